@@ -1,0 +1,33 @@
+"""Start the server, or say in one line why this Python cannot.
+
+The line and exit status 78 (EX_CONFIG) tell a caller who looks for a fitting Python, such as
+the R package, to try the next one.  For that this file must parse on any Python, also 2.7.
+"""
+
+import sys
+
+CANNOT_RUN_HERE = 78
+
+
+def refuse(reason):
+    """Say why this Python cannot run the server and exit with status 78."""
+    version = ".".join(str(part) for part in sys.version_info[:3])
+    sys.stderr.write(
+        "gym_server cannot run on this Python (%s, %s): %s\n" % (version, sys.executable, reason)
+    )
+    sys.exit(CANNOT_RUN_HERE)
+
+
+def main():
+    """Run the command line; never returns."""
+    if sys.version_info < (3, 10):
+        refuse("Python 3.10 or newer is needed")
+    try:
+        from gym_server import cli
+    except ImportError as error:
+        refuse(error)
+    sys.exit(cli.main())
+
+
+if __name__ == "__main__":
+    main()

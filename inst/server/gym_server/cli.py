@@ -1,0 +1,200 @@
+"""The command line."""
+
+from __future__ import annotations
+
+import argparse
+import ipaddress
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from gym_server import __version__
+from gym_server.app import Config, GymApp, create_app
+from gym_server.serve import Server, bind
+
+log = logging.getLogger("gym_server")
+
+# A step that never returns must not keep the server alive for ever.
+_GRACE_SECONDS = 10.0
+
+# After that, for the environments that can be closed.
+_LAST_SECONDS = 2.0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve until asked to stop.
+
+    Args:
+        argv: the arguments; None for the process's own.
+
+    Returns:
+        The exit status: 0 after a stop, 1 when the server cannot start.
+    """
+    options = _parser().parse_args(argv)
+    _set_up_logging(options.log_level)
+    if not _is_loopback(options.host) and not options.no_auth:
+        return _fail(
+            f"--host {options.host} lets anybody on the network run environments on this machine "
+            "and write files; give --no-auth if that is meant"
+        )
+    stop = _Stop()
+    max_body_bytes = options.max_body_mb * 2**20
+    try:
+        listener = bind(options.host, options.port)
+        app = create_app(
+            Config(
+                monitor_dir=_prepare_monitor_dir(options.monitor_dir),
+                temporary_monitors=_is_loopback(options.host),
+                allowed_modules=options.allow_module,
+                max_body_bytes=max_body_bytes,
+                stop=stop,
+            )
+        )
+    except OSError as error:
+        return _fail(_why_not(error, options))
+    server = Server(app, listener, max_body_bytes)
+    stop.server = server
+    _stop_on_signals(stop)
+    if options.stop_on_stdin_eof:
+        threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
+    print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
+    _serve(app, server)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gym-http-server", description="Gymnasium environments over HTTP."
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
+    parser.add_argument(
+        "--port",
+        type=_number(0, 65535),
+        default=5000,
+        help="port; 0 takes a free one (%(default)s)",
+    )
+    parser.add_argument(
+        "--log-level",
+        default="warning",
+        choices=("debug", "info", "warning", "error"),
+        help="what goes to standard error (%(default)s)",
+    )
+    parser.add_argument(
+        "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
+    )
+    parser.add_argument(
+        "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
+    )
+    parser.add_argument(
+        "--allow-module",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
+    )
+    parser.add_argument(
+        "--max-body-mb",
+        type=_number(1, 1024),
+        default=16,
+        help="size of the largest request (%(default)s)",
+    )
+    parser.add_argument(
+        "--no-auth", action="store_true", help="serve a --host that others can reach"
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    return parser
+
+
+def _number(least: int, greatest: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= greatest:
+            raise argparse.ArgumentTypeError(f"{text!r} is not between {least} and {greatest}")
+        return int(text)
+
+    return parse
+
+
+def _set_up_logging(level: str) -> None:
+    logging.basicConfig(
+        level=level.upper(),
+        stream=sys.stderr,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    logging.captureWarnings(True)
+    # It warns whenever two requests arrive at once.
+    logging.getLogger("waitress.queue").setLevel(logging.ERROR)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _prepare_monitor_dir(directory: Path | None) -> Path | None:
+    if directory is None:
+        return None
+    directory.mkdir(parents=True, exist_ok=True)
+    return directory.resolve()
+
+
+def _why_not(error: OSError, options: argparse.Namespace) -> str:
+    if error.filename is not None:
+        return f"the directory {error.filename} cannot be used: {error.strerror}"
+    return (
+        f"port {options.port} on {options.host} cannot be used: {error.strerror or error}; "
+        "--port 0 takes a free one"
+    )
+
+
+def _fail(reason: str) -> int:
+    print(f"gym_server: {reason}", file=sys.stderr, flush=True)
+    return 1
+
+
+class _Stop:
+    """Stops the server, which is made after the application that may want to stop it."""
+
+    server: Server | None = None
+
+    def __call__(self) -> None:
+        if self.server is not None:
+            self.server.stop()
+
+
+def _stop_on_signals(stop: Callable[[], None]) -> None:
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: stop())
+
+
+def _wait_for_eof(stop: Callable[[], None]) -> None:
+    # Not sys.stdin, whose lock this thread would still hold when the interpreter ends.
+    try:
+        while os.read(0, 4096):
+            pass
+    except OSError:
+        pass
+    stop()
+
+
+def _serve(app: GymApp, server: Server) -> None:
+    answered = server.run(_GRACE_SECONDS)
+    closer = threading.Thread(target=app.close, daemon=True)
+    closer.start()
+    closer.join(_GRACE_SECONDS if answered else _LAST_SECONDS)
+    if closer.is_alive() or not answered:
+        log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
+        logging.shutdown()
+        # An ordinary exit would wait for its thread.
+        os._exit(0)

@@ -1,0 +1,187 @@
+"""Make an environment from its id, and say what is wrong with an id that names none."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import importlib
+from collections.abc import Callable, Collection
+
+import gymnasium
+from gymnasium import error
+from gymnasium.envs import registration
+
+from gym_server.errors import GymServerError, environment_error, invalid_parameter
+from gym_server.plain import brief
+
+
+def make(
+    env_id: object, render_mode: str | None, kwargs: dict, allowed_modules: Collection[str]
+) -> gymnasium.Env:
+    """Make an environment.
+
+    Args:
+        env_id: ``Name-v0``, or ``module:Name-v0`` for a module that registers it.
+        render_mode: "rgb_array", "human" (made as "rgb_array": the server opens no window), or
+            None for "rgb_array" where the environment can.
+        kwargs: handed to the environment.
+        allowed_modules: names of the modules that an id may import.
+
+    Raises:
+        GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
+            ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
+            ``invalid_kwargs``, ``environment_error``.
+    """
+    if "render_mode" in kwargs:
+        raise GymServerError(
+            "invalid_kwargs",
+            "kwargs must not carry 'render_mode'",
+            "render_mode is a parameter of its own",
+        )
+    spec = find_spec(env_id, allowed_modules)
+    chosen = _choose_render_mode(ask(_load_creator, spec), spec, render_mode)
+    return ask(_make, spec, chosen, kwargs)
+
+
+def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
+    """Return what the registry knows of an id, after importing its module when it names one.
+
+    Raises:
+        GymServerError: as for ``make()``.
+    """
+    if not isinstance(env_id, str):
+        raise _unusable("malformed_env_id", brief(env_id))
+    module, colon, name = env_id.rpartition(":")
+    if registration.ENV_ID_RE.fullmatch(name) is None or (colon and not _is_module(module)):
+        raise _unusable("malformed_env_id", env_id)
+    if module and module not in allowed_modules:
+        raise GymServerError(
+            "module_not_allowed",
+            f"This server may not import the module '{module}'",
+            f"start the server with --allow-module {module}",
+        )
+    if module:
+        ask(importlib.import_module, module)
+    _register_package_of(name)
+    try:
+        return gymnasium.spec(_with_version(name))
+    except error.Error as failure:
+        raise _explain(failure, env_id, name) from failure
+
+
+def _is_module(text: str) -> bool:
+    return all(part.isidentifier() for part in text.split("."))
+
+
+def _register_package_of(name: str) -> None:
+    """Import the package that registers a namespace, when it is installed."""
+    namespace, _, _ = registration.parse_env_id(name)
+    if namespace in _PACKAGES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(_PACKAGES[namespace])
+
+
+# Since Gymnasium 1.0 packages are no longer found by themselves.
+_PACKAGES = {"ALE": "ale_py"}
+
+
+def _with_version(name: str) -> str:
+    """Return the newest version of an id that names none, as Gymnasium does."""
+    namespace, bare_name, version = registration.parse_env_id(name)
+    if version is None and name not in gymnasium.registry:
+        version = registration.find_highest_version(namespace, bare_name)
+    return registration.get_env_id(namespace, bare_name, version)
+
+
+def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
+    match failure:
+        case error.DeprecatedEnv():
+            return _unusable(
+                "deprecated_env_id", env_id, "that version is deprecated", _use_latest(name)
+            )
+        case error.VersionNotFound():
+            return _unusable(
+                "unknown_env_id", env_id, "there is no such version", _use_latest(name)
+            )
+        case _:
+            return _unusable(
+                "unknown_env_id", env_id, "no environment of that name is registered", _near(name)
+            )
+
+
+def _unusable(
+    code: str, env_id: str, reason: str | None = None, hint: str | None = None
+) -> GymServerError:
+    # The classic server had these words for every id that it could not use.
+    message = f"Attempted to look up malformed environment ID '{env_id}'"
+    return GymServerError(code, f"{message}: {reason}" if reason else message, hint)
+
+
+def _use_latest(name: str) -> str:
+    namespace, bare_name, _ = registration.parse_env_id(name)
+    latest = registration.find_highest_version(namespace, bare_name)
+    return f"use {registration.get_env_id(namespace, bare_name, latest)}"
+
+
+def _near(name: str) -> str | None:
+    ids = list(gymnasium.registry)
+    near = difflib.get_close_matches(name, ids, n=3, cutoff=0.6)
+    if not near:
+        by_lower_case = {env_id.lower(): env_id for env_id in ids}
+        matches = difflib.get_close_matches(name.lower(), by_lower_case, n=3, cutoff=0.6)
+        near = [by_lower_case[match] for match in matches]
+    return f"did you mean {' or '.join(near)}?" if near else None
+
+
+def _load_creator(spec: registration.EnvSpec) -> Callable:
+    if callable(spec.entry_point):
+        return spec.entry_point
+    return registration.load_env_creator(spec.entry_point)
+
+
+def _choose_render_mode(
+    creator: Callable, spec: registration.EnvSpec, wanted: str | None
+) -> str | None:
+    metadata = getattr(creator, "metadata", None)
+    # A function says nothing of what it makes; then Gymnasium gets to see what was asked.
+    modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
+    if wanted is None:
+        return "rgb_array" if modes and "rgb_array" in modes else None
+    if wanted not in ("rgb_array", "human") or (modes is not None and "rgb_array" not in modes):
+        can_draw = modes is None or "rgb_array" in modes
+        supported = '"rgb_array" or "human"' if can_draw else "left out"
+        raise invalid_parameter("render_mode", wanted, f"{supported} for {spec.id}")
+    return "rgb_array"
+
+
+def _make(spec: registration.EnvSpec, render_mode: str | None, kwargs: dict) -> gymnasium.Env:
+    # The checker would repeat itself in a log that nobody reads, and takes time in each step.
+    ours = {"disable_env_checker": True}
+    if render_mode is not None:
+        ours["render_mode"] = render_mode
+    try:
+        return gymnasium.make(spec, **{**ours, **kwargs})
+    except TypeError as failure:
+        if kwargs and any(words in str(failure) for words in _ABOUT_ARGUMENTS):
+            raise GymServerError("invalid_kwargs", str(failure)) from failure
+        raise
+
+
+_ABOUT_ARGUMENTS = ("unexpected keyword argument", "multiple values for", "required positional")
+
+
+def ask(function: Callable, *args: object):
+    """Call into Gymnasium or an environment; translate what it raises.
+
+    Raises:
+        GymServerError: ``missing_dependency`` or ``environment_error``, or one that the function
+            raises itself.
+    """
+    try:
+        return function(*args)
+    except GymServerError:
+        raise
+    except (error.DependencyNotInstalled, ImportError) as failure:
+        raise GymServerError("missing_dependency", str(failure)) from failure
+    except (Exception, SystemExit) as failure:
+        raise environment_error(failure) from failure

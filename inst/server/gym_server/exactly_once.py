@@ -1,0 +1,102 @@
+"""Requests that a client numbers are done once, however often they arrive.
+
+libcurl silently sends a POST again when a kept-alive connection broke before an answer came.
+A step must not be taken twice for that, so a client may put a key and a growing number into
+its requests; a repetition gets the stored answer.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Hashable
+from typing import Generic, NamedTuple, TypeVar
+
+from gym_server.errors import GymServerError
+
+AnswerT = TypeVar("AnswerT")
+
+
+class RequestId(NamedTuple):
+    """What a client calls one of its requests: its own key (1 to 64 characters), a number."""
+
+    key: str
+    number: int
+
+
+class _Latest(Generic[AnswerT]):
+    """The newest request of one key, and its answer."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.number = -1
+        self.content: Hashable = None
+        self.answer: AnswerT | None = None
+        self.used = time.monotonic()
+
+
+class ExactlyOnce(Generic[AnswerT]):
+    """The last answer of each key."""
+
+    def __init__(self, forget_after: float = 15 * 60) -> None:
+        """Start with no keys.
+
+        Args:
+            forget_after: seconds of idleness after which a key is dropped when another comes.
+        """
+        self._forget_after = forget_after
+        self._lock = threading.Lock()
+        self._keys: dict[str, _Latest[AnswerT]] = {}
+
+    def answer(
+        self, request_id: RequestId, content: Hashable, act: Callable[[], AnswerT]
+    ) -> AnswerT:
+        """Do what a request asks, or return the answer that it got before.
+
+        Args:
+            request_id: the key and number that the client gave it.
+            content: what the request asks; a repetition has the same.
+            act: does it; called at most once per number, must not raise.
+
+        Raises:
+            GymServerError: ``request_conflict`` when the number was used for something else
+                or lies before the newest.
+        """
+        latest = self._latest(request_id.key)
+        # Held while the environment moves: a repetition that arrives meanwhile waits for the
+        # answer of the first.
+        with latest.lock:
+            if request_id.number < latest.number:
+                raise _conflict(request_id, f"came after number {latest.number}")
+            if request_id.number == latest.number:
+                if content != latest.content:
+                    raise _conflict(request_id, "was already used for another request")
+            else:
+                latest.answer = act()
+                latest.number = request_id.number
+                latest.content = content
+            latest.used = time.monotonic()
+            return latest.answer  # type: ignore[return-value]
+
+    def _latest(self, key: str) -> _Latest[AnswerT]:
+        now = time.monotonic()
+        with self._lock:
+            latest = self._keys.get(key)
+            if latest is None:
+                self._forget_before(now - self._forget_after)
+                latest = self._keys[key] = _Latest()
+            latest.used = now
+            return latest
+
+    def _forget_before(self, oldest: float) -> None:
+        for key, latest in list(self._keys.items()):
+            if latest.used < oldest and not latest.lock.locked():
+                del self._keys[key]
+
+
+def _conflict(request_id: RequestId, reason: str) -> GymServerError:
+    return GymServerError(
+        "request_conflict",
+        f"Request number {request_id.number} of key '{request_id.key}' {reason}; nothing was done",
+        "number the requests of a key upwards, and give each copy of a client its own key",
+    )

@@ -1,0 +1,84 @@
+"""The one thread that draws, and pictures as PNG.
+
+pygame is one per process: an environment's ``close()`` calls ``pygame.quit()``, which takes
+the fonts of all the others away, and an OpenGL context belongs to the thread that made it.
+So everything that draws or closes runs here, and pygame ends with the process.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+import zlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+
+ResultT = TypeVar("ResultT")
+
+
+class RenderThread:
+    """Runs one piece of drawing or closing after the other."""
+
+    def __init__(self) -> None:
+        """Start no thread yet: a server that never draws has none."""
+        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+
+    def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
+        """Run a function on the render thread; return its result or raise what it raises."""
+        return self._executor.submit(_keep_pygame_and, draw, *args).result()
+
+    def stop(self) -> None:
+        """Let what is queued finish, and end the thread."""
+        self._executor.shutdown()
+
+
+def _keep_pygame_and(draw: Callable[..., ResultT], *args: object) -> ResultT:
+    # Environments import pygame when they first draw and quit it when they close, so looking
+    # before each piece of work is early enough, and a server that never draws never pays for
+    # the import.
+    if "pygame" in sys.modules:
+        import pygame
+
+        pygame.quit = pygame.display.quit = _quit_later
+    return draw(*args)
+
+
+def _quit_later() -> None:
+    """Stand in for pygame's quit, which pygame itself runs when the process ends."""
+
+
+_COLOUR_TYPES = {1: 0, 3: 2, 4: 6}
+
+
+def png(frame: np.ndarray) -> bytes:
+    """Return a picture as a PNG file.
+
+    Args:
+        frame: uint8 array of shape (height, width), (height, width, 1), (height, width, 3) for
+            RGB or (height, width, 4) for RGBA.
+
+    Raises:
+        ValueError: for another dtype or shape.
+    """
+    if frame.ndim == 2:
+        frame = frame[:, :, np.newaxis]
+    if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] not in _COLOUR_TYPES:
+        raise ValueError(f"no picture: {frame.dtype} of shape {frame.shape}")
+    height, width, channels = frame.shape
+    # Each row starts with the number of its filter: 0, none.
+    rows = np.zeros((height, 1 + width * channels), dtype=np.uint8)
+    rows[:, 1:] = frame.reshape(height, width * channels)
+    header = struct.pack(">2I5B", width, height, 8, _COLOUR_TYPES[channels], 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + _chunk(b"IHDR", header)
+        + _chunk(b"IDAT", zlib.compress(rows.tobytes(), 1))
+        + _chunk(b"IEND", b"")
+    )
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))

@@ -1,0 +1,206 @@
+"""Directories that monitors write: which are allowed, and which files in them are ours."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+import threading
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import TextIO
+
+from gym_server.errors import GymServerError
+from gym_server.plain import brief
+
+EPISODES = "episodes.csv"
+MANIFEST = "gym-monitor.json"
+
+_VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
+
+
+def video_name(episode: int) -> str:
+    """Return the name that RecordVideo gives the video of an episode."""
+    return f"rl-video-episode-{episode}.mp4"
+
+
+class MonitorRoot:
+    """Where the monitors of a server may write."""
+
+    def __init__(self, root: Path, allow_temporary: bool) -> None:
+        """Set the limits.
+
+        Args:
+            root: relative directories lie below it, and absolute ones may.
+            allow_temporary: whether absolute ones may also lie below the system's temporary
+                directory, as the classic examples have it.
+        """
+        self.root = root
+        self._allowed = [root]
+        if allow_temporary:
+            self._allowed.append(Path(tempfile.gettempdir()))
+            if os.name == "posix":
+                self._allowed.append(Path("/tmp"))  # noqa: S108 - the classic examples' own
+        self._lock = threading.Lock()
+        self._in_use: set[Path] = set()
+
+    def claim(self, directory: str, force: bool, resume: bool) -> MonitorDirectory:
+        """Make a directory ready for one monitor, and refuse it to all others.
+
+        Args:
+            directory: as the client names it.
+            force: delete the files that an earlier monitor wrote there.
+            resume: keep them and go on counting; ``force`` goes first.
+
+        Raises:
+            GymServerError: ``monitor_directory``.
+        """
+        path = self._resolve(directory)
+        with self._lock:
+            if path in self._in_use:
+                raise _refuse(directory, "another monitor writes there")
+            self._in_use.add(path)
+        claimed = MonitorDirectory(path, self._release)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            if path.resolve() != path:
+                raise _refuse(directory, "it leads elsewhere")
+            claimed.prepare(force, resume)
+        except OSError as error:
+            claimed.release()
+            raise _refuse(directory, error.strerror or str(error)) from error
+        except BaseException:
+            claimed.release()
+            raise
+        return claimed
+
+    def _release(self, path: Path) -> None:
+        with self._lock:
+            self._in_use.discard(path)
+
+    def _resolve(self, directory: str) -> Path:
+        if "\0" in directory:
+            raise _refuse(directory, "it contains a NUL")
+        if ".." in PurePosixPath(directory).parts or ".." in PureWindowsPath(directory).parts:
+            raise _refuse(directory, "it climbs")
+        try:
+            # Links are followed before the comparison, so that none leads out.
+            path = Path(self.root, directory).resolve()
+            allowed = [root.resolve() for root in self._allowed]
+        except (OSError, RuntimeError, ValueError) as error:
+            raise _refuse(directory, str(error)) from error
+        if not any(root in path.parents for root in allowed):
+            raise _refuse(directory, "it is outside the directory that this server may write")
+        return path
+
+
+class MonitorDirectory:
+    """A directory that one monitor writes, and the list of files that monitors wrote there.
+
+    Attributes:
+        path: where it is.
+        next_episode: the number of the episode that begins next.
+    """
+
+    def __init__(self, path: Path, on_release) -> None:
+        """Name a directory; ``MonitorRoot.claim()`` prepares it."""
+        self.path = path
+        self.next_episode = 0
+        self._files: set[str] = set()
+        self._on_release = on_release
+        self._prepared = False
+
+    def prepare(self, force: bool, resume: bool) -> None:
+        """Read what earlier monitors left and keep it, delete it or refuse; see ``claim()``."""
+        self._read_manifest()
+        present = {name for name in os.listdir(self.path) if _is_monitor_file(name)}
+        foreign = present - self._files
+        if foreign:
+            raise _refuse(
+                str(self.path),
+                f"it holds {min(foreign)}, which no monitor of this server wrote",
+                "move that file away, or take another directory",
+            )
+        linked = [name for name in present if (self.path / name).is_symlink()]
+        if linked:
+            raise _refuse(str(self.path), f"{linked[0]} is a link")
+        if force:
+            for name in present:
+                (self.path / name).unlink()
+            self._files.clear()
+            self.next_episode = 0
+        elif present and not resume:
+            raise _refuse(
+                str(self.path),
+                "it holds the files of an earlier monitor",
+                "take force = true to delete them, or resume = true to go on counting",
+            )
+        self._prepared = True
+        self.add(EPISODES)
+
+    def open_table(self, columns: Iterable[str]) -> TextIO:
+        """Open the table of episodes for appending; a new one gets its header."""
+        path = self.path / EPISODES
+        table = open(path, "a", encoding="ascii", newline="")  # noqa: SIM115 - the monitor closes it
+        if table.tell() == 0:
+            table.write(",".join(columns) + "\n")
+            table.flush()
+        return table
+
+    def add(self, name: str) -> None:
+        """Put a file on the list, before it is written."""
+        self._files.add(name)
+        self._write_manifest()
+
+    def release(self) -> None:
+        """Write the list for a later monitor and give the directory free."""
+        if self._prepared:
+            self._write_manifest()
+        self._on_release(self.path)
+
+    def _read_manifest(self) -> None:
+        path = self.path / MANIFEST
+        if path.is_symlink():
+            raise _refuse(str(self.path), f"{MANIFEST} is a link")
+        try:
+            manifest = json.loads(path.read_text(encoding="utf-8"))
+            files = {str(name) for name in manifest["files"]}
+            self.next_episode = int(manifest["next_episode"])
+        except FileNotFoundError:
+            return
+        except (ValueError, KeyError, TypeError) as error:
+            raise _refuse(str(self.path), f"its {MANIFEST} cannot be read") from error
+        # A list from elsewhere must not make us delete anything but a monitor's own files.
+        self._files = {name for name in files if _is_monitor_file(name)}
+        # A server that was killed could not write the last number.
+        self.next_episode = max([self.next_episode, *self._episodes_in_table()])
+
+    def _episodes_in_table(self) -> list[int]:
+        try:
+            lines = (self.path / EPISODES).read_text(encoding="ascii").splitlines()[1:]
+            return [int(line.split(",")[0]) + 1 for line in lines if line]
+        except FileNotFoundError:
+            return []
+
+    def _write_manifest(self) -> None:
+        manifest = {
+            "written_by": "gym_server",
+            "next_episode": self.next_episode,
+            "files": sorted(self._files),
+        }
+        new = self.path / f"{MANIFEST}.new"
+        new.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+        new.replace(self.path / MANIFEST)
+
+
+def _is_monitor_file(name: str) -> bool:
+    return name == EPISODES or _VIDEO.fullmatch(name) is not None
+
+
+def _refuse(directory: str, reason: str, hint: str | None = None) -> GymServerError:
+    return GymServerError(
+        "monitor_directory",
+        f"The directory {brief(directory)} cannot be used: {reason}",
+        hint or "name a directory relative to the server's --monitor-dir, such as 'cartpole-1'",
+    )

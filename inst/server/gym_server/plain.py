@@ -1,0 +1,78 @@
+"""Plain JSON values out of whatever an environment hands over."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+NONFINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
+
+# Deeper than any honest info, and shallow enough for the JSON encoder's own recursion;
+# a structure that contains itself ends here.
+_DEEPEST = 64
+
+
+def plain(value: object, depth: int = 0) -> object:
+    """Turn any value into None, booleans, integers, finite floats, strings, lists and dicts.
+
+    Args:
+        value: anything; NumPy scalars and arrays become Python's, mappings get string keys,
+            non-finite numbers become "NaN", "Infinity" or "-Infinity", and what JSON has no
+            word for becomes its ``repr()``.
+        depth: how deep in the structure the value lies.
+    """
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, (float, np.floating)):
+        return _number(float(value))
+    if depth > _DEEPEST:
+        return _repr(value)
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist(), depth) if value.dtype != object else _array(value, depth)
+    if isinstance(value, (np.bool_, np.integer)):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {_key(key): plain(item, depth + 1) for key, item in value.items()}
+    if isinstance(value, Iterable) and not isinstance(value, (bytes, bytearray, memoryview)):
+        return _items(value, depth)
+    return _repr(value)
+
+
+def brief(value: object, width: int = 80) -> str:
+    """Return a value as JSON text of at most ``width`` characters, for error messages."""
+    try:
+        text = json.dumps(plain(value))
+    except (RecursionError, ValueError):
+        text = _repr(type(value))
+    return text if len(text) <= width else text[: width - 3] + "..."
+
+
+def _number(value: float) -> float | str:
+    if math.isfinite(value):
+        return value
+    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+
+
+def _array(value: np.ndarray, depth: int) -> object:
+    return _items(value, depth) if value.ndim else plain(value.item(), depth + 1)
+
+
+def _items(value: Iterable, depth: int) -> object:
+    # Only what is finite by its kind: an iterator in an info may never end.
+    if isinstance(value, (list, tuple, set, frozenset, np.ndarray, range)):
+        return [plain(item, depth + 1) for item in value]
+    return _repr(value)
+
+
+def _key(key: object) -> str:
+    return key if isinstance(key, str) else str(plain(key))
+
+
+def _repr(value: object) -> str:
+    try:
+        return repr(value)
+    except Exception:
+        return f"<{type(value).__name__}>"

@@ -1,0 +1,280 @@
+"""The protocol's routes: each takes a parsed request, calls one method, and answers."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import gymnasium
+import numpy
+
+from gym_server import __version__, openapi, wire
+from gym_server.errors import GymServerError
+from gym_server.instances import Choices, Instance, Instances
+from gym_server.monitor_directory import MonitorRoot
+from gym_server.wire import Field, Png
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the routes work on.
+
+    Attributes:
+        instances: the environments.
+        monitor_root: where monitors may write.
+        stop: asks the server to stop once the requests under way are answered.
+    """
+
+    instances: Instances
+    monitor_root: MonitorRoot
+    stop: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A request, parsed.
+
+    Attributes:
+        services: what to work on.
+        path: the variable parts of the URL.
+        body: the request's JSON object.
+        fields: the values of the fields that the route declares; None for absent ones.
+    """
+
+    services: Services
+    path: dict[str, str]
+    body: dict
+    fields: dict
+
+    @property
+    def instance(self) -> Instance:
+        """The instance that the URL names."""
+        return self.services.instances.get(self.path["instance_id"])
+
+
+Handler = Callable[[Call], dict | Png | None]
+
+
+@dataclass(frozen=True)
+class Route:
+    """One route of the protocol.
+
+    Attributes:
+        method: "GET" or "POST".
+        path: Flask's rule, which also matches without its last slash.
+        fields: what the body may hold.
+        handler: returns a JSON object, an image, or None for 204.
+        answer: what the answer holds, in words.
+        once: whether the body may also number the request, which is then done once however
+            often it arrives.
+    """
+
+    method: str
+    path: str
+    fields: tuple[Field, ...]
+    handler: Handler
+    answer: str
+    once: bool = False
+
+    @property
+    def status(self) -> int:
+        """The status of an ordinary answer."""
+        return 200 if self.answer else 204
+
+
+ROUTES: list[Route] = []
+
+_INSTANCE = "/v1/envs/<instance_id>/"
+
+
+def _route(
+    method: str, path: str, *fields: Field, answer: str = "", once: bool = False
+) -> Callable[[Handler], Handler]:
+    def declare(handler: Handler) -> Handler:
+        ROUTES.append(Route(method, path, fields, handler, answer, once))
+        return handler
+
+    return declare
+
+
+@_route(
+    "POST",
+    "/v1/envs/",
+    Field("env_id", wire.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field("seed", wire.INTEGER, "Seeds the action space, and the first reset without a seed."),
+    Field("render_mode", wire.TEXT, "rgb_array (the default where it is supported) or human."),
+    Field("kwargs", wire.OBJECT, "Handed to the environment."),
+    *map(wire.not_yet, ("num_envs", "vectorization_mode", "autoreset_mode", "wrappers")),
+    answer="instance_id",
+    once=True,
+)
+def env_create(call: Call) -> dict:
+    """Create an environment."""
+    fields = call.fields
+    choices = Choices(fields["env_id"], fields["seed"], fields["render_mode"], fields["kwargs"])
+    return {"instance_id": call.services.instances.create(choices)}
+
+
+@_route("GET", "/v1/envs/", answer="all_envs: env_id by instance_id")
+def env_list_all(call: Call) -> dict:
+    """List the environments."""
+    return {"all_envs": call.services.instances.env_ids()}
+
+
+@_route("GET", _INSTANCE, answer="all about the environment; needs_reset also after done")
+def env_about(call: Call) -> dict:
+    """Tell all about an environment."""
+    return call.instance.about()
+
+
+@_route(
+    "POST",
+    _INSTANCE + "reset/",
+    Field("seed", wire.INTEGER, "Seeds the environment and its action space."),
+    Field("options", wire.OBJECT, "The environment's own."),
+    wire.not_yet("reset_mask"),
+    answer="observation, info",
+    once=True,
+)
+def env_reset(call: Call) -> dict:
+    """Start an episode."""
+    return call.instance.reset(call.fields["seed"], call.fields["options"])
+
+
+@_route(
+    "POST",
+    _INSTANCE + "step/",
+    Field("action", wire.ANYTHING, "A member of the action space.", required=True),
+    Field("render", wire.BOOLEAN, "Classic; a frame is drawn when somebody asks for it."),
+    answer="observation, reward, done, terminated, truncated, info",
+    once=True,
+)
+def env_step(call: Call) -> dict:
+    """Take one step."""
+    return call.instance.step(call.fields["action"])
+
+
+@_route("GET", _INSTANCE + "action_space/", answer="info: the space")
+def env_action_space_info(call: Call) -> dict:
+    """Describe the action space."""
+    return {"info": call.instance.action_space_info}
+
+
+@_route("GET", _INSTANCE + "observation_space/", answer="info: the space")
+def env_observation_space_info(call: Call) -> dict:
+    """Describe the observation space."""
+    return {"info": call.instance.observation_space_info}
+
+
+@_route("GET", _INSTANCE + "action_space/sample/", answer="action")
+def env_action_space_sample(call: Call) -> dict:
+    """Draw an action."""
+    return {"action": call.instance.sample_action()}
+
+
+@_route("GET", _INSTANCE + "action_space/contains/<x>/", answer="member: true or false")
+def env_action_space_contains(call: Call) -> dict:
+    """Tell whether a value is an action."""
+    value = wire.parse_path_value(call.path["x"])
+    return {"member": call.instance.action_contains({"value": value})}
+
+
+_VALUE = Field("value", wire.ANYTHING, "Is it a member? Without it: is the description right?")
+
+
+@_route("POST", _INSTANCE + "action_space/contains/", _VALUE, answer="member: true or false")
+def env_action_space_contains_posted(call: Call) -> dict:
+    """Tell whether a value is an action, or a description the action space's."""
+    return {"member": call.instance.action_contains(call.body)}
+
+
+@_route("POST", _INSTANCE + "observation_space/contains/", _VALUE, answer="member: true or false")
+def env_observation_space_contains(call: Call) -> dict:
+    """Tell whether a value is an observation, or a description the observation space's."""
+    return {"member": call.instance.observation_contains(call.body)}
+
+
+@_route("GET", _INSTANCE + "render/", answer="the current frame, image/png")
+def env_render(call: Call) -> Png:
+    """Draw the current state."""
+    return Png(call.instance.render())
+
+
+@_route(
+    "POST",
+    _INSTANCE + "monitor/start/",
+    Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
+    Field("force", wire.BOOLEAN, "Delete what an earlier monitor wrote there."),
+    Field("resume", wire.BOOLEAN, "Go on counting where the earlier monitor ended."),
+    Field("video_callable", wire.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+)
+def env_monitor_start(call: Call) -> None:
+    """Record the episodes that start from now on."""
+    fields = call.fields
+    call.instance.start_monitor(
+        call.services.monitor_root,
+        fields["directory"],
+        bool(fields["force"]),
+        bool(fields["resume"]),
+        fields["video_callable"] or 0,
+    )
+
+
+@_route("POST", _INSTANCE + "monitor/close/")
+def env_monitor_close(call: Call) -> None:
+    """Finish the monitor's files."""
+    call.instance.close_monitor()
+
+
+@_route("POST", _INSTANCE + "close/", once=True)
+def env_close(call: Call) -> None:
+    """Close an environment."""
+    call.services.instances.close(call.path["instance_id"])
+
+
+@_route(
+    "POST",
+    "/v1/upload/",
+    Field("training_dir", wire.TEXT, "A monitor's directory.", required=True),
+    Field("api_key", wire.TEXT, "A key to OpenAI Gym.", required=True),
+    Field("algorithm_id", wire.ANYTHING, "Ignored."),
+    answer="nothing: 410 always",
+)
+def upload(call: Call) -> None:
+    """Refuse an upload: the service that took them closed in 2017."""
+    raise GymServerError(
+        "upload_closed",
+        "Nothing was uploaded: OpenAI closed its scoreboard in 2017",
+        "the monitor's directory holds your results",
+    )
+
+
+@_route("POST", "/v1/shutdown/", answer="message")
+def shutdown(call: Call) -> dict:
+    """Answer the requests under way and stop the server."""
+    call.services.stop()
+    return {"message": "Server shutting down"}
+
+
+@_route("GET", "/v1/health/", answer="status, instances, versions, pid")
+def health(call: Call) -> dict:
+    """Tell that the server is well, and its versions."""
+    return {
+        "status": "ok",
+        "instances": len(call.services.instances.env_ids()),
+        "versions": {
+            "gym_server": __version__,
+            "gymnasium": gymnasium.__version__,
+            "numpy": numpy.__version__,
+            "python": platform.python_version(),
+        },
+        "pid": os.getpid(),
+    }
+
+
+@_route("GET", "/v1/openapi.json/", answer="this document")
+def openapi_document(call: Call) -> dict:
+    """Describe the protocol for machines."""
+    return openapi.document(ROUTES)

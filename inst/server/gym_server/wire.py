@@ -1,0 +1,255 @@
+"""What travels: strict JSON both ways, the fields of a request, the shape of an answer."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from gym_server.errors import GymServerError, invalid_parameter, missing_parameter
+from gym_server.exactly_once import RequestId
+from gym_server.plain import plain
+
+JSON = "application/json"
+
+# JSON ---------------------------------------------------------------------------------------
+
+_encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
+
+
+def dumps(value: object) -> bytes:
+    """Return a value as strict JSON; non-finite numbers become strings."""
+    try:
+        text = _encode(value)
+    except (TypeError, ValueError):
+        # Only now walk through all of it: an ordinary step has nothing to convert.
+        text = _encode(plain(value))
+    return text.encode("ascii")
+
+
+def loads(raw: bytes) -> dict:
+    """Return the JSON object in a request's body.
+
+    Args:
+        raw: the body; nothing, ``null``, ``""`` and ``[]`` mean an empty object.
+
+    Raises:
+        GymServerError: ``malformed_json`` or ``not_an_object``.
+    """
+    if not raw.strip():
+        return {}
+    try:
+        body = json.loads(raw, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise GymServerError(
+            "malformed_json", f"The request's body is not valid JSON: {error}"
+        ) from None
+    if body is None or body == "" or body == []:
+        return {}
+    if not isinstance(body, dict):
+        raise GymServerError(
+            "not_an_object",
+            f"The request's body must be a JSON object, not {_KIND_NAMES[type(body)]}",
+        )
+    return body
+
+
+_KIND_NAMES = {
+    bool: "a boolean",
+    int: "a number",
+    float: "a number",
+    str: "a string",
+    list: "a list",
+}
+
+
+def _refuse_constant(name: str) -> object:
+    raise ValueError(f'{name} is not JSON (as a string, "{name}", it is)')
+
+
+# Fields -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a field may hold.
+
+    Attributes:
+        schema: its JSON schema.
+        wanted: what it must be, in words that follow "must be".
+        parse: turns the JSON value into ours; raises ValueError for what does not fit.
+        empty_is_absent: classic clients send "" or [] for a parameter that they do not set.
+    """
+
+    schema: dict
+    wanted: str
+    parse: Callable[[object], object]
+    empty_is_absent: bool = True
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a request's body."""
+
+    name: str
+    kind: Kind
+    doc: str
+    required: bool = False
+
+
+def read(body: dict, fields: Iterable[Field]) -> dict:
+    """Return the fields' values from a request's body; None for those that are absent.
+
+    Raises:
+        GymServerError: ``missing_parameter``, ``invalid_parameter``, ``not_supported``.
+    """
+    values = {}
+    for field in fields:
+        value = body.get(field.name)
+        if value is None or (field.kind.empty_is_absent and value in ("", [])):
+            if field.required:
+                raise missing_parameter(field.name)
+            values[field.name] = None
+            continue
+        try:
+            values[field.name] = field.kind.parse(value)
+        except ValueError:
+            raise invalid_parameter(field.name, value, field.kind.wanted) from None
+    return values
+
+
+def integer(value: object) -> int:
+    """Return an integer or an integer-valued float as an integer >= 0, else raise ValueError."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError
+    if not math.isfinite(value) or value % 1 != 0 or value < 0:
+        raise ValueError
+    return int(value)
+
+
+def _boolean(value: object) -> bool:
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, str) and value.lower() in ("true", "false"):
+        return value.lower() == "true"
+    raise ValueError
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise ValueError
+    return value
+
+
+def _object(value: object) -> dict:
+    if not isinstance(value, dict):
+        raise ValueError
+    return value
+
+
+def _video_callable(value: object) -> int:
+    """Return 0 for no videos, n for every n-th episode."""
+    if isinstance(value, (bool, str)):
+        return int(_boolean(value))
+    return integer(value)
+
+
+def _request_id(value: object) -> RequestId:
+    value = _object(value)
+    key, number = _text(value.get("key")), integer(value.get("number"))
+    # It is echoed in a header, where nothing else may stand.
+    if not (1 <= len(key) <= 64 and all("!" <= character <= "~" for character in key)):
+        raise ValueError
+    return RequestId(key, number)
+
+
+def _not_yet(name: str) -> Kind:
+    def refuse(value: object) -> object:
+        raise GymServerError("not_supported", f"This server does not support '{name}'")
+
+    return Kind({"not": {}}, "absent", refuse)
+
+
+ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
+ANY_ID = Kind({"type": "string"}, "a string", lambda value: value)
+BOOLEAN = Kind({"type": "boolean"}, "true or false", _boolean)
+INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
+TEXT = Kind({"type": "string"}, "a string", _text)
+OBJECT = Kind({"type": "object"}, "an object", _object)
+VIDEO_CALLABLE = Kind(
+    {"type": ["boolean", "integer"], "minimum": 0},
+    "true, false or an integer n for every n-th episode",
+    _video_callable,
+)
+REQUEST_ID = Kind(
+    {
+        "type": "object",
+        "required": ["key", "number"],
+        "properties": {
+            "key": {"type": "string", "minLength": 1, "maxLength": 64, "pattern": "^[!-~]+$"},
+            "number": {"type": "integer", "minimum": 0},
+        },
+    },
+    'an object of a "key" (1 to 64 visible ASCII characters) and a "number" (an integer, '
+    "0 or greater)",
+    _request_id,
+)
+
+REQUEST = Field(
+    "request",
+    REQUEST_ID,
+    "Names this request, so that it is done once however often it arrives: a key of the "
+    "client's own and a number that grows.",
+)
+
+
+def not_yet(name: str) -> Field:
+    """Declare a field that is refused rather than ignored."""
+    return Field(name, _not_yet(name), "Not supported.")
+
+
+# Answers ------------------------------------------------------------------------------------
+
+
+class Answer(NamedTuple):
+    """An answer as it goes out, and is stored for a repetition."""
+
+    status: int
+    body: bytes
+    content_type: str = JSON
+    headers: tuple[tuple[str, str], ...] = ()
+
+
+def answer(result: dict | Png | None, request_id: RequestId | None, status: int = 200) -> Answer:
+    """Put a route's result into an answer.
+
+    Args:
+        result: a JSON object, an image, or None for an answer without content (204).
+        request_id: what the client called its request, echoed when given.
+        status: the HTTP status of a JSON answer.
+    """
+    if isinstance(result, Png):
+        return Answer(200, result.data, "image/png")
+    if result is None:
+        headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
+        # Strictly typed classic clients expect Flask's default type here.
+        return Answer(204, b"", "text/html; charset=utf-8", headers)
+    if request_id is not None:
+        result = {**result, "request": request_id._asdict()}
+    return Answer(status, dumps(result))
+
+
+class Png(NamedTuple):
+    """A PNG image."""
+
+    data: bytes
+
+
+def parse_path_value(text: str) -> object:
+    """Return a value that stands in a URL: JSON where it is JSON, else the text itself."""
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError):
+        return text
