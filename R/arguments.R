@@ -1,0 +1,97 @@
+# Checks of arguments. Each returns its value, invisibly, or aborts with
+# `gym_error_argument`, naming the argument and what was given for it.
+
+check_count <- function(x, min = 1, max = .Machine$integer.max, allow_null = FALSE,
+                        arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (allow_null && is.null(x)) {
+    return(invisible(x))
+  }
+  whole <- is_number(x) && x == trunc(x)
+  if (!whole || x < min || x > max) {
+    must <- paste0("a whole number", range_text(min, max), if (allow_null) " or NULL")
+    abort_argument(x, must, arg, call)
+  }
+  invisible(x)
+}
+
+check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE,
+                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (allow_null && is.null(x)) {
+    return(invisible(x))
+  }
+  if (!is_number(x) || x < min || x > max) {
+    must <- paste0("a number", range_text(min, max), if (allow_null) " or NULL")
+    abort_argument(x, must, arg, call)
+  }
+  invisible(x)
+}
+
+# What set.seed() takes: any whole number that R's integers can hold.
+check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  check_count(x, min = -.Machine$integer.max, allow_null = TRUE, arg = arg, call = call)
+}
+
+check_flag <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!rlang::is_bool(x)) {
+    abort_argument(x, "TRUE or FALSE", arg, call)
+  }
+  invisible(x)
+}
+
+check_string <- function(x, allow_null = FALSE,
+                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (allow_null && is.null(x)) {
+    return(invisible(x))
+  }
+  if (!rlang::is_string(x) || is.na(x) || !nzchar(x)) {
+    abort_argument(x, paste0("a string", if (allow_null) " or NULL"), arg, call)
+  }
+  invisible(x)
+}
+
+check_choice <- function(x, choices, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!rlang::is_string(x) || !x %in% choices) {
+    abort_argument(x, paste("one of", paste0('"', choices, '"', collapse = ", ")), arg, call)
+  }
+  invisible(x)
+}
+
+abort_argument <- function(x, must, arg, call) {
+  gym_abort(
+    paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
+    class = "gym_error_argument",
+    argument = arg,
+    value = x,
+    call = call
+  )
+}
+
+is_number <- function(x) is.numeric(x) && length(x) == 1L && is.null(dim(x)) && !is.na(x)
+
+range_text <- function(min, max) {
+  # The largest integer that R can hold limits a count without anybody meaning it.
+  bounded <- max < .Machine$integer.max
+  above <- min > -.Machine$integer.max
+  if (above && bounded) {
+    paste(" from", format(min), "to", format(max))
+  } else if (above) {
+    paste(" of at least", format(min))
+  } else if (bounded) {
+    paste(" of at most", format(max))
+  } else {
+    ""
+  }
+}
+
+describe_argument <- function(x) {
+  if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(x))) {
+    describe_value(x)
+  } else if (is.function(x)) {
+    "a function"
+  } else if (is.object(x)) {
+    paste("an object of class", class(x)[[1L]])
+  } else {
+    kind <- if (is.list(x)) "list" else paste(typeof(x), "vector")
+    paste0(if (is.integer(x)) "an " else "a ", kind, " of length ", length(x))
+  }
+}

@@ -1,0 +1,61 @@
+#' Draw an environment's current frame
+#'
+#' Asks the server for a picture of the environment as it is now.
+#'
+#' @inheritParams env_reset
+#' @return An object of class `gym_frame`: an integer array of height x width x
+#'   3 (red, green, blue, each 0 to 255). [plot()] shows it, [as.raster()] makes
+#'   it a raster image.
+#' @section Errors: `gym_error_http_400` for an unknown instance, one that has
+#'   not been reset yet (code `reset_needed`) or that cannot be drawn (code
+#'   `cannot_render`); `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", seed = 1)
+#' env$reset()
+#' frame <- env_render(env$client, env$instance_id)
+#' plot(frame)
+#' env$close()
+env_render <- function(x, instance_id) {
+  check_client(x)
+  check_string(instance_id)
+  route <- paste0(instance_route(instance_id), "render/")
+  response <- send(x, route)
+  if (response$status_code != 200L) {
+    parse_answer(response, paste0("GET ", x$remote_base, route))
+  }
+  pixels <- png::readPNG(response$content)[, , 1:3, drop = FALSE]
+  pixels <- round(pixels * 255)
+  storage.mode(pixels) <- "integer"
+  structure(pixels, class = "gym_frame")
+}
+
+#' @importFrom grDevices as.raster
+#' @export
+as.raster.gym_frame <- function(x, ...) {
+  as.raster(unclass(x), max = 255L)
+}
+
+#' Show a frame
+#'
+#' Draws the picture as large as the plotting region allows, its proportions
+#' kept.
+#'
+#' @param x A frame, from [env_render()].
+#' @param ... Unused.
+#' @return The frame, invisibly.
+#' @export
+plot.gym_frame <- function(x, ...) {
+  old <- graphics::par(mar = c(0, 0, 0, 0))
+  on.exit(graphics::par(old))
+  graphics::plot.new()
+  graphics::plot.window(c(0, ncol(x)), c(0, nrow(x)), asp = 1, xaxs = "i", yaxs = "i")
+  graphics::rasterImage(as.raster(x), 0, 0, ncol(x), nrow(x))
+  invisible(x)
+}
+
+#' @export
+print.gym_frame <- function(x, ...) {
+  cat("<gym_frame: ", ncol(x), " x ", nrow(x), " pixels>\n", sep = "")
+  invisible(x)
+}

@@ -1,0 +1,43 @@
+#' gym: R at the wheel of Gymnasium
+#'
+#' Plays the environments of [Gymnasium](https://gymnasium.farama.org) from R.
+#' [gym_make()] makes an environment, [rollout()] plays a policy in it,
+#' [search_random()] finds the weights of a small neural network that solves
+#' it. The classic client calls ([env_create()], [env_reset()], [env_step()]
+#' and the others) work as they always did.
+#'
+#' @section Errors:
+#' Every error of this package has class `gym_error` and one of these classes:
+#'
+#' | class | when |
+#' |---|---|
+#' | `gym_error_argument` | an argument is not what the function takes; nothing was sent |
+#' | `gym_error_space` | an action or observation does not fit its space |
+#' | `gym_error_http` | the server refused; also has a class with the status, such as `gym_error_http_400`, and the fields `status`, `code`, `hint` |
+#' | `gym_error_connection` | no answer: no server there, connection lost, time over |
+#' | `gym_error_server_start` | a server could not be started |
+#'
+#' ```r
+#' tryCatch(
+#'   env_step(client, "0123abcd", 1),
+#'   gym_error_http_400 = function(cnd) cnd$code,
+#'   gym_error_connection = function(cnd) "no server"
+#' )
+#' ```
+#'
+#' @importFrom rlang %||%
+#' @keywords internal
+"_PACKAGE"
+
+# What this R session holds: the local servers it started and its own client.
+# Being an environment it is never identical to a copy that was read from a
+# file or sent to another process, which is how a client notices that it has
+# been moved.
+the_session <- new.env(parent = emptyenv())
+the_session$servers <- list()
+the_session$client <- NULL
+
+.onLoad <- function(libname, pkgname) {
+  the_session$pid <- Sys.getpid()
+  reg.finalizer(the_session, stop_session_servers, onexit = TRUE)
+}

@@ -1,0 +1,65 @@
+#' Record an environment's episodes
+#'
+#' From the next reset on the server writes one row for each finished episode
+#' into `episodes.csv`: its number, return, length in steps and seconds. Videos
+#' are recorded where `video_callable` asks for them.
+#'
+#' @inheritParams env_reset
+#' @param directory Where the server writes, a string: a path below the server's
+#'   directory for monitors (its option `--monitor-dir`), or, for a server on
+#'   this machine, below the system's directory for temporary files.
+#' @param force Whether to delete what an earlier monitor left in the directory;
+#'   other files are never touched. Default `FALSE`.
+#' @param resume Whether to go on counting where an earlier monitor stopped.
+#'   Default `FALSE`: a directory with an earlier monitor's files is refused.
+#' @param video_callable Which episodes to record as videos: `FALSE`, the
+#'   default, for none, `TRUE` for each, or a whole number n for every n-th,
+#'   beginning with the first. Needs the server's extra `video` (the Python
+#'   package moviepy).
+#' @return Nothing, invisibly.
+#' @section Errors: `gym_error_http_400` for an unknown instance, a directory
+#'   that is refused, an active monitor, or videos that cannot be made, with the
+#'   reason; `gym_error_argument`; `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", seed = 1)
+#' directory <- file.path(tempdir(), "cartpole")
+#' env_monitor_start(env$client, env$instance_id, directory, force = TRUE)
+#' invisible(rollout(env, policy_random(), episodes = 3))
+#' env_monitor_close(env$client, env$instance_id)
+#' read.csv(file.path(directory, "episodes.csv"))
+#' env$close()
+env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume = FALSE,
+                              video_callable = FALSE) {
+  check_client(x)
+  check_string(instance_id)
+  check_string(directory)
+  check_flag(force)
+  check_flag(resume)
+  if (!isTRUE(video_callable) && !isFALSE(video_callable)) {
+    check_count(video_callable, min = 1)
+  }
+  fields <- list(
+    directory = directory, force = force, resume = resume, video_callable = video_callable
+  )
+  request_answer(x, paste0(instance_route(instance_id), "monitor/start/"), to_json(fields), "POST")
+  invisible()
+}
+
+#' Stop recording an environment's episodes
+#'
+#' Ends the monitor and finishes its files. Closing the environment does the
+#' same.
+#'
+#' @inheritParams env_reset
+#' @return Nothing, invisibly.
+#' @section Errors: `gym_error_http_400` for an unknown instance or one without
+#'   a monitor, `gym_error_connection`.
+#' @seealso [env_monitor_start()], with an example.
+#' @export
+env_monitor_close <- function(x, instance_id) {
+  check_client(x)
+  check_string(instance_id)
+  request_answer(x, paste0(instance_route(instance_id), "monitor/close/"), "{}", "POST")
+  invisible()
+}

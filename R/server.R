@@ -1,0 +1,309 @@
+# Local servers: started by this session, ended with it. The server ends when its
+# standard input closes, which happens however the R session ends.
+
+#' Use the session's server
+#'
+#' Returns the client that functions take when they are given none. It talks to
+#' the server that the environment variable `GYM_SERVER_URL` names or, without
+#' it, to one on this machine, which is started at the first call and stops with
+#' the session.
+#'
+#' @return A client, as [create_GymClient()] makes it.
+#' @section Errors: `gym_error_server_start` when no server could be started.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' gym_client()
+gym_client <- function() {
+  url <- Sys.getenv("GYM_SERVER_URL")
+  if (nzchar(url)) {
+    return(named_client(url))
+  }
+  if (is.null(the_session$client) || !is_running(the_session$client)) {
+    the_session$client <- gym_server_start()
+  }
+  the_session$client
+}
+
+# One client for all calls, so that they share its connection.
+named_client <- function(url) {
+  if (!identical(the_session$named_url, url)) {
+    the_session$named_client <- create_GymClient(url)
+    the_session$named_url <- url
+  }
+  the_session$named_client
+}
+
+# In a forked child the parent's server is as good as its own.
+is_running <- function(client) {
+  server <- the_session$servers[[client$remote_base]]
+  !is.null(server) && (Sys.getpid() != the_session$pid || server$process$is_alive())
+}
+
+#' Start a server on this machine
+#'
+#' Starts the server that comes with the package as a process of its own and
+#' waits until it takes connections. It stops with the R session, also when that
+#' is killed.
+#'
+#' Python is looked for in `python`; in the environment variable `GYM_PYTHON`; in
+#' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); on the `PATH`.
+#' The first that can run the server is taken. Where `python` or `GYM_PYTHON`
+#' names one, no other is tried.
+#'
+#' @param port The port to listen on, a whole number; `NULL`, the default, takes
+#'   a free one.
+#' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
+#' @param ... Further options of the server, by name: `monitor_dir = "runs"` is
+#'   its `--monitor-dir runs`. `log_level = "info"` logs every start and stop,
+#'   `allow_module = c("a", "b")` names Python modules whose environments may be
+#'   made.
+#' @param timeout How long the start may take, in seconds; the default is 60.
+#' @return A client for the server, as [create_GymClient()] makes it.
+#' @section Errors: `gym_error_server_start`, with the server's own words: no
+#'   Python can run it, the port is taken, it did not start in time;
+#'   `gym_error_argument`.
+#' @seealso [gym_server_stop()], [gym_server_log()], [gym_client()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' server <- gym_server_start()
+#' env_list_all(server)
+#' gym_server_stop(server)
+gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
+  check_count(port, min = 0, allow_null = TRUE)
+  check_string(python, allow_null = TRUE)
+  check_number(timeout, min = 0.001)
+  arguments <- c(
+    "-m", "gym_server", "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
+    server_options(list(...))
+  )
+  candidates <- python_candidates(python)
+  refusals <- character()
+  for (candidate in candidates) {
+    server <- launch_server(candidate, arguments, timeout)
+    if (is.list(server)) {
+      the_session$servers[[server$url]] <- server
+      return(create_GymClient(server$url))
+    }
+    refusals <- c(refusals, server)
+  }
+  abort_no_python(python, candidates, refusals)
+}
+
+# Extra options as the command line takes them: log_level = "info" becomes
+# --log-level info, TRUE a flag, a vector one option for each element.
+server_options <- function(options, call = rlang::caller_env()) {
+  check_named_list(options, arg = "...", call = call)
+  flags <- paste0("--", gsub("_", "-", names(options)))
+  unlist(Map(
+    function(flag, values) {
+      if (isTRUE(values)) {
+        flag
+      } else if (!isFALSE(values)) {
+        as.vector(rbind(flag, as.character(values)))
+      }
+    },
+    flags, options
+  ), use.names = FALSE)
+}
+
+# The exit status by which the server says that it cannot run on this Python.
+status_wrong_python <- 78L
+
+# Start the server with one Python. Returns what is known of the running server,
+# or a string that says why this Python cannot run it.
+launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
+  log <- tempfile("gym-server-", fileext = ".log")
+  process <- tryCatch(
+    processx::process$new(
+      python, arguments,
+      stdin = "|", stdout = "|", stderr = log,
+      env = server_environment(),
+      # The closing of its standard input ends the server, which also lets it
+      # close its environments and cannot be done by a forked child.
+      cleanup = FALSE, windows_hide_window = TRUE
+    ),
+    error = function(cnd) conditionMessage(cnd)
+  )
+  if (is.character(process)) {
+    return("it cannot be run")
+  }
+  url <- await_start(process, log, timeout, call)
+  if (!is.null(url)) {
+    return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
+  }
+  words <- log_tail(log)
+  if (!identical(process$get_exit_status(), status_wrong_python) && length(words)) {
+    abort_server_start("The server ended before it took connections.", words, call)
+  }
+  if (length(words)) utils::tail(words, 1L) else "it ended without a word"
+}
+
+server_environment <- function() {
+  search_path <- c(system.file("server", package = "gym"), Sys.getenv("PYTHONPATH"))
+  c(
+    "current",
+    PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
+    PYTHONUNBUFFERED = "1",
+    # R's library may be another user's; nothing is written there.
+    PYTHONDONTWRITEBYTECODE = "1"
+  )
+}
+
+# Wait for the line by which the server says that it takes connections. Returns
+# its address, NULL when the process ended first.
+await_start <- function(process, log, timeout, call) {
+  deadline <- Sys.time() + timeout
+  repeat {
+    left <- as.numeric(deadline - Sys.time(), units = "secs")
+    if (left <= 0) {
+      process$kill()
+      abort_server_start(
+        paste0("The server did not start within ", timeout, " seconds."), log_tail(log), call
+      )
+    }
+    process$poll_io(as.integer(ceiling(left * 1000)))
+    lines <- process$read_output_lines()
+    address <- sub("^Server starting at: ", "", grep("^Server starting at: ", lines, value = TRUE))
+    if (length(address)) {
+      return(address[1L])
+    }
+    if (!process$is_incomplete_output()) {
+      process$wait(5000)
+      return(NULL)
+    }
+  }
+}
+
+log_tail <- function(log, n = 20L) {
+  if (!file.exists(log)) {
+    return(character())
+  }
+  utils::tail(readLines(log, warn = FALSE), n)
+}
+
+abort_server_start <- function(message, log_lines, call) {
+  gym_abort(
+    c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n")),
+    class = "gym_error_server_start",
+    log = log_lines,
+    call = call
+  )
+}
+
+abort_no_python <- function(python, candidates, refusals, call = rlang::caller_env()) {
+  looked <- if (length(candidates)) paste0(candidates, ": ", refusals)
+  server <- system.file("server", package = "gym")
+  best <- if (length(candidates)) candidates[1L] else "python3"
+  gym_abort(
+    c(
+      "No Python was found that can run the server.",
+      stats::setNames(looked, rep("x", length(looked))),
+      i = if (is.null(python) && !nzchar(Sys.getenv("GYM_PYTHON"))) {
+        "Looked in `python =`, GYM_PYTHON, an active virtual environment and the PATH."
+      },
+      i = "The server needs Python 3.10 or newer with a few packages. In a terminal:",
+      " " = paste0(best, " -m pip install ", shQuote(server)),
+      i = "Name another Python by `gym_server_start(python = )` or the variable GYM_PYTHON."
+    ),
+    class = "gym_error_server_start",
+    candidates = candidates,
+    call = call
+  )
+}
+
+# Where Python may be, in the order in which it is tried.
+python_candidates <- function(python = NULL) {
+  named <- python %||% Sys.getenv("GYM_PYTHON")
+  if (nzchar(named)) {
+    return(path.expand(named))
+  }
+  active <- Sys.getenv(c("VIRTUAL_ENV", "CONDA_PREFIX"), names = FALSE)
+  folder <- if (is_windows()) c("Scripts", ".") else "bin"
+  places <- file.path(rep(active[nzchar(active)], each = length(folder)), folder)
+  path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
+  # Windows' WindowsApps holds a stand-in that opens the Store.
+  places <- c(places, grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE))
+  commands <- paste0(c("python3", "python"), if (is_windows()) ".exe")
+  found <- file.path(rep(places, each = length(commands)), commands)
+  found <- found[file.access(found, 1L) == 0L]
+  found[!duplicated(normalizePath(found))]
+}
+
+is_windows <- function() .Platform$OS.type == "windows"
+
+#' Stop a server that this session started
+#'
+#' The server finishes the calls under way and closes its environments; one that
+#' does not end within 15 seconds is killed.
+#'
+#' @param server The client that [gym_server_start()] returned; by default the
+#'   session's own.
+#' @return Nothing, invisibly. Stopping a server twice does no harm.
+#' @section Errors: `gym_error_argument` for a server that this session did not
+#'   start.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' server <- gym_server_start()
+#' gym_server_stop(server)
+gym_server_stop <- function(server = the_session$client) {
+  stop_server(session_server(server))
+  invisible()
+}
+
+#' Read a server's log
+#'
+#' What a server that this session started has had to say, also after its end.
+#'
+#' @inheritParams gym_server_stop
+#' @return A character vector, one element a line.
+#' @inheritSection gym_server_stop Errors
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' server <- gym_server_start(log_level = "info")
+#' gym_server_log(server)
+#' gym_server_stop(server)
+gym_server_log <- function(server = the_session$client) {
+  log_tail(session_server(server)$log, n = Inf)
+}
+
+session_server <- function(client, call = rlang::caller_env()) {
+  check_client(client, arg = "server", call = call)
+  the_session$servers[[client$remote_base]] %||% gym_abort(
+    c(
+      paste0("The server at ", client$remote_base, " was not started by this session."),
+      i = "`shutdown_server()` stops any server."
+    ),
+    class = "gym_error_argument",
+    call = call
+  )
+}
+
+stop_server <- function(server, patience = 15) {
+  process <- server$process
+  if (!process$is_alive()) {
+    return(invisible())
+  }
+  close(process$get_input_connection())
+  process$wait(patience * 1000)
+  if (process$is_alive()) {
+    process$kill()
+  }
+}
+
+# At the end of the session; a forked child's end is not the session's.
+stop_session_servers <- function(session) {
+  if (Sys.getpid() != session$pid) {
+    return()
+  }
+  for (server in session$servers) {
+    stop_server(server, patience = 2)
+  }
+}
+
+# For the examples: whether the session has a server or can have one.
+can_start_server <- function() {
+  tryCatch(
+    inherits(gym_client(), "GymClient"),
+    gym_error_server_start = function(cnd) FALSE
+  )
+}

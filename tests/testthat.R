@@ -1,0 +1,4 @@
+library(testthat)
+library(gym)
+
+test_check("gym")

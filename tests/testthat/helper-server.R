@@ -1,0 +1,68 @@
+# One server for all tests of a file's process, started by the first that needs
+# it; the session's own server, so the session's end stops it.
+test_client <- function() {
+  skip_if_no_server()
+  gym_client()
+}
+
+skip_if_no_server <- function() {
+  testthat::skip_if_not(
+    can_start_server(), "no Python that can run the server (GYM_PYTHON names one)"
+  )
+}
+
+# A server of its own for a test that stops it or needs other options.
+local_server <- function(..., frame = parent.frame()) {
+  skip_if_no_server()
+  server <- gym_server_start(...)
+  withr::defer(gym_server_stop(server), envir = frame)
+  server
+}
+
+# An environment that is closed when the test ends.
+local_env <- function(env_id = "CartPole-v1", ..., client = test_client(),
+                      frame = parent.frame()) {
+  env <- gym_make(env_id, ..., client = client)
+  withr::defer(try(env$close(), silent = TRUE), envir = frame)
+  env
+}
+
+# A server that can make the environments of odd_environments.py.
+local_odd_server <- function(frame = parent.frame()) {
+  withr::local_envvar(
+    PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
+  )
+  local_server(allow_module = "odd_environments", frame = frame)
+}
+
+make_odd <- function(name, server) {
+  gym_make(paste0("odd_environments:", name, "-v0"), client = server)
+}
+
+# A client whose connections to `server` are cut; see cutting_proxy.py.
+local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
+  python <- the_session$servers[[server$remote_base]]$python
+  proxy <- processx::process$new(
+    python, c(test_path("cutting_proxy.py"), sub(".*:", "", server$remote_base), when, pattern,
+              times),
+    stdin = "|", stdout = "|", stderr = NULL
+  )
+  withr::defer(proxy$kill(), envir = frame)
+  port <- character()
+  while (!length(port) && proxy$is_alive()) {
+    proxy$poll_io(1000)
+    port <- proxy$read_output_lines()
+  }
+  create_GymClient(paste0("http://127.0.0.1:", port), timeout = 10)
+}
+
+# A port on which nobody listens.
+free_port <- function() {
+  for (port in sample(20000:40000)) {
+    socket <- tryCatch(serverSocket(port), error = function(cnd) NULL)
+    if (!is.null(socket)) {
+      close(socket)
+      return(port)
+    }
+  }
+}

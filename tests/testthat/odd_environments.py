@@ -1,0 +1,152 @@
+"""Environments for the R tests that no package registers.
+
+Made on a server that was started with `--allow-module odd_environments`.
+"""
+
+import time
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+
+class Odd(gym.Env):
+    """Gives back what a test wants to see arrive; never ends."""
+
+    def __init__(self, observation_space, action_space=None, observation=None):
+        self.observation_space = observation_space
+        self.action_space = action_space or spaces.Discrete(2)
+        self.observation = observation
+
+    def _observe(self):
+        if self.observation is None:
+            return self.observation_space.sample()
+        return self.observation
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._observe(), {}
+
+    def step(self, action):
+        return self._observe(), 1.0, False, False, {}
+
+
+class Echo(Odd):
+    """The observation is the last action."""
+
+    def step(self, action):
+        self.observation = np.asarray(action, dtype=self.observation_space.dtype)
+        return super().step(action)
+
+
+class Failing(Odd):
+    """Raises when action 1 is taken."""
+
+    def step(self, action):
+        if action == 1:
+            raise RuntimeError("the pole caught fire")
+        return super().step(action)
+
+
+class Slow(Odd):
+    """Each step takes two seconds."""
+
+    def step(self, action):
+        time.sleep(2)
+        return super().step(action)
+
+
+class Telling(Odd):
+    """Its info and reward hold all sorts of values."""
+
+    def step(self, action):
+        info = {
+            "action_mask": np.array([1, 0, 1], dtype=np.int8),
+            "words": ["a", "é"],
+            "nested": {"x": np.float32(0.5), "nothing": None},
+            "nan": float("nan"),
+            "grid": np.arange(6).reshape(2, 3),
+        }
+        return self._observe(), float("inf"), False, True, info
+
+
+def box(low, high, shape, dtype):
+    return spaces.Box(low, high, shape, dtype)
+
+
+def image():
+    """Counts row by row, so that a swapped axis shows."""
+    return Odd(
+        box(0, 255, (2, 3, 4), np.uint8),
+        observation=np.arange(24, dtype=np.uint8).reshape(2, 3, 4),
+    )
+
+
+def large_integers():
+    limits = np.iinfo(np.int64)
+    values = np.array([limits.min, -1, 2**53 + 1, limits.max], dtype=np.int64)
+    return Odd(box(limits.min, limits.max, (4,), np.int64), observation=values)
+
+
+def middling_integers():
+    values = np.array([-(2**31), 2**31, 2**53 - 1], dtype=np.int64)
+    return Odd(box(-(2**53), 2**53, (3,), np.int64), observation=values)
+
+
+def not_finite():
+    values = np.array([np.nan, np.inf, -np.inf, 1 / 3], dtype=np.float64)
+    return Odd(box(-np.inf, np.inf, (4,), np.float64), observation=values)
+
+
+def echo():
+    space = box(-np.inf, np.inf, (2, 3), np.float64)
+    return Echo(space, space, np.zeros((2, 3)))
+
+
+def lopsided():
+    low = np.array([-np.inf, 0.0, -1.0])
+    high = np.array([np.inf, np.inf, 1.0])
+    space = spaces.Box(low, high, dtype=np.float64)
+    return Odd(space, space)
+
+
+def one_number():
+    return Odd(box(-1, 1, (1,), np.float32), box(-1, 1, (), np.float32))
+
+
+def shifted():
+    return Odd(spaces.Discrete(3, start=-1), spaces.Discrete(3, start=5))
+
+
+def mapping():
+    return Odd(spaces.Dict({"a": spaces.Discrete(2)}))
+
+
+def failing():
+    return Failing(spaces.Discrete(2))
+
+
+def slow():
+    return Slow(spaces.Discrete(2))
+
+
+def telling():
+    return Telling(spaces.Discrete(2))
+
+
+for maker in (
+    image,
+    large_integers,
+    middling_integers,
+    not_finite,
+    echo,
+    lopsided,
+    one_number,
+    shifted,
+    mapping,
+    failing,
+    slow,
+    telling,
+):
+    name = "".join(word.title() for word in maker.__name__.split("_"))
+    gym.register(f"{name}-v0", entry_point=maker, disable_env_checker=True)

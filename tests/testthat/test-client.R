@@ -1,0 +1,210 @@
+test_that("a client prints its address", {
+  expect_output(
+    print(create_GymClient("http://127.0.0.1:5000")), "<GymClient: http://127.0.0.1:5000>",
+    fixed = TRUE
+  )
+})
+
+test_that("a slash at the end of the address changes nothing", {
+  expect_identical(create_GymClient("http://127.0.0.1:5000/")$remote_base, "http://127.0.0.1:5000")
+})
+
+test_that("what is no address is refused and named", {
+  expect_error(create_GymClient("127.0.0.1:5000"), "127.0.0.1:5000", class = "gym_error_argument")
+  expect_error(create_GymClient(5000), "5000", class = "gym_error_argument")
+  expect_error(create_GymClient("http://a", timeout = 0), "timeout", class = "gym_error_argument")
+  expect_error(create_GymClient("http://a", config = list()), "config",
+               class = "gym_error_argument")
+})
+
+test_that("what is no client is refused", {
+  expect_error(env_list_all("http://127.0.0.1:5000"), "client", class = "gym_error_argument")
+})
+
+test_that("with no server there the error names the address and the mend", {
+  port <- free_port()
+  client <- create_GymClient(paste0("http://127.0.0.1:", port))
+  error <- expect_error(env_list_all(client), class = "gym_error_connection")
+  expect_match(conditionMessage(error), paste0("http://127.0.0.1:", port), fixed = TRUE)
+  expect_match(conditionMessage(error), "gym_server_start()", fixed = TRUE)
+})
+
+test_that("a server that stops in the middle is an error, one that is back is used again", {
+  server <- local_server()
+  port <- as.integer(sub(".*:", "", server$remote_base))
+  id <- env_create(server, "CartPole-v1")
+  env_reset(server, id)
+  gym_server_stop(server)
+  expect_error(env_step(server, id, 1), class = "gym_error_connection")
+  again <- local_server(port = port)
+  expect_identical(again$remote_base, server$remote_base)
+  expect_error(env_step(server, id, 1), "unknown", class = "gym_error_http_400")
+  expect_length(env_reset(server, env_create(server, "CartPole-v1")), 4)
+})
+
+test_that("an answer that does not come within the timeout is an error", {
+  server <- local_odd_server()
+  patient <- make_odd("Slow", server)
+  patient$reset()
+  hasty <- create_GymClient(server$remote_base, timeout = 0.3)
+  expect_error(env_step(hasty, patient$instance_id, 1), "[Tt]ime", class = "gym_error_connection")
+})
+
+test_that("a step whose answer was lost is not taken twice", {
+  server <- local_server()
+  client <- local_cut_client(server, "answered", "/step")
+  id <- env_create(client, "CartPole-v1", seed = 1)
+  env_reset(client, id)
+  first <- env_step(client, id, 1)
+  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+
+  twin <- env_create(server, "CartPole-v1", seed = 1)
+  env_reset(server, twin)
+  expect_identical(first, env_step(server, twin, 1))
+  expect_identical(env_step(client, id, 0), env_step(server, twin, 0))
+})
+
+test_that("creating is not done twice, nor is closing", {
+  server <- local_server()
+  client <- local_cut_client(server, "answered", "POST /v1/envs/ ")
+  id <- env_create(client, "CartPole-v1")
+  expect_named(env_list_all(server), id)
+  client <- local_cut_client(server, "answered", "/close")
+  expect_error(env_close(client, id), NA)
+  expect_length(env_list_all(server), 0)
+})
+
+test_that("a call that was cut before it was sent is made", {
+  server <- local_server()
+  client <- local_cut_client(server, "unsent", "/step", times = 2)
+  id <- env_create(client, "CartPole-v1", seed = 1)
+  env_reset(client, id)
+  expect_equal(env_step(client, id, 1)$reward, 1)
+  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+})
+
+test_that("a connection that breaks each time is an error in the end", {
+  server <- local_server()
+  client <- local_cut_client(server, "answered", "/step", times = 100)
+  id <- env_create(client, "CartPole-v1")
+  env_reset(client, id)
+  expect_error(env_step(client, id, 1), class = "gym_error_connection")
+  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+})
+
+test_that("a call without a number is not repeated", {
+  server <- local_server()
+  id <- env_create(server, "CartPole-v1")
+  env_reset(server, id)
+  client <- local_cut_client(server, "answered", "/step")
+  expect_error(
+    post_request(client, paste0("/v1/envs/", id, "/step/"), list(action = 1)),
+    class = "gym_error_connection"
+  )
+  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+})
+
+test_that("a client survives saveRDS() and makes calls of its own", {
+  client <- test_client()
+  id <- env_create(client, "CartPole-v1", seed = 3)
+  withr::defer(env_close(client, id))
+  file <- withr::local_tempfile()
+  saveRDS(client, file)
+  copies <- list(readRDS(file), readRDS(file))
+  expect_length(env_reset(copies[[1]], id), 4)
+  expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
+  expect_equal(env_step(client, id, 0)$reward, 1)
+  keys <- vapply(c(list(client), copies), function(copy) copy$state$key, "")
+  expect_length(unique(keys), 3)
+})
+
+test_that("a client works in forked workers", {
+  skip_on_os("windows")
+  client <- test_client()
+  env_list_all(client)
+  answers <- parallel::mclapply(1:4, function(seed) {
+    env <- gym_make("CartPole-v1", seed = seed, client = client)
+    on.exit(env$close())
+    observation <- env$reset()
+    for (i in 1:5) observation <- env$step(i %% 2)$observation
+    observation
+  }, mc.cores = 4)
+  alone <- lapply(1:4, function(seed) {
+    env <- gym_make("CartPole-v1", seed = seed, client = client)
+    on.exit(env$close())
+    observation <- env$reset()
+    for (i in 1:5) observation <- env$step(i %% 2)$observation
+    observation
+  })
+  expect_identical(answers, alone)
+})
+
+test_that("a client works in spawned workers", {
+  client <- test_client()
+  cluster <- parallel::makePSOCKcluster(1)
+  withr::defer(parallel::stopCluster(cluster))
+  library_paths <- .libPaths()
+  answer <- parallel::clusterCall(cluster, function(client, library_paths) {
+    .libPaths(library_paths)
+    env <- gym::gym_make("CartPole-v1", seed = 1, client = client)
+    on.exit(env$close())
+    env$reset()
+  }, client, library_paths)
+  env <- local_env(seed = 1)
+  expect_identical(answer[[1]], env$reset())
+})
+
+test_that("the end of a forked worker closes nothing of its parent's", {
+  skip_on_os("windows")
+  env <- local_env()
+  env$reset()
+  parallel::mclapply(1:2, function(i) {
+    rm(env)
+    gc()
+    i
+  }, mc.cores = 2)
+  expect_equal(env$step(1)$reward, 1)
+})
+
+test_that("classic requests go to any route", {
+  client <- test_client()
+  expect_equal(get_request(client, "/v1/health/")$status, "ok")
+  id <- post_request(client, "/v1/envs/", list(env_id = "CartPole-v1"))$instance_id
+  expect_match(id, "^[0-9a-f]{8}$")
+  expect_null(post_request(client, paste0("/v1/envs/", id, "/close/")))
+})
+
+test_that("an answer of httr's is read or raised", {
+  base <- test_client()$remote_base
+  answer <- parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/health/")))
+  expect_equal(answer$status, "ok")
+  expect_error(
+    parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/envs/nobody/"))),
+    "Instance_id nobody unknown",
+    class = "gym_error_http_400"
+  )
+})
+
+test_that("settings made with httr are sent", {
+  client <- create_GymClient(
+    test_client()$remote_base, config = c(httr::add_headers("X-Test" = "1"), httr::timeout(5))
+  )
+  expect_length(env_reset(client, env_create(client, "CartPole-v1")), 4)
+})
+
+test_that("a proxy of the system's is not asked for a server on this machine", {
+  test_client()
+  withr::local_envvar(http_proxy = "http://127.0.0.1:9", no_proxy = "")
+  client <- create_GymClient(test_client()$remote_base)
+  expect_type(env_list_all(client), "list")
+})
+
+test_that("calls leave R's generator alone", {
+  set.seed(1)
+  before <- .Random.seed
+  env <- local_env()
+  env$reset()
+  env$step(1)
+  env_action_space_sample(env$client, env$instance_id)
+  expect_identical(.Random.seed, before)
+})

@@ -1,0 +1,248 @@
+test_that("the classic calls play an episode", {
+  client <- test_client()
+  id <- env_create(client, "CartPole-v0")
+  expect_match(id, "^[0-9a-f]{8}$")
+  expect_identical(env_list_all(client)[[id]], "CartPole-v0")
+  observation <- env_reset(client, id)
+  expect_type(observation, "double")
+  expect_length(observation, 4)
+  repeat {
+    action <- env_action_space_sample(client, id)
+    expect_true(action %in% 0:1)
+    results <- env_step(client, id, action, render = TRUE)
+    if (results[["done"]]) break
+  }
+  expect_named(
+    results, c("observation", "reward", "done", "info", "terminated", "truncated")
+  )
+  expect_length(results[[1]], 4)
+  expect_identical(results[[2]], 1)
+  expect_true(results[[3]])
+  expect_identical(results[[4]], structure(list(), names = character()))
+  expect_invisible(env_close(client, id))
+  expect_null(env_list_all(client)[[id]])
+})
+
+test_that("the classic calls tell the spaces", {
+  client <- test_client()
+  id <- env_create(client, "CartPole-v0")
+  withr::defer(env_close(client, id))
+  expect_equal(env_action_space_info(client, id)[["name"]], "Discrete")
+  expect_equal(env_action_space_info(client, id)[["n"]], 2)
+  space <- env_observation_space_info(client, id)
+  expect_equal(space$shape, 4)
+  # The limits of CartPole's observations, as float32 has them.
+  expect_equal(space$high, c(4.8, Inf, 0.41887903, Inf), tolerance = 1e-7)
+  expect_identical(space$low, -space$high)
+})
+
+test_that("what belongs to a space is told from what does not", {
+  env <- local_env()
+  member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
+  expect_true(member(0))
+  expect_true(member(1L))
+  for (value in list(2, -1, 0.5, "a", NULL, NA, c(0, 1))) expect_false(member(value))
+  observed <- function(value) env_observation_space_contains(env$client, env$instance_id, value)
+  expect_true(observed(c(0, 1e30, 0, 0)))
+  expect_true(observed(env$reset()))
+  for (value in list(c(9, 0, 0, 0), 1:3, 0, "a", matrix(0, 1, 4))) expect_false(observed(value))
+})
+
+test_that("a Box of one number knows its members", {
+  env <- local_env("Pendulum-v1")
+  member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
+  expect_true(member(1.5))
+  expect_false(member(2.5))
+})
+
+test_that("the same seed gives the same episode, seed 0 is a seed", {
+  play <- function(...) {
+    env <- local_env(...)
+    c(list(env$reset()), lapply(c(1, 0, 1, 1), function(action) env$step(action)$observation))
+  }
+  expect_identical(play(seed = 0), play(seed = 0))
+  expect_false(identical(play(seed = 0), play(seed = 1)))
+  env <- local_env()
+  expect_identical(env$reset(seed = 0), play(seed = 0)[[1]])
+})
+
+test_that("Python sees the same numbers", {
+  # gymnasium.make("CartPole-v1").reset(seed=42), Gymnasium 1.x
+  env <- local_env()
+  expect_equal(
+    env$reset(seed = 42), c(0.0273956, -0.00611216, 0.03585979, 0.0197368), tolerance = 1e-6
+  )
+})
+
+test_that("the seed also fixes the sampling of actions", {
+  draw <- function(seed) {
+    env <- local_env(seed = seed)
+    vapply(1:20, function(i) env_action_space_sample(env$client, env$instance_id), 1L)
+  }
+  expect_identical(draw(5), draw(5))
+  expect_false(identical(draw(5), draw(6)))
+})
+
+test_that("a seed that is none is refused before anything is sent", {
+  env <- local_env()
+  for (bad in list(-1, 1.5, NA, "1", TRUE, c(1, 2), Inf)) {
+    expect_error(env$reset(seed = bad), "seed", class = "gym_error_argument")
+  }
+})
+
+test_that("options reach the environment's reset", {
+  env <- local_env()
+  expect_true(all(abs(env$reset(options = list(low = 0.2, high = 0.3))) >= 0.2))
+  expect_error(env$reset(options = list(1)), "options", class = "gym_error_argument")
+})
+
+test_that("an environment is an object with Gymnasium's names", {
+  env <- local_env("CartPole-v1", seed = 1)
+  expect_output(print(env), "<gym_env: CartPole-v1>.*<Box float32 \\[4\\]>.*<Discrete 2>")
+  expect_equal(env$spec$reward_threshold, 475)
+  expect_equal(env$spec$max_episode_steps, 500)
+  expect_length(env$reset(), 4)
+  expect_identical(env$step(1)$truncated, FALSE)
+  # The classic calls see the same environment.
+  out <- env_step(env$client, env$instance_id, 0)
+  expect_equal(out$reward, 1)
+  env$close()
+  expect_output(print(env), "closed")
+  expect_error(env$close(), NA)
+  expect_error(env$step(1), "unknown", class = "gym_error_http_400")
+})
+
+test_that("arguments by name go to the environment", {
+  env <- local_env("CartPole-v1", sutton_barto_reward = TRUE)
+  env$reset()
+  expect_equal(env$step(1)$reward, 0)
+  expect_error(local_env("CartPole-v1", wind = 3), "wind", class = "gym_error_http_400")
+  expect_error(gym_make("CartPole-v1", 3), class = "gym_error_argument")
+})
+
+test_that("an environment that was thrown away is closed by the next that is made", {
+  client <- create_GymClient(test_client()$remote_base)
+  before <- length(env_list_all(client))
+  env <- gym_make("CartPole-v1", client = client)
+  rm(env)
+  gc()
+  env <- local_env(client = client)
+  expect_length(env_list_all(client), before + 1)
+})
+
+test_that("an unknown instance is the classic error", {
+  client <- test_client()
+  calls <- list(
+    env_reset = function(id) env_reset(client, id),
+    env_step = function(id) env_step(client, id, 1),
+    env_action_space_info = function(id) env_action_space_info(client, id),
+    env_action_space_sample = function(id) env_action_space_sample(client, id),
+    env_observation_space_info = function(id) env_observation_space_info(client, id),
+    env_monitor_start = function(id) env_monitor_start(client, id, "tmp", force = TRUE),
+    env_monitor_close = function(id) env_monitor_close(client, id),
+    env_render = function(id) env_render(client, id),
+    env_close = function(id) env_close(client, id)
+  )
+  for (call in calls) {
+    expect_error(call("bad_id"), "Instance_id bad_id unknown", class = "gym_error_http_400")
+  }
+  expect_error(env_reset(client, NULL), "instance_id", class = "gym_error_argument")
+})
+
+test_that("an id that is not known gets a hint", {
+  client <- test_client()
+  error <- expect_error(env_create(client, "bad string"), class = "gym_error_http_400")
+  expect_match(
+    conditionMessage(error), "Attempted to look up malformed environment ID 'bad string'",
+    fixed = TRUE
+  )
+  expect_error(env_create(client, "CartPol-v1"), "CartPole-v1", class = "gym_error_http_400")
+  error <- expect_error(env_create(client, "FrozenLake-v0"), class = "gym_error_http_400")
+  expect_match(error$hint, "FrozenLake-v1")
+  expect_error(env_create(client, 5), "env_id", class = "gym_error_argument")
+})
+
+test_that("an action outside the space is an error and the environment has not moved", {
+  client <- test_client()
+  env <- local_env(seed = 1)
+  twin <- local_env(seed = 1)
+  env$reset()
+  twin$reset()
+  for (bad in list(2, -1, 0.5, NA, NULL, "1", c(0, 1))) {
+    expect_error(env$step(bad), "Discrete", class = "gym_error_space")
+  }
+  expect_identical(env$step(1), twin$step(1))
+})
+
+test_that("a number of the wrong length is refused for a Box", {
+  env <- local_env("Pendulum-v1")
+  env$reset()
+  expect_error(env$step(c(0, 0)), "<Box float32 \\[1\\]>", class = "gym_error_space")
+  expect_error(env$step(2.5), "2.5", class = "gym_error_space")
+  expect_length(env$step(-2)$observation, 3)
+})
+
+test_that("a step before the first reset is an error", {
+  env <- local_env()
+  error <- expect_error(env$step(1), class = "gym_error_http_400")
+  expect_identical(error$code, "reset_needed")
+})
+
+test_that("a step after the end warns once an episode", {
+  env <- local_env()
+  for (episode in 1:2) {
+    env$reset()
+    while (!env$step(1)$done) NULL
+    expect_warning(env$step(1), "after the end", class = "gym_warning_step_after_done")
+    expect_warning(env$step(1), NA)
+  }
+})
+
+test_that("an exception inside an environment is told and touches no other", {
+  server <- local_odd_server()
+  env <- make_odd("Failing", server)
+  other <- make_odd("Image", server)
+  env$reset()
+  other$reset()
+  error <- expect_error(env$step(1), "the pole caught fire", class = "gym_error_http_500")
+  expect_identical(error$code, "environment_error")
+  expect_equal(other$step(1)$reward, 1)
+  expect_error(env$close(), NA)
+})
+
+test_that("what an environment tells besides arrives", {
+  env <- make_odd("Telling", local_odd_server())
+  env$reset()
+  out <- env$step(0)
+  expect_identical(out$reward, Inf)
+  expect_true(out$truncated)
+  expect_false(out$terminated)
+  expect_identical(out$info$action_mask, c(1L, 0L, 1L))
+  expect_identical(out$info$words, c("a", "\u00e9"))
+  expect_identical(out$info$nested$x, 0.5)
+  expect_identical(out$info$nan, NaN)
+  expect_identical(out$info$grid, list(0:2, 3:5))
+})
+
+test_that("uploading fails with the reason", {
+  client <- test_client()
+  expect_error(upload(client, "results", api_key = "k"), "2017", class = "gym_error_http_410")
+  withr::local_envvar(OPENAI_GYM_API_KEY = "")
+  expect_error(upload(client, "results"), "api_key", class = "gym_error_http_400")
+})
+
+test_that("an interrupt during a call arrives as an interrupt", {
+  skip_on_os("windows")
+  env <- make_odd("Slow", local_odd_server())
+  env$reset()
+  killer <- processx::process$new("sh", c("-c", paste("sleep 0.5; kill -INT", Sys.getpid())))
+  outcome <- tryCatch(
+    {
+      env$step(0)
+      "finished"
+    },
+    interrupt = function(cnd) "interrupted",
+    error = function(cnd) "error"
+  )
+  expect_identical(outcome, "interrupted")
+})

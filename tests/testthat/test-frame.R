@@ -1,0 +1,58 @@
+test_that("a frame is what the environment draws", {
+  env <- local_env(seed = 1)
+  env$reset()
+  frame <- env_render(env$client, env$instance_id)
+  expect_s3_class(frame, "gym_frame")
+  expect_equal(dim(frame), c(400, 600, 3))
+  expect_type(frame, "integer")
+  expect_output(print(frame), "600 x 400 pixels")
+  # CartPole's background is white, its cart black.
+  expect_equal(frame[1, 1, ], c(255, 255, 255))
+  expect_true(any(frame == 0))
+  expect_identical(env$render(), frame)
+})
+
+test_that("a frame follows the environment", {
+  env <- local_env(seed = 1)
+  env$reset()
+  before <- env$render()
+  for (i in 1:8) env$step(1)
+  expect_false(identical(env$render(), before))
+})
+
+test_that("a frame knows plot() and as.raster()", {
+  env <- local_env(seed = 1)
+  env$reset()
+  frame <- env$render()
+  raster <- as.raster(frame)
+  expect_equal(dim(raster), c(400, 600))
+  expect_equal(as.matrix(raster)[1, 1], "#FFFFFF")
+  file <- withr::local_tempfile(fileext = ".png")
+  png(file)
+  expect_invisible(plot(frame))
+  dev.off()
+  drawn <- png::readPNG(file)
+  expect_true(any(drawn[, , 1] < 0.1))
+})
+
+test_that("an environment that was not reset has no frame", {
+  error <- expect_error(local_env()$render(), class = "gym_error_http_400")
+  expect_identical(error$code, "reset_needed")
+})
+
+test_that("an environment that cannot be drawn says so", {
+  env <- make_odd("Image", local_odd_server())
+  env$reset()
+  error <- expect_error(env$render(), class = "gym_error_http_400")
+  expect_identical(error$code, "cannot_render")
+})
+
+test_that("drawing works for all of classic control, while others are closed", {
+  for (id in c("CartPole-v1", "MountainCar-v0", "MountainCarContinuous-v0", "Acrobot-v1",
+               "Pendulum-v1")) {
+    env <- local_env(id, seed = 1)
+    env$reset()
+    expect_s3_class(env$render(), "gym_frame")
+    env$close()
+  }
+})

@@ -1,0 +1,151 @@
+pid_runs <- function(pid) {
+  # Signal 0 only asks; a zombie waits for its parent, not for us.
+  tools::pskill(pid, 0) &&
+    !any(grepl("^State:\\s+Z", tryCatch(
+      readLines(file.path("/proc", pid, "status")),
+      error = function(cnd) "", warning = function(cnd) ""
+    )))
+}
+
+test_that("a server starts on a free port, tells its log and stops", {
+  server <- local_server(log_level = "info")
+  expect_s3_class(server, "GymClient")
+  expect_match(server$remote_base, "^http://127.0.0.1:[0-9]+$")
+  expect_type(env_list_all(server), "list")
+  process <- the_session$servers[[server$remote_base]]$process
+  expect_true(process$is_alive())
+  expect_invisible(gym_server_stop(server))
+  expect_false(process$is_alive())
+  expect_identical(process$get_exit_status(), 0L)
+  expect_error(gym_server_stop(server), NA)
+  expect_type(gym_server_log(server), "character")
+  expect_error(env_list_all(server), class = "gym_error_connection")
+})
+
+test_that("shutdown_server() stops any server", {
+  server <- local_server()
+  expect_invisible(shutdown_server(server))
+  process <- the_session$servers[[server$remote_base]]$process
+  process$wait(10000)
+  expect_identical(process$get_exit_status(), 0L)
+})
+
+test_that("a port that is taken is an error with the server's words", {
+  server <- local_server()
+  port <- as.integer(sub(".*:", "", server$remote_base))
+  error <- expect_error(gym_server_start(port = port), class = "gym_error_server_start")
+  expect_match(conditionMessage(error), as.character(port))
+  expect_type(env_list_all(server), "list")
+})
+
+test_that("a Python that cannot run the server is named, with the mend", {
+  error <- expect_error(
+    gym_server_start(python = "/no/such/python"), class = "gym_error_server_start"
+  )
+  expect_match(conditionMessage(error), "/no/such/python", fixed = TRUE)
+  expect_match(conditionMessage(error), "pip install", fixed = TRUE)
+})
+
+test_that("the first Python that can run the server is taken", {
+  skip_on_os("windows")
+  working <- the_session$servers[[test_client()$remote_base]]$python
+  folder <- withr::local_tempdir()
+  # One that has none of the packages, as a system's own may be.
+  bare <- file.path(folder, "bare", "python3")
+  dir.create(dirname(bare))
+  writeLines(
+    c("#!/bin/sh", "echo \"gym_server cannot run on this Python: No module named 'flask'\" >&2",
+      "exit 78"), bare
+  )
+  Sys.chmod(bare, "755")
+  good <- file.path(folder, "good", "python3")
+  dir.create(dirname(good))
+  writeLines(c("#!/bin/sh", paste0("exec '", working, "' \"$@\"")), good)
+  Sys.chmod(good, "755")
+  withr::local_envvar(
+    GYM_PYTHON = NA, VIRTUAL_ENV = NA, CONDA_PREFIX = NA,
+    PATH = paste(c(dirname(bare), dirname(good), Sys.getenv("PATH")), collapse = ":")
+  )
+  server <- gym_server_start()
+  withr::defer(gym_server_stop(server))
+  expect_identical(the_session$servers[[server$remote_base]]$python, good)
+
+  withr::local_envvar(PATH = paste(dirname(bare), "/bin", sep = ":"))
+  withr::local_envvar(PATH = dirname(bare))
+  error <- expect_error(gym_server_start(), class = "gym_error_server_start")
+  expect_match(conditionMessage(error), "No module named 'flask'", fixed = TRUE)
+  expect_match(conditionMessage(error), "VIRTUAL_ENV|virtual environment")
+})
+
+test_that("Python is looked for in the order that the help page tells", {
+  folder <- withr::local_tempdir()
+  commands <- file.path(folder, c("venv/bin/python3", "path/python3", "WindowsApps/python3"))
+  for (command in commands) {
+    dir.create(dirname(command), recursive = TRUE)
+    writeLines(command, command)
+    Sys.chmod(command, "755")
+  }
+  skip_on_os("windows")
+  withr::local_envvar(
+    GYM_PYTHON = NA, VIRTUAL_ENV = file.path(folder, "venv"), CONDA_PREFIX = NA,
+    PATH = paste(file.path(folder, c("WindowsApps", "path")), collapse = ":")
+  )
+  expect_identical(python_candidates(), commands[1:2])
+  expect_identical(python_candidates("/my/python"), "/my/python")
+  withr::local_envvar(GYM_PYTHON = "/its/python")
+  expect_identical(python_candidates(), "/its/python")
+  expect_identical(python_candidates("/my/python"), "/my/python")
+})
+
+test_that("options reach the server by name", {
+  directory <- withr::local_tempdir()
+  server <- local_server(monitor_dir = directory)
+  env <- gym_make("CartPole-v1", client = server)
+  env_monitor_start(server, env$instance_id, "runs")
+  expect_true(file.exists(file.path(directory, "runs", "episodes.csv")))
+  expect_error(gym_server_start(nonsense = 1), "nonsense", class = "gym_error_server_start")
+  expect_error(gym_server_start(NULL, NULL, "x"), class = "gym_error_argument")
+})
+
+test_that("GYM_SERVER_URL names the session's server", {
+  server <- local_server()
+  withr::local_envvar(GYM_SERVER_URL = paste0(server$remote_base, "/"))
+  expect_identical(gym_client()$remote_base, server$remote_base)
+  withr::local_envvar(GYM_SERVER_URL = NA)
+  expect_false(identical(gym_client()$remote_base, server$remote_base))
+})
+
+test_that("the session's server is started once, and anew when it died", {
+  own <- test_client()
+  expect_identical(gym_client(), own)
+  the_session$servers[[own$remote_base]]$process$kill()
+  expect_false(identical(gym_client()$remote_base, own$remote_base))
+  expect_type(env_list_all(gym_client()), "list")
+})
+
+test_that("a server that another session started is not stopped here", {
+  expect_error(
+    gym_server_stop(create_GymClient("http://127.0.0.1:1")), "not started by this session",
+    class = "gym_error_argument"
+  )
+})
+
+test_that("the server ends with the R session, also when R is killed", {
+  skip_on_os("windows")
+  skip_if_no_server()
+  for (ending in c("q('no')", "tools::pskill(Sys.getpid(), tools::SIGKILL)")) {
+    script <- paste0(
+      ".libPaths(", deparse1(.libPaths()), "); server <- gym::gym_server_start();",
+      "cat(gym:::the_session$servers[[1]]$pid, '\\n'); ", ending
+    )
+    output <- processx::run(
+      file.path(R.home("bin"), "Rscript"), c("-e", script), error_on_status = FALSE
+    )
+    pid <- as.integer(output$stdout)
+    for (i in 1:100) {
+      if (!pid_runs(pid)) break
+      Sys.sleep(0.1)
+    }
+    expect_false(pid_runs(pid))
+  }
+})

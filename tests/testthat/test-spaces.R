@@ -1,0 +1,157 @@
+box <- function(shape, dtype = "float32", low = -1, high = 1) {
+  size <- prod(unlist(shape))
+  new_space(list(
+    name = "Box", shape = as.list(shape), dtype = dtype,
+    low = as.list(rep_len(low, size)), high = as.list(rep_len(high, size))
+  ))
+}
+discrete <- function(n, start = 0L) new_space(list(name = "Discrete", n = n, start = start))
+
+test_that("a space prints in one line", {
+  expect_output(print(box(4)), "<Box float32 [4]>", fixed = TRUE)
+  expect_output(print(box(c(2, 3), "uint8")), "<Box uint8 [2, 3]>", fixed = TRUE)
+  expect_output(print(discrete(2)), "<Discrete 2>", fixed = TRUE)
+  expect_output(print(discrete(3, -1L)), "<Discrete 3 from -1>", fixed = TRUE)
+})
+
+test_that("the classic elements of a space are there", {
+  expect_equal(discrete(2)[["n"]], 2)
+  space <- box(4)
+  expect_equal(space[["name"]], "Box")
+  expect_equal(space[["shape"]][[1]], 4)
+  expect_length(space[["low"]], 4)
+})
+
+test_that("infinite bounds arrive as infinite", {
+  space <- box(2, low = -1e100, high = 1e100)
+  expect_identical(space$low, c(-Inf, -Inf))
+  expect_identical(space$high, c(Inf, Inf))
+})
+
+test_that("an unknown kind of space is an error that names it", {
+  expect_error(new_space(list(name = "Riddle")), "Riddle", class = "gym_error_space")
+})
+
+test_that("a discrete action is one whole number", {
+  space <- discrete(2)
+  expect_equal(encode_value(space, 1, NULL), "1")
+  expect_equal(encode_value(space, 1L, NULL), "1")
+  for (bad in list(0.5, NA, NA_real_, NULL, "1", c(0, 1), TRUE, Inf, NaN, list(1), integer())) {
+    expect_error(encode_value(space, bad, NULL), "<Discrete 2>", class = "gym_error_space")
+  }
+})
+
+test_that("the error for an action shows the value", {
+  expect_error(encode_value(discrete(2), "left", NULL), "\"left\"", class = "gym_error_space")
+  expect_error(encode_value(box(2), c(0.5, 1, 7), NULL), "c\\(0.5, 1, 7\\)",
+               class = "gym_error_space")
+})
+
+test_that("an action of a Box keeps its digits and its shape", {
+  expect_equal(encode_value(box(1), 0.1, NULL), "[0.10000000000000001]")
+  expect_equal(encode_value(box(integer()), 0.5, NULL), "0.5")
+  expect_equal(encode_value(box(3), 1:3, NULL), "[1,2,3]")
+  expect_equal(
+    encode_value(box(c(2, 3)), matrix(1:6, 2, byrow = TRUE), NULL), "[[1,2,3],[4,5,6]]"
+  )
+  cube <- aperm(array(1:24, c(4, 3, 2)))
+  expect_match(encode_value(box(c(2, 3, 4)), cube, NULL), "^\\[\\[\\[1,2,3,4\\],\\[5,6")
+})
+
+test_that("an action of a Box with the wrong shape or type is refused", {
+  for (bad in list(1, 1:3, "a", NA_real_, c(1, NA), NULL, list(1, 2), TRUE, matrix(1:2, 1))) {
+    expect_error(encode_value(box(2), bad, NULL), "<Box float32 \\[2\\]>",
+                 class = "gym_error_space")
+  }
+  expect_error(encode_value(box(c(2, 3)), 1:6, NULL), "2 x 3", class = "gym_error_space")
+})
+
+test_that("integers are integer where they fit, double up to 2^53", {
+  space <- box(2, "int64")
+  expect_identical(decode_value(space, from_json("[1, -2147483647]")), c(1L, -2147483647L))
+  expect_identical(decode_value(space, from_json("[1, -2147483648]")), c(1, -2147483648))
+  expect_identical(decode_value(space, from_json("[1, 9007199254740991]")), c(1, 2^53 - 1))
+})
+
+test_that("integers beyond 2^53 are integer64, never rounded", {
+  skip_if_not_installed("bit64")
+  digits <- c("-5", "9007199254740993", "9007199254740991")
+  value <- decode_value(box(3, "int64"), from_json(paste0("[", toString(digits), "]")))
+  expect_s3_class(value, "integer64")
+  expect_equal(as.character(value), digits)
+})
+
+test_that("without bit64 an integer beyond 2^53 is an error that names bit64", {
+  error <- expect_error(
+    integers_beyond_double(c("-5", "9007199254740993"), has_bit64 = FALSE),
+    class = "gym_error_space"
+  )
+  expect_match(conditionMessage(error), "9007199254740993.*bit64")
+})
+
+test_that("drawing a value stays inside the bounds and follows R's generator", {
+  spaces <- list(
+    discrete(3, -1L), box(3), box(c(2, 3), "uint8", 0, 255), box(2, low = 5, high = 1e100),
+    box(2, low = -1e100, high = -5), box(2, low = -1e100, high = 1e100)
+  )
+  for (space in spaces) {
+    set.seed(1)
+    first <- space_sample(space)
+    for (i in 1:50) {
+      value <- space_sample(space)
+      if (space$name == "Box") {
+        expect_true(all(row_major(value) >= space$low & row_major(value) <= space$high))
+      } else {
+        expect_true(value %in% -1:1)
+      }
+    }
+    set.seed(1)
+    expect_identical(space_sample(space), first)
+  }
+  expect_equal(dim(space_sample(box(c(2, 3)))), c(2, 3))
+})
+
+test_that("values of every sort arrive from a real server as Python had them", {
+  server <- local_odd_server()
+  expect_identical(
+    make_odd("Image", server)$reset(),
+    aperm(array(0:23, c(4, 3, 2)))
+  )
+  expect_identical(make_odd("NotFinite", server)$reset(), c(NaN, Inf, -Inf, 1 / 3))
+  expect_identical(make_odd("MiddlingIntegers", server)$reset(), c(-2^31, 2^31, 2^53 - 1))
+  lopsided <- make_odd("Lopsided", server)$observation_space
+  expect_identical(lopsided$low, c(-Inf, 0, -1))
+  expect_identical(lopsided$high, c(Inf, Inf, 1))
+  shifted <- make_odd("Shifted", server)
+  expect_equal(shifted$action_space$start, 5)
+  expect_true(shifted$reset() %in% -1:1)
+  expect_error(shifted$step(1), "Discrete", class = "gym_error_space")
+})
+
+test_that("int64 beyond 2^53 arrives exactly from a real server", {
+  skip_if_not_installed("bit64")
+  server <- local_odd_server()
+  value <- make_odd("LargeIntegers", server)$reset()
+  # The smallest int64 is bit64's NA.
+  expect_equal(as.character(value)[-1], c("-1", "9007199254740993", "9223372036854775807"))
+})
+
+test_that("an action comes back from a real server as it was sent", {
+  env <- make_odd("Echo", local_odd_server())
+  env$reset()
+  values <- matrix(c(1 / 3, -1e300, 5e-324, 0, pi, -0.1), 2)
+  expect_identical(env$step(values)$observation, values)
+  infinite <- matrix(c(Inf, -Inf, 1:4), 2)
+  expect_identical(env$step(infinite)$observation, infinite)
+})
+
+test_that("a bare number is an action of a Box of one number", {
+  env <- make_odd("OneNumber", local_odd_server())
+  env$reset()
+  expect_equal(env$step(0.5)$reward, 1)
+  expect_error(env$step(2), class = "gym_error_space")
+})
+
+test_that("a space that is not known is refused at creation and named", {
+  expect_error(make_odd("Mapping", local_odd_server()), "Dict", class = "gym_error_http_400")
+})
