@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import threading
-import time
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -45,18 +45,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     stop = _Stop()
     max_body_bytes = options.max_body_mb * 2**20
     try:
+        monitor_dir = _prepare_monitor_dir(options.monitor_dir)
         listener = bind(options.host, options.port)
-        app = create_app(
-            Config(
-                monitor_dir=_prepare_monitor_dir(options.monitor_dir),
-                temporary_monitors=_is_loopback(options.host),
-                allowed_modules=options.allow_module,
-                max_body_bytes=max_body_bytes,
-                stop=stop,
-            )
-        )
     except OSError as error:
         return _fail(_why_not(error, options))
+    app = create_app(
+        Config(
+            monitor_dir=monitor_dir,
+            temporary_monitors=_is_loopback(options.host),
+            allowed_modules=options.allow_module,
+            max_body_bytes=max_body_bytes,
+            stop=stop,
+        )
+    )
     server = Server(app, listener, max_body_bytes)
     stop.server = server
     _stop_on_signals(stop)
@@ -126,6 +127,8 @@ def _set_up_logging(level: str) -> None:
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
     )
     logging.captureWarnings(True)
+    # RecordVideo says so of any folder that exists; what is in ours is the monitor's affair.
+    warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
     # It warns whenever two requests arrive at once.
     logging.getLogger("waitress.queue").setLevel(logging.ERROR)
 

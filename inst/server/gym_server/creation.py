@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import importlib
+import threading
 from collections.abc import Callable, Collection
 
 import gymnasium
@@ -13,6 +14,8 @@ from gymnasium.envs import registration
 
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.plain import brief
+
+_importing = threading.Lock()
 
 
 def make(
@@ -60,9 +63,10 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
             f"This server may not import the module '{module}'",
             f"start the server with --allow-module {module}",
         )
-    if module:
-        ask(importlib.import_module, module)
-    _register_package_of(name)
+    with _importing:
+        if module:
+            ask(importlib.import_module, module)
+        _register_package_of(name)
     try:
         return gymnasium.spec(_with_version(name))
     except error.Error as failure:
@@ -134,9 +138,13 @@ def _near(name: str) -> str | None:
 
 
 def _load_creator(spec: registration.EnvSpec) -> Callable:
-    if callable(spec.entry_point):
-        return spec.entry_point
-    return registration.load_env_creator(spec.entry_point)
+    # Python lets go of its import locks where modules import each other in a circle, as
+    # Gymnasium's do; two threads would see them half made.
+    with _importing:
+        importlib.import_module("gymnasium.wrappers")
+        if callable(spec.entry_point):
+            return spec.entry_point
+        return registration.load_env_creator(spec.entry_point)
 
 
 def _choose_render_mode(

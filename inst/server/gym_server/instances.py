@@ -1,257 +1,19 @@
-"""The environments that clients made, each under an instance_id and a lock of its own."""
+"""The environments that clients made, by instance_id."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import secrets
 import threading
-import time
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Collection
 
-import gymnasium
-
-from gym_server import creation, spaces
-from gym_server.creation import ask
+from gym_server import creation
 from gym_server.errors import GymServerError, unknown_instance
-from gym_server.frames import RenderThread, png
-from gym_server.monitor import Monitor
-from gym_server.monitor_directory import MonitorRoot
-from gym_server.plain import plain
+from gym_server.frames import RenderThread
+from gym_server.instance import Choices, Instance
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What a client chose at creation."""
-
-    env_id: object
-    seed: int | None = None
-    render_mode: str | None = None
-    kwargs: dict | None = None
-
-
-class Instance:
-    """One environment.
-
-    Every method that moves the environment waits for its lock; one that waited while the
-    instance was being closed raises ``unknown_instance``.
-    """
-
-    # Given when the instance is listed.
-    instance_id = ""
-
-    def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
-        """Take over an environment.
-
-        Raises:
-            GymServerError: ``unsupported_space``.
-        """
-        self.action_space = env.action_space
-        self.observation_space = env.observation_space
-        self.action_space_info = spaces.describe(self.action_space)
-        self.observation_space_info = spaces.describe(self.observation_space)
-        self.env_id = env.spec.id if env.spec else str(choices.env_id)
-        self._env = env
-        self._choices = choices
-        self._renderer = renderer
-        self._lock = threading.Lock()
-        self._closed = False
-        self._monitor: Monitor | None = None
-        self._seed_for_reset = choices.seed
-        self._was_reset = False
-        self._done = False
-        self._steps = 0
-        self._episode_steps = 0
-        self._made = self._used = time.monotonic()
-        if choices.seed is not None:
-            self.action_space.seed(choices.seed)
-
-    def reset(self, seed: int | None, options: dict | None) -> dict:
-        """Start an episode.
-
-        Args:
-            seed: seeds the environment and the action space; None leaves both as they are, or
-                takes the seed given at creation the first time.
-            options: the environment's own.
-
-        Returns:
-            ``{"observation", "info"}`` as JSON values.
-        """
-        with self._held():
-            reset = self._monitor.reset if self._monitor else self._env.reset
-            seed_to_use = self._seed_for_reset if seed is None else seed
-            self._was_reset = False
-            observation, info = ask(lambda: reset(seed=seed_to_use, options=options))
-            if seed is None:
-                self._seed_for_reset = None
-            else:
-                self.action_space.seed(seed)
-            self._was_reset = True
-            self._done = False
-            self._episode_steps = 0
-            return {
-                "observation": ask(spaces.encode, self.observation_space, observation),
-                "info": plain(info) if info else {},
-            }
-
-    def step(self, action: object) -> dict:
-        """Take one step.
-
-        Args:
-            action: the JSON value of a member of the action space.
-
-        Returns:
-            ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
-            values.
-
-        Raises:
-            GymServerError: ``reset_needed`` or ``action_not_in_space``, both before the
-                environment moves; ``environment_error``.
-        """
-        with self._held():
-            if not self._was_reset:
-                raise _reset_needed("step()")
-            try:
-                decoded = spaces.decode(self.action_space, action)
-            except spaces.NotInSpace as refusal:
-                raise GymServerError("action_not_in_space", f"The action {refusal}") from None
-            return ask(self._step, decoded)
-
-    def _step(self, action: object) -> dict:
-        step = self._monitor.step if self._monitor else self._env.step
-        observation, reward, terminated, truncated, info = step(action)
-        terminated, truncated = bool(terminated), bool(truncated)
-        self._steps += 1
-        self._episode_steps += 1
-        self._done = terminated or truncated
-        return {
-            "observation": spaces.encode(self.observation_space, observation),
-            "reward": float(reward),
-            "done": self._done,
-            "terminated": terminated,
-            "truncated": truncated,
-            # Converted while the environment cannot change it.
-            "info": plain(info) if info else {},
-        }
-
-    def sample_action(self) -> object:
-        """Draw an action from the action space's own generator."""
-        with self._held():
-            return spaces.encode(self.action_space, self.action_space.sample())
-
-    def action_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``spaces.contains()``."""
-        return spaces.contains(self.action_space, self.action_space_info, claim)
-
-    def observation_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``spaces.contains()``."""
-        return spaces.contains(self.observation_space, self.observation_space_info, claim)
-
-    def render(self) -> bytes:
-        """Draw the current state as a PNG.
-
-        Raises:
-            GymServerError: ``cannot_render`` or ``reset_needed``.
-        """
-        with self._held():
-            if self._env.render_mode != "rgb_array":
-                raise GymServerError(
-                    "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
-                )
-            if not self._was_reset:
-                raise _reset_needed("render()")
-            frame = ask(self._renderer.run, self._env.render)
-        try:
-            return png(frame)
-        except (ValueError, AttributeError) as error:
-            raise GymServerError(
-                "cannot_render", f"What {self.env_id} draws is no picture: {error}"
-            ) from error
-
-    def start_monitor(
-        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
-    ) -> None:
-        """Record the episodes that start from now on; see ``Monitor``."""
-        with self._held():
-            if self._monitor is not None:
-                raise GymServerError(
-                    "monitor_active",
-                    f"Instance {self.instance_id} is already monitored",
-                    "close that monitor first",
-                )
-            self._monitor = Monitor.start(
-                self._env, root, directory, force, resume, video_every, self._renderer
-            )
-
-    def close_monitor(self) -> None:
-        """Stop recording and finish the files.
-
-        Raises:
-            GymServerError: ``monitor_not_active``.
-        """
-        with self._held():
-            if self._monitor is None:
-                raise GymServerError(
-                    "monitor_not_active", f"Instance {self.instance_id} is not monitored"
-                )
-            self._finish_monitor()
-
-    def close(self) -> None:
-        """Finish the monitor and close the environment; whoever waits learns that it is gone."""
-        with self._held():
-            self._closed = True
-            try:
-                if self._monitor is not None:
-                    self._finish_monitor()
-            finally:
-                ask(self._renderer.run, self._env.close)
-
-    def _finish_monitor(self) -> None:
-        monitor, self._monitor = self._monitor, None
-        monitor.close()
-
-    @property
-    def busy(self) -> bool:
-        """Whether a call is under way."""
-        return self._lock.locked()
-
-    def about(self) -> dict:
-        """Return all that is known of the instance, without waiting for its environment."""
-        spec = self._env.spec
-        now = time.monotonic()
-        monitor = self._monitor
-        return {
-            "instance_id": self.instance_id,
-            "env_id": self.env_id,
-            "observation_space": self.observation_space_info,
-            "action_space": self.action_space_info,
-            "reward_threshold": spec.reward_threshold if spec else None,
-            "max_episode_steps": spec.max_episode_steps if spec else None,
-            "lanes": 1,
-            "render_mode": self._choices.render_mode or self._env.render_mode,
-            "kwargs": self._choices.kwargs or {},
-            "seed": self._choices.seed,
-            "age_seconds": now - self._made,
-            "idle_seconds": now - self._used,
-            "steps": self._steps,
-            "episode_steps": self._episode_steps,
-            "needs_reset": self._done or not self._was_reset,
-            "monitor": monitor.about() if monitor else None,
-        }
-
-    @contextmanager
-    def _held(self) -> Iterator[None]:
-        with self._lock:
-            if self._closed:
-                raise unknown_instance(self.instance_id)
-            self._used = time.monotonic()
-            try:
-                yield
-            finally:
-                self._used = time.monotonic()
 
 
 class Instances:
@@ -284,7 +46,9 @@ class Instances:
                 self._instances[instance.instance_id] = instance
             return instance.instance_id
         except Exception:
-            self._renderer.run(env.close)
+            # What the client must hear of is why it gets no instance.
+            with contextlib.suppress(Exception):
+                self._renderer.run(env.close)
             raise
 
     def get(self, instance_id: str) -> Instance:
@@ -315,14 +79,16 @@ class Instances:
         """Close every instance and take no more."""
         with self._lock:
             self._stopping = True
-            # One that never comes back must not keep the others open.
-            instances = sorted(self._instances.values(), key=lambda instance: instance.busy)
+            instances = list(self._instances.values())
             self._instances.clear()
-        for instance in instances:
-            try:
-                instance.close()
-            except GymServerError as error:
-                log.warning("Closing instance %s: %s", instance.instance_id, error)
+        # One that never comes back must not keep the others from finishing their monitors.
+        threads = [
+            threading.Thread(target=_close, args=(instance,), daemon=True) for instance in instances
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
 
     def _new_id(self) -> str:
         while True:
@@ -331,7 +97,8 @@ class Instances:
                 return instance_id
 
 
-def _reset_needed(call: str) -> GymServerError:
-    return GymServerError(
-        "reset_needed", f"{call} needs a running episode", "reset the environment first"
-    )
+def _close(instance: Instance) -> None:
+    try:
+        instance.close()
+    except GymServerError as error:
+        log.warning("Closing instance %s: %s", instance.instance_id, error)

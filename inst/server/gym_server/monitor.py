@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TextIO
 
 import gymnasium
-from gymnasium.error import DependencyNotInstalled
 
 from gym_server.errors import GymServerError
 from gym_server.frames import RenderThread
@@ -78,8 +77,8 @@ class Monitor:
             _require_video(env)
         claimed = root.claim(directory, force, resume)
         try:
-            table = claimed.open_table(COLUMNS)
             recorder = _recorder(env, claimed.path, video_every) if video_every else None
+            table = claimed.open_table(COLUMNS)
         except BaseException:
             claimed.release()
             raise
@@ -122,8 +121,11 @@ class Monitor:
             GymServerError: ``monitor_directory`` when something could not be written.
         """
         self._finish_video()
-        self._table.close()
-        self._directory.release()
+        try:
+            self._table.close()
+            self._directory.release()
+        except OSError as error:
+            self._remember(error)
         if self._failure is not None:
             raise GymServerError(
                 "monitor_directory",
@@ -153,7 +155,10 @@ class Monitor:
         # that failed and after resuming.
         recorder.episode_id = number - 1
         if recorder.episode_trigger(number):
-            self._directory.add(video_name(number))
+            try:
+                self._directory.add(video_name(number))
+            except OSError as error:
+                self._remember(error)
         return self._renderer.run(lambda: recorder.reset(seed=seed, options=options))
 
     def _finish_video(self) -> None:
@@ -191,13 +196,10 @@ def _require_video(env: gymnasium.Env) -> None:
 
 
 def _recorder(env: gymnasium.Env, path: Path, video_every: int) -> gymnasium.wrappers.RecordVideo:
-    try:
-        return gymnasium.wrappers.RecordVideo(
-            env,
-            str(path),
-            episode_trigger=lambda number: number % video_every == 0,
-            # A garbage collection after each video would stop every other environment.
-            gc_trigger=None,
-        )
-    except DependencyNotInstalled as error:
-        raise GymServerError("video_unavailable", str(error)) from error
+    recorder = gymnasium.wrappers.RecordVideo(
+        env, str(path), episode_trigger=lambda number: number % video_every == 0
+    )
+    # A garbage collection after each video would stop every other environment.  (Not an
+    # argument in Gymnasium 1.0.)
+    recorder.gc_trigger = None
+    return recorder

@@ -7,7 +7,7 @@ import os
 import re
 import tempfile
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TextIO
 
@@ -41,7 +41,7 @@ class MonitorRoot:
         if allow_temporary:
             self._allowed.append(Path(tempfile.gettempdir()))
             if os.name == "posix":
-                self._allowed.append(Path("/tmp"))  # noqa: S108 - the classic examples' own
+                self._allowed.append(Path("/tmp"))
         self._lock = threading.Lock()
         self._in_use: set[Path] = set()
 
@@ -103,7 +103,7 @@ class MonitorDirectory:
         next_episode: the number of the episode that begins next.
     """
 
-    def __init__(self, path: Path, on_release) -> None:
+    def __init__(self, path: Path, on_release: Callable[[Path], None]) -> None:
         """Name a directory; ``MonitorRoot.claim()`` prepares it."""
         self.path = path
         self.next_episode = 0
@@ -114,6 +114,7 @@ class MonitorDirectory:
     def prepare(self, force: bool, resume: bool) -> None:
         """Read what earlier monitors left and keep it, delete it or refuse; see ``claim()``."""
         self._read_manifest()
+        # Whatever the list says, a monitor writes and deletes files of these names only.
         present = {name for name in os.listdir(self.path) if _is_monitor_file(name)}
         foreign = present - self._files
         if foreign:
@@ -142,11 +143,14 @@ class MonitorDirectory:
     def open_table(self, columns: Iterable[str]) -> TextIO:
         """Open the table of episodes for appending; a new one gets its header."""
         path = self.path / EPISODES
-        table = open(path, "a", encoding="ascii", newline="")  # noqa: SIM115 - the monitor closes it
-        if table.tell() == 0:
-            table.write(",".join(columns) + "\n")
-            table.flush()
-        return table
+        try:
+            table = open(path, "a", encoding="ascii", newline="")  # noqa: SIM115 - kept open
+            if table.tell() == 0:
+                table.write(",".join(columns) + "\n")
+                table.flush()
+            return table
+        except OSError as error:
+            raise _refuse(str(self.path), error.strerror or str(error)) from error
 
     def add(self, name: str) -> None:
         """Put a file on the list, before it is written."""
@@ -155,26 +159,23 @@ class MonitorDirectory:
 
     def release(self) -> None:
         """Write the list for a later monitor and give the directory free."""
-        if self._prepared:
-            self._write_manifest()
-        self._on_release(self.path)
+        try:
+            if self._prepared:
+                self._write_manifest()
+        finally:
+            self._on_release(self.path)
 
     def _read_manifest(self) -> None:
         path = self.path / MANIFEST
-        if path.is_symlink():
-            raise _refuse(str(self.path), f"{MANIFEST} is a link")
         try:
             manifest = json.loads(path.read_text(encoding="utf-8"))
-            files = {str(name) for name in manifest["files"]}
-            self.next_episode = int(manifest["next_episode"])
+            self._files = {str(name) for name in manifest["files"]}
+            # A server that was killed could not write the last number.
+            self.next_episode = max([int(manifest["next_episode"]), *self._episodes_in_table()])
         except FileNotFoundError:
             return
         except (ValueError, KeyError, TypeError) as error:
-            raise _refuse(str(self.path), f"its {MANIFEST} cannot be read") from error
-        # A list from elsewhere must not make us delete anything but a monitor's own files.
-        self._files = {name for name in files if _is_monitor_file(name)}
-        # A server that was killed could not write the last number.
-        self.next_episode = max([self.next_episode, *self._episodes_in_table()])
+            raise _refuse(str(self.path), "what an earlier monitor left is damaged") from error
 
     def _episodes_in_table(self) -> list[int]:
         try:
@@ -190,7 +191,10 @@ class MonitorDirectory:
             "files": sorted(self._files),
         }
         new = self.path / f"{MANIFEST}.new"
-        new.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+        # Made anew, so that no link of that name is followed.
+        new.unlink(missing_ok=True)
+        with open(new, "x", encoding="utf-8") as file:
+            json.dump(manifest, file, indent=1)
         new.replace(self.path / MANIFEST)
 
 

@@ -12,7 +12,8 @@ import numpy
 
 from gym_server import __version__, openapi, wire
 from gym_server.errors import GymServerError
-from gym_server.instances import Choices, Instance, Instances
+from gym_server.instance import Choices, Instance
+from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.wire import Field, Png
 

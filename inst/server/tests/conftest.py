@@ -1,0 +1,143 @@
+import http.client
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from gym_server.app import Config, create_app
+
+TESTS = Path(__file__).parent
+SERVER = TESTS.parent
+
+
+@pytest.fixture
+def monitor_dir(tmp_path):
+    directory = tmp_path / "monitors"
+    directory.mkdir()
+    return directory.resolve()
+
+
+@pytest.fixture
+def app(monitor_dir):
+    app = create_app(Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"]))
+    yield app
+    app.close()
+
+
+@pytest.fixture
+def client(app):
+    return app.test_client()
+
+
+@pytest.fixture
+def create(client):
+    """Make an instance and return the URL of its routes."""
+
+    def create(env_id="CartPole-v1", **fields):
+        answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
+        assert answer.status_code == 200, answer.json
+        return f"/v1/envs/{answer.json['instance_id']}"
+
+    return create
+
+
+@pytest.fixture
+def faulty(create):
+    return lambda name, **kwargs: create(f"faulty_envs:{name}-v0", kwargs=kwargs)
+
+
+class ServerProcess:
+    """A real server in a process of its own."""
+
+    def __init__(self, *arguments, **variables):
+        environment = {
+            **os.environ,
+            **variables,
+            "PYTHONPATH": os.pathsep.join([str(SERVER), str(TESTS)]),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "gym_server", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            text=True,
+        )
+        self.first_line = self.process.stdout.readline()
+        self.port = int(self.first_line.rsplit(":", 1)[1]) if self.first_line else None
+
+    def connect(self):
+        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+
+    def socket(self):
+        return socket.create_connection(("127.0.0.1", self.port), timeout=30)
+
+    def post(self, path, body=None):
+        return self._call("POST", path, json.dumps(body or {}))
+
+    def get(self, path):
+        return self._call("GET", path)
+
+    def _call(self, method, path, body=None):
+        connection = self.connect()
+        try:
+            connection.request(method, path, body)
+            answer = connection.getresponse()
+            return answer.status, json.loads(answer.read() or "null")
+        finally:
+            connection.close()
+
+    def create(self, env_id, **fields):
+        status, answer = self.post("/v1/envs/", {"env_id": env_id, **fields})
+        assert status == 200, answer
+        return f"/v1/envs/{answer['instance_id']}"
+
+    def stop(self, how=signal.SIGTERM, timeout=30):
+        """Stop it and return exit status, standard output and standard error."""
+        if how is not None:
+            self.process.send_signal(how)
+        output = self.process.communicate(timeout=timeout)
+        return self.process.returncode, *output
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout, self.process.stderr):
+            pipe.close()
+
+
+@pytest.fixture
+def serve():
+    """Start a server on a free port; it is gone when the test is over."""
+    servers = []
+
+    def serve(*arguments, **variables):
+        server = ServerProcess(
+            "--port", "0", "--allow-module", "faulty_envs", *arguments, **variables
+        )
+        servers.append(server)
+        return server
+
+    yield serve
+    for server in servers:
+        server.kill()
+
+
+@pytest.fixture
+def eventually():
+    """Wait until something holds."""
+
+    def eventually(condition, seconds=10):
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, "it never came true"
+            time.sleep(0.01)
+
+    return eventually

@@ -1,0 +1,195 @@
+"""Environments that misbehave, or have spaces that the classic ones lack.
+
+For tests: ``--allow-module faulty_envs`` lets a server make them, as in
+``faulty_envs:Echo-v0``.  The module needs Gymnasium and nothing else.
+"""
+
+import sys
+import threading
+import time
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+
+class Counting(gymnasium.Env):
+    """Observes how often it was stepped since it was made; an episode lasts ``length`` steps."""
+
+    observation_space = spaces.Box(0, 2**62, (1,), np.int64)
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, seconds=0.0, length=5):
+        self.seconds, self.length = seconds, length
+        self.steps = self.left = 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.left = self.length
+        return self.observe(), {"seed": seed, "options": options}
+
+    def step(self, action):
+        time.sleep(self.seconds)
+        self.steps += 1
+        self.left -= 1
+        return self.observe(), 1.5, self.left <= 0, False, {}
+
+    def observe(self):
+        return np.array([self.steps], dtype=np.int64)
+
+
+class Hanging(Counting):
+    def step(self, action):
+        time.sleep(3600)
+
+
+class Echo(Counting):
+    """Observes the action that it got; its Box is what the kwargs say."""
+
+    def __init__(self, dtype="float32", low=-1, high=1, shape=(1,)):
+        super().__init__()
+        low, high = (_bound(bound) for bound in (low, high))
+        box = spaces.Box(low, high, tuple(shape), np.dtype(dtype).type)
+        self.action_space = self.observation_space = box
+
+    def observe(self):
+        return self.observation_space.low
+
+    def step(self, action):
+        info = {"dtype": action.dtype.name, "shape": action.shape}
+        return action, 0.0, False, False, info
+
+
+class Shifted(Counting):
+    """A Discrete space that does not begin at 0."""
+
+    action_space = spaces.Discrete(3, start=-1)
+
+    def step(self, action):
+        return self.observe(), float(action), False, False, {"type": type(action).__name__}
+
+
+class NotANumber(Counting):
+    """Everything that JSON has no word for."""
+
+    observation_space = spaces.Box(-np.inf, np.inf, (4,), np.float32)
+
+    def observe(self):
+        return np.array([np.nan, np.inf, -np.inf, 0.1], dtype=np.float32)
+
+    def step(self, action):
+        itself = []
+        itself.append(itself)
+        info = {
+            "array": np.array([[1, 2], [3, 4]], dtype=np.uint8),
+            "nan": np.float64("nan"),
+            "flag": np.bool_(True),
+            "big": np.int64(2**62),
+            "object": object,
+            7: {"nested": (np.float32(0.5), {1})},
+            "itself": itself,
+        }
+        return self.observe(), float("inf"), np.bool_(False), np.bool_(False), info
+
+
+class RaisesInConstructor(Counting):
+    def __init__(self):
+        raise RuntimeError("no such table")
+
+
+class RaisesInReset(Counting):
+    def reset(self, *, seed=None, options=None):
+        if not (options or {}).get("mend"):
+            raise RuntimeError("the cart is gone")
+        return super().reset(seed=seed, options=options)
+
+
+class RaisesInStep(Counting):
+    def step(self, action):
+        if action == 1:
+            raise ValueError("the pole broke")
+        return super().step(action)
+
+
+class ExitsInStep(Counting):
+    def step(self, action):
+        sys.exit("good bye")
+
+
+class RaisesInClose(Counting):
+    def close(self):
+        raise RuntimeError("stuck")
+
+
+class Drawing(Counting):
+    """Draws what it was told to draw, and notes the threads that draw and close it."""
+
+    threads = set()  # noqa: RUF012
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, frame="picture", render_mode=None, **kwargs):
+        super().__init__(**kwargs)
+        self.frame, self.render_mode = frame, render_mode
+
+    def close(self):
+        self.threads.add(threading.get_ident())
+
+    def render(self):
+        self.threads.add(threading.get_ident())
+        if self.frame == "hangs":
+            time.sleep(3600)
+        if self.frame == "raises":
+            raise RuntimeError("out of paint")
+        if self.frame == "nothing":
+            return None
+        return np.full((16, 32, 3), self.steps, dtype=np.uint8)
+
+
+class OldRenderModes(Counting):
+    metadata = {"render_modes": ["ansi"]}  # noqa: RUF012
+
+
+class DictSpace(Counting):
+    observation_space = spaces.Dict({"camera": spaces.Discrete(3)})
+
+
+class OwnSpace(spaces.Space):
+    def __repr__(self):
+        return "OwnSpace()"
+
+
+class CustomSpace(Counting):
+    action_space = OwnSpace()
+
+
+class LongDouble(Counting):
+    observation_space = spaces.Box(0, 1, (1,), np.longdouble)
+
+
+def _bound(bound):
+    return (
+        np.array(bound) if isinstance(bound, list) else float(bound) if bound in _NAMED else bound
+    )
+
+
+_NAMED = ("inf", "-inf")
+
+for _kind in (
+    Counting,
+    CustomSpace,
+    DictSpace,
+    Drawing,
+    Echo,
+    ExitsInStep,
+    Hanging,
+    LongDouble,
+    NotANumber,
+    OldRenderModes,
+    RaisesInClose,
+    RaisesInConstructor,
+    RaisesInReset,
+    RaisesInStep,
+    Shifted,
+):
+    gymnasium.register(id=f"{_kind.__name__}-v0", entry_point=_kind)

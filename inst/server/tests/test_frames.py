@@ -1,0 +1,76 @@
+import io
+import struct
+import threading
+import zlib
+
+import numpy as np
+import pytest
+
+from gym_server.frames import RenderThread, png
+
+
+def decode(data):
+    """Read a PNG of 8 bits and no filters back into an array."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    stream, chunks = io.BytesIO(data[8:]), {}
+    while header := stream.read(8):
+        length, name = struct.unpack(">I4s", header)
+        chunks[name] = stream.read(length)
+        assert struct.unpack(">I", stream.read(4))[0] == zlib.crc32(name + chunks[name])
+    width, height, bits, colour = struct.unpack(">2I2B", chunks[b"IHDR"][:10])
+    channels = {0: 1, 2: 3, 6: 4}[colour]
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, -1)
+    assert bits == 8
+    assert not rows[:, 0].any()
+    return rows[:, 1:].reshape(height, width, channels)
+
+
+@pytest.mark.parametrize("shape", [(4, 6, 3), (4, 6, 4), (4, 6, 1), (4, 6)])
+def test_a_png_holds_every_pixel(shape):
+    frame = np.arange(np.prod(shape), dtype=np.uint8).reshape(shape)
+    assert np.array_equal(decode(png(frame)), frame.reshape(4, 6, -1))
+
+
+def test_a_frame_may_be_a_transposed_view():
+    frame = np.arange(72, dtype=np.uint8).reshape(4, 6, 3).transpose(1, 0, 2)
+    assert np.array_equal(decode(png(frame)), frame)
+
+
+@pytest.mark.parametrize(
+    "frame", [np.zeros((4, 6, 3)), np.zeros((4,), np.uint8), np.zeros((4, 6, 2), np.uint8)]
+)
+def test_what_is_no_picture_is_refused(frame):
+    with pytest.raises(ValueError, match="no picture"):
+        png(frame)
+
+
+def test_everything_is_drawn_on_one_thread():
+    renderer = RenderThread()
+    drawn_on = set()
+    threads = [
+        threading.Thread(target=lambda: drawn_on.add(renderer.run(threading.current_thread).ident))
+        for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(drawn_on) == 1
+    renderer.stop()
+
+
+def test_what_drawing_raises_is_raised():
+    renderer = RenderThread()
+    with pytest.raises(ZeroDivisionError):
+        renderer.run(lambda: 1 / 0)
+    renderer.stop()
+
+
+def test_pygame_outlives_an_environment_that_quits_it():
+    import pygame
+
+    renderer = RenderThread()
+    renderer.run(pygame.font.init)
+    renderer.run(lambda: (pygame.display.quit(), pygame.quit()))
+    assert renderer.run(pygame.font.get_init)
+    renderer.stop()
