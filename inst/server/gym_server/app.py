@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import tempfile
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -49,13 +47,11 @@ class GymApp(Flask):
         super().__init__("gym_server", static_folder=None)
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
-        self._own_monitor_dir = (
-            Path(tempfile.mkdtemp(prefix="gym-monitor-")) if config.monitor_dir is None else None
-        )
+        self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
         self._instances = Instances(config.allowed_modules, self._renderer)
         services = Services(
             self._instances,
-            MonitorRoot(config.monitor_dir or self._own_monitor_dir, config.temporary_monitors),
+            self._monitor_root,
             config.stop,
         )
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
@@ -74,10 +70,7 @@ class GymApp(Flask):
         """Close every environment and monitor."""
         self._instances.close_all()
         self._renderer.stop()
-        if self._own_monitor_dir is not None:
-            # What monitors wrote stays.
-            with contextlib.suppress(OSError):
-                self._own_monitor_dir.rmdir()
+        self._monitor_root.close()
 
 
 def create_app(config: Config | None = None) -> GymApp:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -28,16 +29,18 @@ def video_name(episode: int) -> str:
 class MonitorRoot:
     """Where the monitors of a server may write."""
 
-    def __init__(self, root: Path, allow_temporary: bool) -> None:
+    def __init__(self, root: Path | None, allow_temporary: bool) -> None:
         """Set the limits.
 
         Args:
-            root: relative directories lie below it, and absolute ones may.
+            root: relative directories lie below it, and absolute ones may; None for a temporary
+                directory, made when the first monitor starts.
             allow_temporary: whether absolute ones may also lie below the system's temporary
                 directory, as the classic examples have it.
         """
-        self.root = root
-        self._allowed = [root]
+        self._root = root
+        self._own_root: Path | None = None
+        self._allowed: list[Path] = []
         if allow_temporary:
             self._allowed.append(Path(tempfile.gettempdir()))
             if os.name == "posix":
@@ -75,9 +78,21 @@ class MonitorRoot:
             raise
         return claimed
 
+    def close(self) -> None:
+        """Remove the temporary directory unless something was written there."""
+        if self._own_root is not None:
+            with contextlib.suppress(OSError):
+                self._own_root.rmdir()
+
     def _release(self, path: Path) -> None:
         with self._lock:
             self._in_use.discard(path)
+
+    def _find_root(self) -> Path:
+        with self._lock:
+            if self._root is None:
+                self._root = self._own_root = Path(tempfile.mkdtemp(prefix="gym-monitor-"))
+            return self._root
 
     def _resolve(self, directory: str) -> Path:
         if "\0" in directory:
@@ -86,8 +101,9 @@ class MonitorRoot:
             raise _refuse(directory, "it climbs")
         try:
             # Links are followed before the comparison, so that none leads out.
-            path = Path(self.root, directory).resolve()
-            allowed = [root.resolve() for root in self._allowed]
+            own = self._find_root()
+            path = Path(own, directory).resolve()
+            allowed = [root.resolve() for root in (own, *self._allowed)]
         except (OSError, RuntimeError, ValueError) as error:
             raise _refuse(directory, str(error)) from error
         if not any(root in path.parents for root in allowed):

@@ -115,15 +115,14 @@ def test_the_monitor_directory_is_the_one_that_was_named(serve, tmp_path):
 
 
 @needs_signals
-def test_its_own_monitor_directory_is_gone_unless_something_was_written(serve, tmp_path):
-    for written in (False, True):
+def test_its_own_monitor_directory_is_there_only_for_what_was_written(serve, tmp_path):
+    for directory in ("..", "a"):
         server = serve(TMPDIR=str(tmp_path))
-        assert len(list(tmp_path.iterdir())) == 1
-        if written:
-            url = server.create("CartPole-v1")
-            assert server.post(f"{url}/monitor/start/", {"directory": "a"})[0] == 204
+        assert list(tmp_path.iterdir()) == []
+        url = server.create("CartPole-v1")
+        server.post(f"{url}/monitor/start/", {"directory": directory})
         server.stop()
-        assert len(list(tmp_path.iterdir())) == written
+        assert len(list(tmp_path.iterdir())) == (directory == "a")
 
 
 def test_the_size_of_a_request_is_limited_as_asked(serve):
