@@ -1,0 +1,46 @@
+# What the plots share.
+
+# An empty plot with this package's defaults, over which what the caller says wins.
+open_plot <- function(frame, chosen) {
+  # Upright numbers read best, but long ones would run into the axis's label.
+  las <- if (max(nchar(pretty(frame$y))) > 3L) 0L else 1L
+  frame <- c(frame, list(type = "n", las = las, bty = "l"))
+  do.call(graphics::plot, c(chosen, frame[setdiff(names(frame), names(chosen))]))
+}
+
+# Colours that remain apart for the colour-blind (Okabe and Ito, 2008).
+okabe_ito <- list(
+  orange = "#E69F00", sky_blue = "#56B4E9", green = "#009E73", yellow = "#F0E442",
+  blue = "#0072B2", vermillion = "#D55E00", purple = "#CC79A7"
+)
+
+# A legend in one line above the plot, where no data are; smaller where the plot is
+# narrow. graphics::legend() gives each entry the width of the longest. Laid out in
+# inches, so that logarithmic axes do not matter.
+legend_above <- function(labels, col, pch, lty, cex = 0.9) {
+  width <- function(cex) sum(legend_widths(labels, cex)) - legend_gap(cex)
+  sides <- graphics::grconvertX(0:1, "npc", "inches")
+  # Not by the ratio of the widths, as devices round the sizes of their letters.
+  while (width(cex) > diff(sides) && cex > 0.3) cex <- 0.95 * cex
+  starts <- mean(sides) - width(cex) / 2 + cumsum(c(0, legend_widths(labels, cex)))
+  left <- starts[seq_along(labels)]
+  key <- legend_key(cex)
+  height <- graphics::grconvertY(1, "npc", "inches") + 0.9 * graphics::par("csi")
+  x <- function(inches) graphics::grconvertX(inches, "inches", "user")
+  y <- rep(graphics::grconvertY(height, "inches", "user"), length(labels))
+  lined <- !is.na(lty)
+  graphics::segments(x(left), y, x(left + key), y, xpd = NA,
+                     col = ifelse(lined, col, NA), lty = ifelse(lined, lty, "blank"), lwd = 2)
+  graphics::points(x(left + key / 2), y, xpd = NA, pch = pch, col = col, cex = cex)
+  graphics::text(x(left + 1.2 * key), y, labels, xpd = NA, cex = cex, adj = c(0, 0.4))
+  place <- list(left = starts[[1L]], right = starts[[1L]] + width(cex), height = height)
+  invisible(place)
+}
+
+legend_widths <- function(labels, cex) {
+  1.2 * legend_key(cex) + graphics::strwidth(labels, "inches", cex = cex) + legend_gap(cex)
+}
+
+legend_key <- function(cex) graphics::strwidth("MM", "inches", cex = cex)
+
+legend_gap <- legend_key

@@ -1,0 +1,114 @@
+#' Act at random
+#'
+#' `policy_random()` makes a policy that looks at nothing and draws its action:
+#' uniformly between the bounds of the action space, and from an exponential or
+#' normal distribution where a side or both are unbounded, as Gymnasium's own
+#' `sample()` does. It draws from R's generator, so that [set.seed()] fixes it.
+#' `random_discrete_agent()` is the same for `n` actions, under the name that the
+#' classic package had for it.
+#'
+#' @param action_space The actions to draw from, a space such as
+#'   `gym_make("CartPole-v1")$action_space`. `NULL`, the default, is the action
+#'   space of the environment that the policy is played in.
+#' @param n How many actions there are, a whole number of at least 1. The actions
+#'   are 0, 1, ..., `n` - 1.
+#' @return A policy of class `gym_policy_random`, for [act()] and [rollout()].
+#' @section Errors: `gym_error_argument` when `action_space` is no space or `n` not
+#'   a whole number of at least 1; from [act()] when the policy has no action space
+#'   yet.
+#' @seealso [policy_network()]
+#' @export
+#' @examples
+#' agent <- random_discrete_agent(2)
+#' agent
+#' set.seed(1)
+#' act(agent, c(0.01, -0.2, 0.03, 0.4))
+#'
+#' @examplesIf gym:::can_start_server()
+#' rollout("CartPole-v1", policy_random(), episodes = 10, seed = 1)
+policy_random <- function(action_space = NULL) {
+  if (!is.null(action_space) && !inherits(action_space, "gym_space")) {
+    abort_argument(action_space, "a space or NULL", "action_space", rlang::current_env())
+  }
+  structure(
+    list(action_space = action_space, observation_space = NULL),
+    class = c("gym_policy_random", "gym_policy")
+  )
+}
+
+#' @rdname policy_random
+#' @export
+random_discrete_agent <- function(n) {
+  check_count(n)
+  policy_random(new_space(list(name = "Discrete", n = as.integer(n), start = 0L)))
+}
+
+#' @export
+act.gym_policy_random <- function(policy, observation, ...) {
+  space <- policy$action_space
+  if (is.null(space)) {
+    gym_abort(
+      c(
+        "The random policy does not know what actions there are.",
+        i = "Name them, as in `policy_random(env$action_space)`, or play it with `rollout()`."
+      ),
+      class = "gym_error_argument",
+      argument = "policy",
+      value = policy
+    )
+  }
+  # What is observed matters only for how many there are, and observations that
+  # are lists (of an environment with several parts) come one at a time.
+  lanes <- if (!is.list(observation)) observation_lanes(observation, policy$observation_space)
+  if (is.null(lanes) || lanes$one) {
+    space_sample(space)
+  } else {
+    stack_actions(replicate(nrow(lanes$values), space_sample(space), simplify = FALSE))
+  }
+}
+
+# Many actions: an integer vector, or an array with one action for each value of
+# its first index.
+stack_actions <- function(actions) {
+  shape <- dim(actions[[1L]]) %||% length(actions[[1L]])
+  stacked <- unlist(actions)
+  if (identical(shape, 1L) && is.integer(stacked)) {
+    return(stacked)
+  }
+  aperm(array(stacked, c(shape, length(actions))), c(length(shape) + 1L, seq_along(shape)))
+}
+
+#' @exportS3Method
+policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env()) {
+  own <- policy$action_space
+  policy$observation_space <- env$observation_space
+  if (is.null(own)) {
+    policy$action_space <- env$action_space
+  } else if (!space_within(own, env$action_space)) {
+    gym_abort(
+      paste0(
+        "The policy's actions are ", format(own), ", but ", environment_label(env),
+        " takes ", format(env$action_space), "."
+      ),
+      class = "gym_error_argument",
+      argument = "policy",
+      value = policy,
+      call = call
+    )
+  }
+  policy
+}
+
+# Is each value of a space, as far as kind and shape tell, one of the other's?
+space_within <- function(inner, outer) {
+  if (inherits(inner, "gym_space_discrete") && inherits(outer, "gym_space_discrete")) {
+    inner$start >= outer$start && inner$start + inner$n <= outer$start + outer$n
+  } else {
+    identical(class(inner), class(outer)) && identical(inner$shape, outer$shape)
+  }
+}
+
+#' @export
+format.gym_policy_random <- function(x, ...) {
+  if (is.null(x$action_space)) "random" else paste("random over", format(x$action_space))
+}

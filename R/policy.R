@@ -1,0 +1,139 @@
+#' Choose an action
+#'
+#' Asks a policy what to do, given what is observed: one observation in, one
+#' action out; many observations in, as many actions out. Changes nothing, except
+#' that a [random policy][policy_random()] draws from R's generator.
+#'
+#' A policy is an object made by [policy_random()] or [policy_network()], or any
+#' function that takes an observation and returns an action. A method of `act()`
+#' for a class of your own makes policies of another kind, which [rollout()] then
+#' plays.
+#'
+#' @param policy The policy: of class `gym_policy`, or a function of an
+#'   observation.
+#' @param observation What is observed. For the usual environments a numeric
+#'   vector is one observation, and a numeric matrix has one observation in each
+#'   row. Where observations are arrays themselves, many of them have one
+#'   dimension more, the first; where they are single whole numbers, many of them
+#'   are an integer vector.
+#' @param ... For methods.
+#' @return For one observation one action: a whole number for a discrete action
+#'   space, a numeric vector (or array) in the shape of the space for a Box. For
+#'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
+#'   (an array with `n` as its first dimension).
+#' @section Errors: `gym_error_argument` when `policy` is no policy, or the
+#'   observation does not have as many numbers as the policy takes.
+#' @export
+#' @examples
+#' policy <- policy_network(sizes = c(4, 2, 1))
+#' act(policy, c(0.01, -0.2, 0.03, 0.4))
+#'
+#' observations <- matrix(rnorm(20), ncol = 4)
+#' act(policy, observations)
+#'
+#' # The pole falls to the right: push the cart to the right.
+#' follow_pole <- function(observation) as.integer(observation[3] > 0)
+#' act(follow_pole, c(0.01, -0.2, 0.03, 0.4))
+act <- function(policy, observation, ...) UseMethod("act")
+
+#' @export
+act.default <- function(policy, observation, ...) {
+  check_policy(policy)
+  gym_abort(
+    paste0("There is no method of `act()` for a policy of class ", class(policy)[[1L]], "."),
+    class = "gym_error_argument"
+  )
+}
+
+#' @export
+act.function <- function(policy, observation, ...) policy(observation)
+
+#' @export
+print.gym_policy <- function(x, ...) {
+  cat("<policy: ", format(x), ">\n", sep = "")
+  invisible(x)
+}
+
+check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!inherits(x, "gym_policy") && !is.function(x)) {
+    abort_argument(x, "a policy or a function of an observation", arg, call)
+  }
+  invisible(x)
+}
+
+policy_text <- function(policy) {
+  if (inherits(policy, "gym_policy")) format(policy) else "a function"
+}
+
+# Two questions that whoever plays or searches asks of a policy ------------------
+
+#' Fit a policy to an environment
+#'
+#' Aborts when the policy cannot play there.
+#' @return The policy, which now knows the environment's spaces.
+#' @noRd
+policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("policy_bind")
+
+#' @exportS3Method
+policy_bind.default <- function(policy, env, call = rlang::caller_env()) policy
+
+#' Draw another policy of the same kind
+#' @noRd
+policy_resample <- function(policy, call = rlang::caller_env()) UseMethod("policy_resample")
+
+#' @exportS3Method
+policy_resample.default <- function(policy, call = rlang::caller_env()) {
+  gym_abort(
+    c(
+      paste0("A random search needs a policy with weights to draw, not ",
+             policy_text(policy), "."),
+      i = "`policy_network()` makes one."
+    ),
+    class = "gym_error_argument",
+    argument = "policy",
+    value = policy,
+    call = call
+  )
+}
+
+# Observations as rows of numbers -------------------------------------------------
+
+#' Put one or many observations into the rows of a matrix
+#'
+#' @param space The observation space, `NULL` for a policy that knows none and
+#'   takes a vector for one observation and a matrix for many.
+#' @return A list: `values`, the matrix, in each row the numbers of an observation
+#'   in row-major order, as Gymnasium flattens them; `one`, whether what came was
+#'   a single observation rather than a number of them.
+#' @noRd
+observation_lanes <- function(observation, space) {
+  axes <- dim(observation)
+  rank <- observation_rank(space)
+  if (is.null(axes) && rank == 1L) {
+    return(list(values = matrix(observation, nrow = 1L), one = TRUE))
+  }
+  if (is.data.frame(observation)) {
+    observation <- as.matrix(observation)
+  }
+  given <- if (!is.null(axes)) length(axes) else if (length(observation) == 1L) 0L else 1L
+  if (given == rank) {
+    list(values = matrix(row_major(observation), nrow = 1L), one = TRUE)
+  } else if (rank == 0L || is.null(axes)) {
+    list(values = matrix(observation, ncol = 1L), one = FALSE)
+  } else {
+    list(values = t(matrix(row_major(observation), ncol = axes[[1L]])), one = FALSE)
+  }
+}
+
+# A discrete space has no shape: its values are single numbers.
+observation_rank <- function(space) {
+  if (is.null(space)) 1L else length(space$shape)
+}
+
+# Words for messages and for what is printed ----------------------------------------
+
+environment_label <- function(env) env$spec$id %||% "the environment"
+
+count_of <- function(n, noun) {
+  paste0(format(n, big.mark = ",", scientific = FALSE), " ", noun, if (n != 1) "s")
+}

@@ -1,0 +1,315 @@
+#' Play whole episodes
+#'
+#' Plays a policy in an environment, episode after episode, and keeps what came of
+#' it. An environment named by its id is made for the purpose and closed
+#' afterwards, whatever happens; one made by [gym_make()] is left open, in its last
+#' episode.
+#'
+#' An episode's return is the sum of its rewards, its length the number of its
+#' steps. Each episode is seeded: the seeds are drawn from R's generator before the
+#' first episode begins, and so are, while they play, the actions of a random
+#' policy. So [set.seed()] alone fixes everything, and `env$reset(seed = )` with a
+#' seed of the table begins the same episode again.
+#'
+#' @param env The environment: an id, such as `"CartPole-v1"`, or an environment
+#'   made by [gym_make()].
+#' @param policy The policy: made by [policy_random()] or [policy_network()], or a
+#'   function that takes an observation and returns an action.
+#' @param episodes How many episodes to play, a whole number of at least 1; the
+#'   default is 1.
+#' @param max_steps After how many steps to cut an episode short, a whole number of
+#'   at least 1. Such an episode counts as truncated. `NULL`, the default, leaves it
+#'   to the environment; most have a limit of their own, but without one a policy
+#'   that never fails plays forever.
+#' @param seed A whole number that fixes all that is drawn: the result is that of
+#'   calling `set.seed(seed)` beforehand, but the session's generator is afterwards as
+#'   it was. `NULL`, the default, draws from the session's generator.
+#' @param steps Keep each step as well? `FALSE`, the default, or `TRUE`.
+#' @param client The client of the server where an environment named by its id is
+#'   made; the default is the session's own, [gym_client()].
+#' @return An object of class `gym_rollout`, which [print()], [summary()],
+#'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
+#'   elements
+#'   \describe{
+#'     \item{episodes}{A data frame with one row for each episode: `episode`
+#'       (integer), `seed` (integer), `return` (double), `length` (integer, in steps),
+#'       `terminated` (logical: ended by the environment's own rules), `truncated`
+#'       (logical: cut short by a limit of steps).}
+#'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
+#'       step: `episode`, `step` (integers), the observation that the action was taken
+#'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
+#'       elsewhere `obs_1`, `obs_2`, ...), `action` (or `action_1`, `action_2`, ...),
+#'       `reward` (double), `terminated`, `truncated` (logical).}
+#'     \item{policy}{The policy played.}
+#'     \item{env_id}{The environment's id, a string.}
+#'     \item{seed}{As given.}
+#'   }
+#'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
+#'   the episodes.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be
+#'   (before anything is made) or a policy that does not fit the environment;
+#'   `gym_error_http` when the server refuses the environment or an action;
+#'   `gym_error_connection` when it does not answer.
+#' @seealso [search_random()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' random <- rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1)
+#' random
+#' summary(random)
+#'
+#' # Any function can be a policy, and each step be kept.
+#' follow_pole <- function(observation) as.integer(observation[3] > 0)
+#' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
+#' head(as.data.frame(played))
+rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, steps = FALSE,
+                    client = gym_client()) {
+  check_environment(env)
+  check_count(episodes)
+  check_count(max_steps, allow_null = TRUE)
+  check_seed(seed)
+  check_flag(steps)
+  call <- rlang::current_env()
+  with_random_seed(seed, {
+    # A policy that is made in the call draws its weights under the seed, too.
+    check_policy(policy)
+    with_environment(env, client, function(env) {
+      policy <- policy_bind(policy, env, call = call)
+      played <- play_episodes(env, policy, episodes, max_steps, keep_steps = steps)
+      new_rollout(played, policy, env, seed)
+    })
+  })
+}
+
+# Environments --------------------------------------------------------------------
+
+check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
+  playable <- (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
+  if (!named && !playable) {
+    must <- "the id of an environment or an environment made by `gym_make()`"
+    abort_argument(x, must, arg, call)
+  }
+  invisible(x)
+}
+
+#' Call a function with an environment
+#'
+#' One that is named by its id is made first and closed when `use` is left.
+#' @noRd
+with_environment <- function(env, client, use) {
+  if (!is.character(env)) {
+    return(use(env))
+  }
+  env <- gym_make(env, client = client)
+  finished <- FALSE
+  on.exit(close_made(env, finished))
+  value <- use(env)
+  finished <- TRUE
+  value
+}
+
+# What was played is not lost because the environment could not be closed, and an
+# error on the way here says more than one from closing.
+close_made <- function(env, finished) {
+  tryCatch(
+    env$close(),
+    gym_error = function(cnd) {
+      if (finished) {
+        rlang::warn(
+          c(paste0("The environment could not be closed."), x = conditionMessage(cnd)),
+          class = "gym_warning_close"
+        )
+      }
+    }
+  )
+}
+
+# Episodes ------------------------------------------------------------------------
+
+#' Play episodes in an open environment with a policy that is fitted to it
+#' @return A list of episodes, each as [play_episode()] returns it.
+#' @noRd
+play_episodes <- function(env, policy, episodes, max_steps, keep_steps = FALSE) {
+  lapply(
+    draw_environment_seeds(episodes),
+    function(seed) play_episode(env, policy, seed, max_steps %||% Inf, keep_steps)
+  )
+}
+
+play_episode <- function(env, policy, seed, max_steps, keep_steps) {
+  observation <- env$reset(seed = seed)
+  total <- 0
+  length <- 0L
+  steps <- list()
+  repeat {
+    action <- act(policy, observation)
+    out <- env$step(action)
+    length <- length + 1L
+    total <- total + out$reward
+    if (keep_steps) {
+      steps[[length]] <- list(
+        observation = observation, action = action, reward = out$reward,
+        terminated = out$terminated, truncated = out$truncated
+      )
+    }
+    if (out$terminated || out$truncated || length >= max_steps) {
+      break
+    }
+    observation <- out$observation
+  }
+  cut <- !out$terminated && length >= max_steps
+  list(
+    seed = seed, total = total, length = length, steps = steps,
+    terminated = out$terminated, truncated = out$truncated || cut
+  )
+}
+
+# Tables --------------------------------------------------------------------------
+
+new_rollout <- function(played, policy, env, seed) {
+  kept <- length(played[[1L]]$steps) > 0L
+  structure(
+    list(
+      episodes = episodes_table(played),
+      steps = if (kept) steps_table(played, env),
+      policy = policy,
+      env_id = environment_label(env),
+      seed = seed
+    ),
+    class = "gym_rollout"
+  )
+}
+
+episodes_table <- function(played) {
+  column <- function(name, type) vapply(played, function(episode) episode[[name]], type)
+  data.frame(
+    episode = seq_along(played),
+    seed = column("seed", integer(1)),
+    return = column("total", numeric(1)),
+    length = column("length", integer(1)),
+    terminated = column("terminated", logical(1)),
+    truncated = column("truncated", logical(1))
+  )
+}
+
+steps_table <- function(played, env) {
+  lengths <- vapply(played, function(episode) episode$length, integer(1))
+  steps <- do.call(c, lapply(played, function(episode) episode$steps))
+  column <- function(name, type) vapply(steps, function(step) step[[name]], type)
+  observations <- value_columns(lapply(steps, function(step) step$observation))
+  names(observations) <- observation_names(env$spec$id, length(observations))
+  actions <- value_columns(lapply(steps, function(step) step$action))
+  numbered <- paste0("action_", seq_along(actions))
+  names(actions) <- if (length(actions) == 1L) "action" else numbered
+  truncated <- column("truncated", logical(1))
+  truncated[cumsum(lengths)] <- vapply(played, function(episode) episode$truncated, NA)
+  data.frame(
+    episode = rep(seq_along(played), lengths),
+    step = sequence(lengths),
+    observations,
+    actions,
+    reward = column("reward", numeric(1)),
+    terminated = column("terminated", logical(1)),
+    truncated = truncated
+  )
+}
+
+# Values of one space as columns: one for each number in them, in row-major order.
+value_columns <- function(values) {
+  flat <- matrix(unlist(lapply(values, row_major)), ncol = length(values))
+  lapply(seq_len(nrow(flat)), function(i) flat[i, ])
+}
+
+#' @export
+as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...) {
+  x$steps %||% x$episodes
+}
+
+# What it says of itself ------------------------------------------------------------
+
+#' @export
+print.gym_rollout <- function(x, ...) {
+  cat(rollout_lines(x), sep = "\n")
+  invisible(x)
+}
+
+rollout_lines <- function(x) {
+  returns <- x$episodes$return
+  c(
+    paste0("Rollout in ", x$env_id, ": ", count_of(length(returns), "episode"), ", ",
+           count_of(sum(x$episodes$length), "step")),
+    paste0("Policy: ", policy_text(x$policy)),
+    paste0("Return: ", returns_text(returns))
+  )
+}
+
+returns_text <- function(returns) {
+  if (length(returns) == 1L) {
+    return(number_text(returns))
+  }
+  paste0(
+    "mean ", number_text(mean(returns)), se_text(standard_error(returns)),
+    ", median ", number_text(stats::median(returns)),
+    ", from ", number_text(min(returns)), " to ", number_text(max(returns))
+  )
+}
+
+#' Summarise a rollout
+#'
+#' @param object What [rollout()] returned.
+#' @param ... Not used.
+#' @return An object of class `summary.gym_rollout`, a list with the elements
+#'   `env_id` (a string), `policy`, `episodes` and `steps` (how many, integers),
+#'   `returns` and `lengths` (the quartiles and the mean, named numeric vectors of
+#'   length 6), `mean` and `se` (the mean return and its standard error, doubles; the
+#'   latter `NA` for a single episode), `terminated` and `truncated` (how many
+#'   episodes ended so, integers).
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))
+summary.gym_rollout <- function(object, ...) {
+  episodes <- object$episodes
+  structure(
+    list(
+      env_id = object$env_id,
+      policy = object$policy,
+      episodes = nrow(episodes),
+      steps = sum(episodes$length),
+      returns = quartiles(episodes$return),
+      lengths = quartiles(episodes$length),
+      mean = mean(episodes$return),
+      se = standard_error(episodes$return),
+      terminated = sum(episodes$terminated),
+      truncated = sum(episodes$truncated)
+    ),
+    class = "summary.gym_rollout"
+  )
+}
+
+#' @export
+print.summary.gym_rollout <- function(x, ...) {
+  cat(
+    paste0("Rollout in ", x$env_id, ": ", count_of(x$episodes, "episode"), ", ",
+           count_of(x$steps, "step")),
+    paste0("Policy: ", policy_text(x$policy)),
+    paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
+    paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated),
+    "",
+    sep = "\n"
+  )
+  print(signif(rbind(return = x$returns, length = x$lengths), 4L))
+  invisible(x)
+}
+
+quartiles <- function(x) {
+  five <- stats::quantile(x, names = FALSE)
+  c(Min. = five[[1L]], `1st Qu.` = five[[2L]], Median = five[[3L]], Mean = mean(x),
+    `3rd Qu.` = five[[4L]], Max. = five[[5L]])
+}
+
+# Of a single episode there is no standard error.
+standard_error <- function(x) stats::sd(x) / sqrt(length(x))
+
+se_text <- function(se) if (!is.na(se)) paste0(" (standard error ", number_text(se), ")")
+
+number_text <- function(x) format(x, digits = 4L, big.mark = ",")

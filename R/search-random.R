@@ -1,0 +1,190 @@
+#' Search for a policy at random
+#'
+#' Plays the post's agent: each round draws the weights of a network anew, plays a batch
+#' of episodes with it, and the first round whose mean return reaches the target ends the
+#' search. `search_random()` without arguments solves CartPole. An environment named by
+#' its id is made for the purpose and closed afterwards, whatever happens.
+#'
+#' # What is drawn
+#'
+#' Each round draws its weights and the seeds of its episodes from R's generator, so that
+#' [set.seed()] alone fixes the whole search. The policy that is given tells only the sizes
+#' and activations: its own weights are not played, in the first round either, and drawing
+#' them in the call (as the default does) leaves the generator alone.
+#'
+#' # Where it differs from the post's script
+#'
+#' The post's script recycles the weights of the output to twice their number, counts for
+#' each episode one step too many, and takes the mean of the *different* returns of a batch.
+#' Here each weight counts once, an episode's return is the sum of its rewards, and the mean
+#' is over all episodes.
+#'
+#' # When it ends early
+#'
+#' A search that is interrupted (Ctrl-C, or Esc) returns what it has, with a message; a round
+#' that was not played to its end does not count. An error in the middle, such as a lost
+#' connection, has the class `gym_error_search` beside its own, and what was played before
+#' it is the element `result` of the condition:
+#'
+#' ```r
+#' search <- tryCatch(search_random(), gym_error_search = function(cnd) cnd$result)
+#' ```
+#'
+#' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
+#'   [gym_make()].
+#' @param policy The kind of policy to search among: a network made by [policy_network()],
+#'   by default the post's, with 4 inputs, 2 hidden neurons and 1 output.
+#' @param rounds How many rounds to play at most, a whole number of at least 1; the default
+#'   is 50.
+#' @param episodes How many episodes to play in each round, a whole number of at least 1; the
+#'   default is 5.
+#' @param target The mean return of a round that ends the search, a number. `NULL`, the
+#'   default, is the environment's own reward threshold (195 for CartPole-v0), and for an
+#'   environment that has none there is no early end, nor with `target = Inf`.
+#' @param max_steps After how many steps to cut an episode short, a whole number of at least
+#'   1. `NULL`, the default, leaves it to the environment (200 steps in CartPole-v0); most have
+#'   a limit, but without one a policy that never fails plays forever.
+#' @param seed A whole number that fixes all that is drawn: the result is that of calling
+#'   `set.seed(seed)` beforehand, but the session's generator is afterwards as it was.
+#'   `NULL`, the default, draws from the session's generator.
+#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param client The client of the server where an environment named by its id is made; the
+#'   default is the session's own, [gym_client()].
+#' @return An object of class [gym_search], which [print()], [summary()][summary.gym_search()],
+#'   [plot()][plot.gym_search()], [as.data.frame()][as.data.frame.gym_search()] and
+#'   [predict()][predict.gym_search()] know; a list with the elements
+#'   \describe{
+#'     \item{policy}{The policy with the best mean return, the one that solved the environment
+#'       when one did, the first of equal ones. `NULL` when no round was finished.}
+#'     \item{solved}{Whether the target was reached, a logical; `FALSE` without a target.}
+#'     \item{round}{The round of that policy, an integer, `NA` when no round was finished.}
+#'     \item{rounds}{A data frame with one row for each round: `round` (integer),
+#'       `mean_return` (double), `steps` (integer).}
+#'     \item{episodes}{A data frame with one row for each episode: `round`, `episode`, `seed`
+#'       (integers), `return` (double), `length` (integer, in steps), `terminated`,
+#'       `truncated` (logical).}
+#'     \item{target}{The target, a double, or `NULL`.}
+#'     \item{env_id}{The environment's id, a string.}
+#'     \item{env}{The environment when an object was given, otherwise `NULL`.}
+#'     \item{client}{The client of the environment.}
+#'     \item{template, max_rounds, max_steps, seed}{`policy`, `rounds`, `max_steps` and `seed` as
+#'       given.}
+#'     \item{elapsed}{The seconds that it took, a double.}
+#'     \item{interrupted}{Whether it was interrupted, a logical.}
+#'   }
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, before
+#'   anything is made, or for a network that does not fit the environment; `gym_error_search`
+#'   for any error while it plays, with the classes of that error, `gym_error_http` or
+#'   `gym_error_connection` for instance.
+#' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
+#'   CartPole-v0: Gym's `reward_threshold`.
+#' @seealso [gym_search] for what to do with the result.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", seed = 1)
+#' search
+#' plot(search)
+#' search$policy
+search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
+                          episodes = 5, target = NULL, max_steps = NULL, seed = NULL,
+                          progress = rlang::is_interactive(), client = gym_client()) {
+  check_environment(env)
+  check_count(rounds)
+  check_count(episodes)
+  check_number(target, allow_null = TRUE)
+  check_count(max_steps, allow_null = TRUE)
+  check_seed(seed)
+  check_flag(progress)
+  call <- rlang::current_env()
+  keep_random_state(policy_resample(check_policy(policy), call = call))
+  given <- if (!is.character(env)) env
+  with_environment(env, client, function(env) {
+    settings <- list(
+      policy = policy, rounds = as.integer(rounds), episodes = episodes,
+      target = target %||% env$spec$reward_threshold, max_steps = max_steps, seed = seed,
+      env = given, env_id = environment_label(env), client = env$client
+    )
+    bound <- policy_bind(policy, env, call = call)
+    with_random_seed(seed, play_rounds(env, bound, settings, progress, call))
+  })
+}
+
+#' Play rounds until one reaches the target
+#'
+#' An interrupt ends them early, an error does too and carries what was played.
+#' @return A search, as [new_search()] makes it.
+#' @noRd
+play_rounds <- function(env, template, settings, progress, call) {
+  started <- proc.time()[["elapsed"]]
+  show <- if (progress) progress_bar(settings$rounds) else function(best) NULL
+  played <- list()
+  best <- -Inf
+  interrupted <- FALSE
+  tryCatch(
+    while (length(played) < settings$rounds) {
+      round <- play_round(env, template, settings)
+      played[[length(played) + 1L]] <- round
+      best <- max(best, round$mean_return, na.rm = TRUE)
+      show(best)
+      if (reaches(round$mean_return, settings$target)) break
+    },
+    interrupt = function(cnd) {
+      interrupted <<- TRUE
+      inform_interrupted(length(played), settings$rounds)
+    },
+    error = function(cnd) {
+      abort_search(cnd, new_search(played, settings, started), call)
+    }
+  )
+  new_search(played, settings, started, interrupted)
+}
+
+play_round <- function(env, template, settings) {
+  policy <- policy_resample(template)
+  played <- play_episodes(env, policy, settings$episodes, settings$max_steps)
+  returns <- vapply(played, function(episode) episode$total, numeric(1))
+  list(policy = policy, played = played, mean_return = mean(returns))
+}
+
+progress_bar <- function(rounds, frame = parent.frame()) {
+  bar <- cli::cli_progress_bar(
+    total = rounds,
+    format = paste(
+      "Round {cli::pb_current} of {cli::pb_total} {cli::pb_bar}",
+      "best mean return {cli::pb_extra$best}, {cli::pb_eta_str}"
+    ),
+    extra = list(best = "-"),
+    .envir = frame
+  )
+  function(best) {
+    cli::cli_progress_update(id = bar, extra = list(best = number_text(best)), .envir = frame)
+  }
+}
+
+inform_interrupted <- function(finished, rounds) {
+  cli::cli_inform(
+    c("!" = "The search was interrupted after {finished} of {rounds} round{?s};
+             it returns what it has so far."),
+    class = "gym_message_interrupted"
+  )
+}
+
+# Of the error in the middle it keeps classes and fields, so that whoever waits for
+# a lost connection need not know that it was lost in a search.
+abort_search <- function(cnd, result, call) {
+  own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
+           "use_cli_format")
+  fields <- unclass(cnd)[setdiff(names(cnd), own)]
+  rlang::exec(
+    gym_abort,
+    c(
+      paste0("The search ended early, after ", count_of(nrow(result$rounds), "round"), "."),
+      i = "What was played is the element `result` of this condition."
+    ),
+    class = c("gym_error_search", grep("^gym_error_", class(cnd), value = TRUE)),
+    result = result,
+    !!!fields,
+    parent = cnd,
+    call = call
+  )
+}

@@ -1,0 +1,264 @@
+# What every search returns, whatever its method: class gym_search.
+
+#' Make a result of a search
+#'
+#' @param rounds The rounds in the order of playing, each a list: `policy`, `played`
+#'   (episodes as [play_episodes()] returns them) and `mean_return`.
+#' @noRd
+new_search <- function(rounds, settings, started, interrupted = FALSE) {
+  table <- rounds_table(rounds)
+  best <- which.max(table$mean_return)
+  found <- length(best) == 1L
+  structure(
+    list(
+      policy = if (found) rounds[[best]]$policy,
+      solved = found && reaches(table$mean_return[[best]], settings$target),
+      round = if (found) best else NA_integer_,
+      rounds = table,
+      episodes = search_episodes_table(rounds),
+      target = settings$target,
+      env_id = settings$env_id,
+      env = settings$env,
+      client = settings$client,
+      template = settings$policy,
+      max_rounds = settings$rounds,
+      max_steps = settings$max_steps,
+      seed = settings$seed,
+      elapsed = proc.time()[["elapsed"]] - started,
+      interrupted = interrupted
+    ),
+    class = "gym_search"
+  )
+}
+
+reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
+
+rounds_table <- function(rounds) {
+  steps <- function(round) sum(vapply(round$played, function(episode) episode$length, 1L))
+  data.frame(
+    round = seq_along(rounds),
+    mean_return = vapply(rounds, function(round) round$mean_return, numeric(1)),
+    steps = vapply(rounds, steps, integer(1))
+  )
+}
+
+search_episodes_table <- function(rounds) {
+  sizes <- vapply(rounds, function(round) length(round$played), integer(1))
+  episodes <- episodes_table(do.call(c, lapply(rounds, function(round) round$played)))
+  episodes$episode <- sequence(sizes)
+  data.frame(round = rep(seq_along(rounds), sizes), episodes)
+}
+
+#' Use what a search has found
+#'
+#' A search returns an object of class `gym_search`, which R's usual functions know:
+#' `print()` says in a few lines what came of it, `as.data.frame()` gives its episodes,
+#' `predict()` what the policy that was found does, and `summary()` plays that policy in
+#' fresh episodes to tell how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
+#' never touch R's generator.
+#'
+#' The best of many rounds of a few episodes has also been lucky, so its mean return in the
+#' search says too much. `summary()` therefore plays it again. Gym's own definition of solved
+#' is a mean return of at least the environment's threshold over 100 consecutive episodes.
+#'
+#' @param x,object A search, as [search_random()] returns it.
+#' @param row.names,optional,... Not used.
+#' @param newdata Observations: a numeric vector for a single one, a matrix with one in each
+#'   row, or a data frame, such as the steps of a [rollout()], with a column for each number
+#'   of an observation under its name there.
+#' @param type `"action"`, the default, for the policy's actions, or `"output"` for the
+#'   outputs of the network that they follow from.
+#' @param episodes How many fresh episodes to play, a whole number of at least 1; the
+#'   default is 100.
+#' @param seed A whole number that fixes the fresh episodes and leaves the session's
+#'   generator as it was, or `NULL`, the default, to draw from the session's generator.
+#' @return `as.data.frame()`: a data frame with one row for each episode of the search, in
+#'   the order in which they were played: `round`, `episode`, `seed` (integers), `return`
+#'   (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
+#'
+#'   `predict()`: for `n` observations the actions, an integer vector of length `n` (a
+#'   matrix with `n` rows where an action has several numbers), or the outputs, a numeric
+#'   vector of length `n` (a matrix with `n` rows where the network has several).
+#'
+#'   `summary()`: an object of class `summary.gym_search`, a list with the elements `search`
+#'   (the search), `rounds`, `episodes`, `steps` (how many the search used, integers),
+#'   `fresh` (the [rollout()] of the policy found), `mean` and `se` (its mean return and the
+#'   standard error, doubles) and `solved` (logical: has the mean of the fresh episodes
+#'   reached the target?).
+#' @section Errors: `gym_error_argument` when the search has no policy because it was ended
+#'   in its first round, or `newdata` does not fit the policy. `summary()` needs the
+#'   environment: of one given to the search as an object, it has to be open still, and the
+#'   errors are those of [rollout()].
+#' @references The definition of solved: the text of CartPole-v0 in Gym ("average reward of
+#'   195.0 over 100 consecutive trials"), and `reward_threshold` in Gymnasium's registry.
+#' @name gym_search
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", rounds = 20, seed = 1)
+#' search
+#' head(as.data.frame(search))
+#' predict(search, c(0.01, -0.2, 0.03, 0.4))
+#' predict(search, c(0.01, -0.2, 0.03, 0.4), type = "output")
+#' summary(search, episodes = 10, seed = 1)
+NULL
+
+#' @rdname gym_search
+#' @export
+as.data.frame.gym_search <- function(x, row.names = NULL, optional = FALSE, ...) {
+  x$episodes
+}
+
+#' @export
+print.gym_search <- function(x, ...) {
+  cat(search_lines(x), sep = "\n")
+  invisible(x)
+}
+
+search_lines <- function(x) {
+  c(
+    paste("Random search in", x$env_id),
+    paste0("Policy: ", policy_text(x$template)),
+    "",
+    outcome_line(x),
+    effort_line(x)
+  )
+}
+
+outcome_line <- function(x) {
+  if (is.null(x$policy)) {
+    return("Ended before the first round was played to its end")
+  }
+  mean <- number_text(x$rounds$mean_return[[x$round]])
+  target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
+  if (x$solved) {
+    paste0("Solved in round ", x$round, " of at most ", x$max_rounds, ": mean return ", mean,
+           target)
+  } else {
+    paste0(if (!is.null(x$target)) "Not solved. ", "Best of ", count_of(nrow(x$rounds), "round"),
+           ": round ", x$round, ", mean return ", mean, target)
+  }
+}
+
+effort_line <- function(x) {
+  paste0(
+    if (x$interrupted) "Interrupted after " else "Played ",
+    count_of(nrow(x$rounds), "round"), ", ", count_of(nrow(x$episodes), "episode"), ", ",
+    count_of(sum(x$rounds$steps), "step"), " in ", seconds_text(x$elapsed)
+  )
+}
+
+seconds_text <- function(seconds) {
+  if (seconds < 120) {
+    paste(format(round(seconds, 1L), nsmall = 1L), "s")
+  } else {
+    paste(round(seconds / 60), "min")
+  }
+}
+
+# Predicting -------------------------------------------------------------------
+
+#' @rdname gym_search
+#' @export
+predict.gym_search <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  check_found(object)
+  predict_policy(object$policy, newdata, type, object$env_id)
+}
+
+#' @rdname rollout
+#' @param object What `rollout()` returned.
+#' @param newdata,type,... As for [predict()][predict.gym_search()] of a search.
+#' @export
+predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  predict_policy(object$policy, newdata, type, object$env_id)
+}
+
+predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
+  if (!inherits(policy, "gym_policy_network")) {
+    gym_abort(
+      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
+      class = "gym_error_argument", argument = "object", value = policy, call = call
+    )
+  }
+  observation <- observations_from(newdata, policy, env_id, call)
+  if (type == "action") {
+    return(act(policy, observation))
+  }
+  values <- observation_lanes(observation, policy$observation_space)$values
+  outputs <- network_outputs(policy, values, call)
+  if (ncol(outputs) == 1L) outputs[, 1L] else outputs
+}
+
+# Of a data frame, the columns with an observation's names; where it has none of
+# those it must consist of the observation alone.
+observations_from <- function(newdata, policy, env_id, call) {
+  if (!is.data.frame(newdata)) {
+    return(newdata)
+  }
+  discrete <- inherits(policy$observation_space, "gym_space_discrete")
+  names <- observation_names(env_id, if (discrete) 1L else policy$sizes[[1L]])
+  if (any(names %in% names(newdata))) {
+    absent <- setdiff(names, names(newdata))
+    if (length(absent)) {
+      gym_abort(
+        paste0("`newdata` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
+        class = "gym_error_argument", argument = "newdata", value = newdata, call = call
+      )
+    }
+    newdata <- newdata[names]
+  }
+  if (discrete) newdata[[1L]] else unname(as.matrix(newdata))
+}
+
+check_found <- function(object, call = rlang::caller_env()) {
+  if (is.null(object$policy)) {
+    gym_abort(
+      "The search has no policy: it ended before the first round was played to its end.",
+      class = "gym_error_argument", argument = "object", value = object, call = call
+    )
+  }
+}
+
+# Summarising --------------------------------------------------------------------
+
+#' @rdname gym_search
+#' @export
+summary.gym_search <- function(object, episodes = 100, seed = NULL, ...) {
+  check_found(object)
+  check_count(episodes)
+  check_seed(seed)
+  fresh <- rollout(
+    object$env %||% object$env_id, object$policy, episodes = episodes,
+    max_steps = object$max_steps, seed = seed, client = object$client
+  )
+  returns <- fresh$episodes$return
+  structure(
+    list(
+      search = object,
+      rounds = nrow(object$rounds),
+      episodes = nrow(object$episodes),
+      steps = sum(object$rounds$steps),
+      fresh = fresh,
+      mean = mean(returns),
+      se = standard_error(returns),
+      solved = reaches(mean(returns), object$target)
+    ),
+    class = "summary.gym_search"
+  )
+}
+
+#' @export
+print.summary.gym_search <- function(x, ...) {
+  cat(search_lines(x$search), sep = "\n")
+  fresh <- nrow(x$fresh$episodes)
+  verdict <- if (!is.null(x$search$target)) {
+    paste0(", target ", number_text(x$search$target), if (x$solved) " reached" else " not reached")
+  }
+  cat(
+    "",
+    paste0("The policy found, in ", count_of(fresh, "fresh episode"), ":"),
+    paste0("mean return ", number_text(x$mean), se_text(x$se), verdict),
+    sep = "\n"
+  )
+  invisible(x)
+}

@@ -1,0 +1,69 @@
+test_that("a message names the argument and the value", {
+  f <- function(rounds) check_count(rounds)
+  expect_error(f(0), "`rounds` must be a whole number of at least 1, not 0.", fixed = TRUE,
+               class = "gym_error_argument")
+  cnd <- tryCatch(f(2.5), gym_error = identity)
+  expect_identical(cnd$argument, "rounds")
+  expect_identical(cnd$value, 2.5)
+  expect_identical(conditionCall(cnd)[[1]], quote(f))
+})
+
+test_that("a count is one whole number, whatever its type", {
+  expect_identical(check_count(3), 3)
+  expect_identical(check_count(3L), 3L)
+  expect_identical(check_count(0, min = 0), 0)
+  for (bad in list(0, -1, 1.5, NA, NA_real_, NaN, Inf, "3", TRUE, NULL, 1:2, list(1), 1e10)) {
+    expect_error(check_count(bad), class = "gym_error_argument")
+  }
+})
+
+test_that("NULL is a count only where it is allowed", {
+  expect_null(check_count(NULL, allow_null = TRUE))
+  expect_error(check_count("a", allow_null = TRUE), "of at least 1 or NULL, not \"a\"",
+               class = "gym_error_argument")
+})
+
+test_that("a seed may be negative or zero but not a fraction", {
+  expect_identical(check_seed(0), 0)
+  expect_identical(check_seed(-5L), -5L)
+  expect_null(check_seed(NULL))
+  seed <- 0.5
+  expect_error(check_seed(seed), "`seed` must be a whole number or NULL, not 0.5.", fixed = TRUE)
+  for (bad in list(NA, "1", 1:2, 2^31)) {
+    expect_error(check_seed(bad), class = "gym_error_argument")
+  }
+})
+
+test_that("a number may be infinite but not missing, and has its bounds named", {
+  expect_identical(check_number(Inf), Inf)
+  x <- -1
+  expect_error(check_number(x, min = 0, max = 1), "a number from 0 to 1, not -1.", fixed = TRUE)
+  for (bad in list(NA, NaN, "1", c(1, 2), TRUE, matrix(1))) {
+    expect_error(check_number(bad), class = "gym_error_argument")
+  }
+})
+
+test_that("flags, strings and choices take nothing else", {
+  expect_true(check_flag(TRUE))
+  expect_identical(check_string("a"), "a")
+  expect_null(check_string(NULL, allow_null = TRUE))
+  expect_identical(check_choice("a", c("a", "b")), "a")
+  for (bad in list(NA, 1, "TRUE", NULL, c(TRUE, FALSE))) {
+    expect_error(check_flag(bad), class = "gym_error_argument")
+  }
+  for (bad in list(NA_character_, "", 1, NULL, c("a", "b"))) {
+    expect_error(check_string(bad), class = "gym_error_argument")
+  }
+  type <- "c"
+  expect_error(check_choice(type, c("a", "b")), "`type` must be one of \"a\", \"b\", not \"c\".",
+               fixed = TRUE)
+})
+
+test_that("what is long or odd is described, not printed", {
+  x <- rnorm
+  expect_error(check_count(x), "not a function.", fixed = TRUE)
+  x <- 1:100
+  expect_error(check_count(x), "not an integer vector of length 100.", fixed = TRUE)
+  x <- data.frame(a = 1)
+  expect_error(check_count(x), "not an object of class data.frame", fixed = TRUE)
+})

@@ -1,0 +1,228 @@
+test_that("the network of the post has 10 weights between -1 and 1, drawn as there", {
+  set.seed(3)
+  policy <- policy_network()
+  set.seed(3)
+  hidden <- matrix(runif(4 * 2, min = -1, max = 1), ncol = 4, nrow = 2)
+  output <- runif(2, min = -1, max = 1)
+  expect_identical(policy$weights, list(hidden, matrix(output, nrow = 1)))
+  set.seed(1)
+  weights <- unlist(policy_network(c(100, 100, 1))$weights)
+  expect_gt(ks.test(weights, "punif", -1, 1)$p.value, 0.001)
+})
+
+test_that("it computes what the post's script computes, each output weight once", {
+  set.seed(1)
+  policy <- policy_network()
+  observations <- matrix(rnorm(400), ncol = 4)
+  by_the_post <- apply(observations, 1, function(input) {
+    neurons <- numeric(2)
+    for (h in 1:2) neurons[h] <- tanh(sum(input * policy$weights[[1]][h, ]))
+    round(1 / (1 + exp(-sum(neurons * policy$weights[[2]][1, ]))))
+  })
+  expect_identical(act(policy, observations), as.integer(by_the_post))
+  expect_setequal(by_the_post, 0:1)
+})
+
+test_that("an output of exactly one half gives 0, as round() does", {
+  expect_identical(act(policy_network(), c(0, 0, 0, 0)), 0L)
+})
+
+test_that("many observations give the same actions as one after the other", {
+  set.seed(1)
+  observations <- matrix(rnorm(40), ncol = 4)
+  for (sizes in list(c(4, 1), c(4, 2, 1), c(4, 8, 8, 3))) {
+    policy <- policy_network(sizes)
+    expect_identical(
+      act(policy, observations), apply(observations, 1, function(row) act(policy, row))
+    )
+  }
+})
+
+test_that("every activation is that of the package sigmoid", {
+  skip_if_not_installed("sigmoid")
+  x <- matrix(c(-30, -2, -0.5, 0, 0.5, 2, 30, 1e-8), nrow = 2)
+  for (method in eval(formals(sigmoid::sigmoid)$method)) {
+    policy <- policy_network(c(1, 1), c("tanh", method), weights = list(matrix(1)))
+    expect_equal(
+      network_outputs(policy, cbind(as.vector(x)))[, 1], as.vector(sigmoid::sigmoid(x, method)),
+      tolerance = 1e-15, info = method
+    )
+  }
+})
+
+test_that("activations of sigmoid are accepted by name and used", {
+  skip_if_not_installed("sigmoid")
+  policy <- policy_network(c(2, 2), c("tanh", "ReLU"), weights = list(diag(c(-1, 1))))
+  expect_identical(network_outputs(policy, rbind(c(3, 4))), rbind(c(0, 4)))
+  expect_identical(act(policy, c(3, 4)), 1L)
+})
+
+test_that("without sigmoid its activations are refused with what to do", {
+  skip_if(requireNamespace("sigmoid", quietly = TRUE), "sigmoid is installed")
+  expect_error(policy_network(activation = c("ReLU", "logistic")), "install.packages",
+               class = "gym_error_argument")
+})
+
+test_that("activations are one of hidden layers and one of outputs, or one for each layer", {
+  expect_identical(policy_network(c(4, 3, 3, 1))$activation, c("tanh", "tanh", "logistic"))
+  expect_identical(policy_network(c(4, 1))$activation, "logistic")
+  expect_identical(policy_network(c(4, 1), "tanh")$activation, "tanh")
+  each <- c("logistic", "tanh", "tanh")
+  expect_identical(policy_network(c(4, 3, 3, 1), each)$activation, each)
+  expect_error(policy_network(activation = "tanh"), "not 1", class = "gym_error_argument")
+  expect_error(policy_network(activation = c("tanh", "softmax")), "`activation[2]` must be one of",
+               fixed = TRUE, class = "gym_error_argument")
+  expect_error(policy_network(activation = NULL), class = "gym_error_argument")
+})
+
+test_that("sizes are two or more whole numbers", {
+  for (bad in list(4, c(4, 0), c(4, 2.5, 1), c(4, NA), "4-2-1", NULL)) {
+    expect_error(policy_network(bad), "sizes", class = "gym_error_argument")
+  }
+})
+
+test_that("given weights must fit the sizes", {
+  weights <- list(matrix(1, 2, 4), matrix(1, 1, 2))
+  expect_identical(policy_network(weights = weights)$weights, weights)
+  expect_error(policy_network(weights = list(matrix(1, 4, 2), matrix(1, 1, 2))),
+               "`weights[[1]]` must be a matrix of 2 x 4 for these sizes, not of 4 x 2.",
+               fixed = TRUE, class = "gym_error_argument")
+  for (bad in list(weights[1], 1:10, list(1, 2), list(matrix(NA_real_, 2, 4), weights[[2]]))) {
+    expect_error(policy_network(weights = bad), class = "gym_error_argument")
+  }
+})
+
+test_that("given weights leave R's generator alone", {
+  set.seed(1)
+  state <- .Random.seed
+  policy_network(c(1, 1), weights = list(matrix(1)))
+  expect_identical(.Random.seed, state)
+})
+
+test_that("several outputs take the largest, of equal ones the first, without drawing", {
+  policy <- policy_network(c(2, 3), weights = list(rbind(c(1, 0), c(0, 1), c(0, 1))))
+  set.seed(1)
+  state <- .Random.seed
+  expect_identical(act(policy, rbind(c(1, 0), c(0, 1))), c(0L, 1L))
+  expect_identical(.Random.seed, state)
+})
+
+test_that("discrete actions that do not begin at 0 are shifted", {
+  env <- fake_environment(
+    observation_space = box_space(-1, 1), action_space = discrete_space(3L, start = -1L)
+  )
+  policy <- policy_network(c(1, 3), weights = list(cbind(c(-1, 0, 1))))
+  bound <- policy_bind(policy, env)
+  expect_identical(act(bound, cbind(c(-1, 1))), c(-1L, 1L))
+  two <- fake_environment(
+    observation_space = box_space(-1, 1), action_space = discrete_space(2L, start = 5L)
+  )
+  bound <- policy_bind(policy_network(c(1, 1), weights = list(matrix(1))), two)
+  expect_identical(act(bound, cbind(c(-1, 1))), c(5L, 6L))
+})
+
+test_that("a single output of any bounded activation is rounded at the middle of its range", {
+  policy <- policy_network(c(1, 1), c("tanh", "tanh"), weights = list(matrix(1)))
+  expect_identical(act(policy, cbind(c(-2, -0.1, 0, 0.1, 2))), c(0L, 0L, 0L, 1L, 1L))
+})
+
+test_that("a Box action is scaled to its bounds", {
+  env <- fake_environment(
+    observation_space = box_space(-1, 1), action_space = box_space(c(-2, 0), c(2, 10))
+  )
+  for (activation in c("logistic", "tanh")) {
+    policy <- policy_network(c(1, 2), c("tanh", activation), weights = list(cbind(c(1, 1))))
+    policy <- policy_bind(policy, env)
+    expect_equal(act(policy, -1000), c(-2, 0))
+    expect_equal(act(policy, 0), c(0, 5))
+    expect_equal(act(policy, 1000), c(2, 10))
+    expect_equal(act(policy, cbind(c(-1000, 0, 1000))), cbind(c(-2, 0, 2), c(0, 5, 10)))
+  }
+})
+
+test_that("the scale stays within bounds as wide as numbers go", {
+  huge <- 1.7e308
+  env <- fake_environment(
+    observation_space = box_space(-1, 1), action_space = box_space(-huge, huge, dtype = "float64")
+  )
+  policy <- policy_bind(policy_network(c(1, 1), weights = list(matrix(1))), env)
+  expect_identical(act(policy, 1000), huge)
+  expect_identical(act(policy, -1000), -huge)
+})
+
+test_that("a Box of whole numbers gets whole numbers, one of arrays arrays", {
+  env <- fake_environment(
+    observation_space = box_space(-1, 1),
+    action_space = box_space(rep(0, 6), 1:6 * 10, shape = c(2L, 3L), dtype = "int32")
+  )
+  policy <- policy_network(c(1, 6), weights = list(matrix(1, 6, 1)))
+  policy <- policy_bind(policy, env)
+  expect_identical(act(policy, 1000), rbind(c(10, 20, 30), c(40, 50, 60)))
+  many <- act(policy, cbind(c(1000, 0)))
+  expect_identical(dim(many), c(2L, 2L, 3L))
+  expect_identical(many[1, , ], rbind(c(10, 20, 30), c(40, 50, 60)))
+  expect_identical(act(policy, 0.01), round(act(policy, 0.01)))
+})
+
+test_that("a discrete observation is one input for each of its values", {
+  env <- fake_environment(observation_space = discrete_space(3L, start = 1L))
+  policy <- policy_network(c(3, 1), weights = list(rbind(c(1, -1, 1))))
+  policy <- policy_bind(policy, env)
+  expect_identical(act(policy, 1:3), c(1L, 0L, 1L))
+  expect_identical(act(policy, 2L), 0L)
+})
+
+test_that("sizes that do not fit the environment are refused with both numbers", {
+  env <- fake_environment(id = "CartPole-v1")
+  expect_error(policy_bind(policy_network(c(3, 2, 1)), env),
+               "The network takes 3 inputs, but CartPole-v1 gives 4 observations.",
+               fixed = TRUE, class = "gym_error_argument")
+  expect_error(policy_bind(policy_network(c(3, 2, 1)), env), "sizes = c(4, 2, 1)", fixed = TRUE)
+  expect_error(policy_bind(policy_network(c(4, 2, 3)), env),
+               "The network gives 3 outputs, but CartPole-v1 has 2 actions.",
+               fixed = TRUE, class = "gym_error_argument")
+  three <- fake_environment(action_space = discrete_space(3L))
+  expect_error(policy_bind(policy_network(c(4, 2, 1)), three), "gives 1 output, but Fake-v0 has 3")
+  pendulum <- fake_environment(action_space = box_space(-2, 2))
+  expect_error(policy_bind(policy_network(c(4, 2)), pendulum),
+               "The network gives 2 outputs, but Fake-v0 takes an action of 1 number.",
+               fixed = TRUE)
+  expect_identical(policy_bind(policy_network(c(4, 2)), env)$action_space, env$action_space)
+})
+
+test_that("a Box with a side without a bound is refused", {
+  env <- fake_environment(action_space = box_space(-1, 1e100))
+  expect_error(policy_bind(policy_network(), env), "side without a bound",
+               class = "gym_error_argument")
+})
+
+test_that("an output that has no range cannot be rounded or scaled", {
+  skip_if_not_installed("sigmoid")
+  policy <- policy_network(activation = c("tanh", "ReLU"))
+  expect_error(act(policy, 1:4), "no upper end", class = "gym_error_argument")
+  expect_error(policy_bind(policy, fake_environment()), "no upper end",
+               class = "gym_error_argument")
+})
+
+test_that("an observation of the wrong length or type is refused with both numbers", {
+  expect_error(act(policy_network(), 1:3),
+               "The network takes 4 inputs, but the observation has 3 numbers.", fixed = TRUE,
+               class = "gym_error_argument")
+  expect_error(act(policy_network(), letters[1:4]), "is of type character",
+               class = "gym_error_argument")
+})
+
+test_that("another draw changes the weights and nothing else", {
+  set.seed(1)
+  policy <- policy_bind(policy_network(), fake_environment())
+  other <- policy_resample(policy)
+  expect_false(identical(other$weights, policy$weights))
+  policy$weights <- other$weights
+  expect_identical(other, policy)
+})
+
+test_that("a network prints in one line", {
+  expect_output(
+    print(policy_network()), "<policy: network 4-2-1, tanh, logistic, 10 weights>", fixed = TRUE
+  )
+})

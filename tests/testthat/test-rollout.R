@@ -1,0 +1,220 @@
+by_seed <- function(seed, step, action) seed %% 10 + step
+
+test_that("the return sums the rewards of every step, the length counts them", {
+  env <- fake_environment(reward = by_seed, ends = function(seed, step, action) step == 4L)
+  played <- rollout(env, policy_random(), episodes = 6, seed = 1)
+  expect_identical(played$episodes$length, rep(4L, 6))
+  expect_identical(played$episodes$return, 4 * (played$episodes$seed %% 10) + 10)
+})
+
+test_that("the table of episodes has the promised columns and types", {
+  played <- rollout(fake_environment(), policy_random(), episodes = 2, seed = 1)
+  expect_s3_class(played, "gym_rollout")
+  expect_identical(
+    vapply(played$episodes, typeof, ""),
+    c(episode = "integer", seed = "integer", return = "double", length = "integer",
+      terminated = "logical", truncated = "logical")
+  )
+  expect_identical(played$episodes$episode, 1:2)
+  expect_identical(as.data.frame(played), played$episodes)
+  expect_null(played$steps)
+})
+
+test_that("each episode is reset with its own seed", {
+  env <- fake_environment()
+  played <- rollout(env, policy_random(), episodes = 5, seed = 1)
+  expect_identical(env$seeds, played$episodes$seed)
+  expect_length(unique(env$seeds), 5)
+})
+
+test_that("set.seed() alone fixes seeds and sampled actions", {
+  play <- function() {
+    env <- fake_environment()
+    played <- rollout(env, policy_random(), episodes = 5)
+    list(played$episodes, env$actions)
+  }
+  set.seed(1)
+  first <- play()
+  second <- play()
+  set.seed(1)
+  expect_identical(play(), first)
+  expect_false(identical(first, second))
+})
+
+test_that("seed = gives what set.seed() gives and leaves the session's generator as it was", {
+  set.seed(1)
+  beforehand <- rollout(fake_environment(), policy_network(), episodes = 3)
+  set.seed(99)
+  state <- .Random.seed
+  within <- rollout(fake_environment(), policy_network(), episodes = 3, seed = 1)
+  expect_identical(.Random.seed, state)
+  expect_identical(within$episodes, beforehand$episodes)
+  expect_identical(within$policy, beforehand$policy)
+})
+
+test_that("max_steps cuts an episode short, which counts as truncated", {
+  env <- fake_environment(ends = function(seed, step, action) step == 4L)
+  cut <- rollout(env, policy_random(), episodes = 2, max_steps = 3, steps = TRUE)
+  expect_identical(cut$episodes$length, c(3L, 3L))
+  expect_identical(cut$episodes$truncated, c(TRUE, TRUE))
+  expect_identical(cut$episodes$terminated, c(FALSE, FALSE))
+  expect_identical(cut$steps$truncated, rep(c(FALSE, FALSE, TRUE), 2))
+  whole <- rollout(env, policy_random(), max_steps = 4)
+  expect_true(whole$episodes$terminated)
+  expect_false(whole$episodes$truncated)
+})
+
+test_that("a row of the steps has the observation that its action was taken on", {
+  env <- fake_environment(id = "CartPole-v1", reward = by_seed)
+  seen <- list()
+  follow <- function(observation) {
+    seen[[length(seen) + 1L]] <<- observation
+    as.integer(observation[3] > 0)
+  }
+  played <- rollout(env, follow, episodes = 3, seed = 1, steps = TRUE)
+  steps <- as.data.frame(played)
+  names <- c("cart_position", "cart_velocity", "pole_angle", "pole_angular_velocity")
+  expect_identical(
+    names(steps), c("episode", "step", names, "action", "reward", "terminated", "truncated")
+  )
+  expect_identical(unname(as.matrix(steps[names])), do.call(rbind, seen))
+  expect_identical(steps$action, as.integer(steps$pole_angle > 0))
+  expect_identical(steps$episode, rep(1:3, each = 3))
+  expect_identical(steps$step, rep(1:3, 3))
+  expect_identical(steps$reward, rep(env$seeds %% 10, each = 3) + steps$step)
+  expect_identical(steps$terminated, steps$step == 3L)
+  expect_identical(tapply(steps$reward, steps$episode, sum)[[2]], played$episodes$return[[2]])
+})
+
+test_that("observations and actions of other shapes have a column for each number", {
+  env <- fake_environment(
+    observation_space = box_space(rep(-1, 6), rep(1, 6), shape = c(2L, 3L)),
+    action_space = box_space(c(-1, 9), c(1, 10))
+  )
+  seen <- NULL
+  keep_first <- function(observation) {
+    if (is.null(seen)) seen <<- observation
+    c(0.5, 9.5)
+  }
+  steps <- rollout(env, keep_first, seed = 1, steps = TRUE)$steps
+  expect_identical(names(steps)[3:10], c(paste0("obs_", 1:6), "action_1", "action_2"))
+  expect_identical(unlist(steps[1, 3:8], use.names = FALSE), as.vector(t(seen)))
+  expect_identical(steps$action_2, rep(9.5, 3))
+  one <- fake_environment(id = "FrozenLake-v1", observation_space = discrete_space(16L),
+                          action_space = box_space(-2, 2))
+  steps <- rollout(one, policy_random(), steps = TRUE)$steps
+  expect_identical(names(steps)[3:4], c("position", "action"))
+  expect_type(steps$position, "integer")
+})
+
+test_that("a network plays as it acts", {
+  env <- fake_environment()
+  set.seed(1)
+  policy <- policy_network()
+  steps <- rollout(env, policy, episodes = 20, steps = TRUE)$steps
+  expect_identical(steps$action, act(policy, as.matrix(steps[3:6])))
+})
+
+test_that("a given environment is left open", {
+  env <- fake_environment()
+  rollout(env, policy_random())
+  expect_identical(env$closed, 0L)
+})
+
+test_that("bad arguments are refused before anything is made, naming argument and value", {
+  bad <- function(..., message) {
+    expect_error(rollout(..., client = no_client()), message, fixed = TRUE,
+                 class = "gym_error_argument")
+  }
+  bad("Fake-v0", policy_random(), episodes = 0,
+      message = "`episodes` must be a whole number of at least 1, not 0.")
+  bad("Fake-v0", policy_random(), episodes = 1.5, message = "`episodes`")
+  bad("Fake-v0", policy_random(), max_steps = 0, message = "`max_steps`")
+  bad("Fake-v0", policy_random(), seed = 0.5,
+      message = "`seed` must be a whole number or NULL, not 0.5.")
+  bad("Fake-v0", policy_random(), steps = NA, message = "`steps`")
+  bad("Fake-v0", "random", message = "`policy`")
+  bad(3, policy_random(), message = "`env`")
+  bad(c("a", "b"), policy_random(), message = "`env`")
+  bad(list(), policy_random(), message = "`env`")
+})
+
+test_that("a network that does not fit plays no step", {
+  env <- fake_environment()
+  expect_error(rollout(env, policy_network(c(3, 1))), "3 inputs, but Fake-v0 gives 4 observations")
+  expect_length(env$seeds, 0)
+})
+
+test_that("an interrupt is an interrupt, and the generator is as it was", {
+  set.seed(1)
+  state <- .Random.seed
+  interrupted <- tryCatch(
+    rollout(fake_environment(), function(observation) rlang::interrupt(), seed = 2),
+    interrupt = function(cnd) "interrupted"
+  )
+  expect_identical(interrupted, "interrupted")
+  expect_identical(.Random.seed, state)
+})
+
+test_that("a rollout prints and sums up its returns", {
+  env <- fake_environment(reward = by_seed)
+  played <- rollout(env, policy_random(), episodes = 40, seed = 1)
+  returns <- played$episodes$return
+  expect_output(print(played), "Rollout in Fake-v0: 40 episodes, 120 steps", fixed = TRUE)
+  expect_lt(length(capture.output(print(played))), 10)
+  summary <- summary(played)
+  expect_identical(summary$mean, mean(returns))
+  expect_equal(summary$se, sd(returns) / sqrt(40))
+  expect_equal(summary$returns[["Median"]], median(returns))
+  expect_identical(c(summary$episodes, summary$steps), c(40L, 120L))
+  expect_output(print(summary), "standard error")
+  one <- rollout(env, policy_random())
+  expect_output(print(one), "1 episode, 3 steps", fixed = TRUE)
+  expect_output(print(one), paste0("Return: ", one$episodes$return, "$"))
+  expect_identical(summary(one)$se, NA_real_)
+})
+
+test_that("CartPole: the same seed plays the same episodes, another does not", {
+  client <- test_client()
+  play <- function(seed) {
+    as.data.frame(rollout("CartPole-v1", policy_random(), 5, seed = seed, steps = TRUE,
+                          client = client))
+  }
+  first <- play(1)
+  expect_identical(play(1), first)
+  expect_false(identical(play(2), first))
+  expect_true(all(abs(first$pole_angle) < 0.4189))
+})
+
+test_that("CartPole: an episode can be begun again by its seed", {
+  env <- local_env("CartPole-v1")
+  played <- rollout(env, policy_random(), 3, seed = 1, steps = TRUE)
+  first <- played$steps[played$steps$episode == 2 & played$steps$step == 1, 3:6]
+  expect_identical(env$reset(seed = played$episodes$seed[2]), unlist(first, use.names = FALSE))
+})
+
+test_that("an environment that was made is closed, a given one is not, also after an error", {
+  client <- local_server()
+  open <- function() names(env_list_all(client))
+  rollout("CartPole-v1", policy_random(), client = client)
+  expect_length(open(), 0)
+  lost <- function(observation) stop("no idea")
+  expect_error(rollout("CartPole-v1", lost, client = client), "no idea")
+  expect_length(open(), 0)
+  expect_error(rollout("CartPole-v1", policy_network(c(3, 1)), client = client),
+               class = "gym_error_argument")
+  expect_length(open(), 0)
+  env <- gym_make("CartPole-v1", client = client)
+  rollout(env, policy_random())
+  expect_identical(open(), env$instance_id)
+})
+
+test_that("CartPole: 200 pushes at most in v0, and a policy's mistake is the environment's error", {
+  client <- test_client()
+  follow_pole <- function(observation) as.integer(observation[3] + observation[4] > 0)
+  played <- rollout("CartPole-v0", follow_pole, 10, seed = 1, client = client)
+  expect_identical(max(played$episodes$length), 200L)
+  expect_identical(played$episodes$truncated, played$episodes$length == 200L)
+  expect_error(rollout("CartPole-v0", function(observation) 2, client = client),
+               class = "gym_error_space")
+})
