@@ -1,0 +1,47 @@
+# make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
+
+.PHONY: help demo test check lint document clean
+.NOTPARALLEL:
+
+# R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
+ifeq ($(LC_ALL)$(LC_CTYPE)$(LANG),)
+ifeq ($(shell uname -s),Linux)
+export LANG = C.UTF-8
+endif
+endif
+
+help:
+	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
+	@echo 'make test      every test: of the server (pytest) and of the R package (testthat)'
+	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
+	@echo 'make lint      lintr for R, ruff for Python'
+	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
+	@echo 'make clean     remove everything that these made'
+	@echo
+	@echo 'Each first installs what it lacks: R and Python themselves by apt on Debian and Ubuntu,'
+	@echo 'all the rest into .venv/ and .r-library/. GYM_PYTHON=... names another Python.'
+
+demo:
+	@tools/setup demo
+	@tools/in-env Rscript --no-init-file tools/demo.R
+
+test:
+	@tools/setup test
+	@tools/in-env tools/test
+
+check:
+	@tools/setup check
+	@tools/in-env Rscript --no-init-file tools/check.R
+
+lint:
+	@tools/setup lint
+	@tools/in-env tools/lint
+
+document:
+	@tools/setup document
+	@tools/in-env Rscript --no-init-file -e 'roxygen2::roxygenise()'
+
+clean:
+	rm -rf .venv .r-library .cran-library pictures gym.Rcheck gym_*.tar.gz
+	find inst -name __pycache__ -prune -exec rm -rf {} +
+	rm -rf inst/server/.pytest_cache inst/server/.ruff_cache

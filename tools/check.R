@@ -1,0 +1,52 @@
+# Builds the package and checks it, both in a temporary folder, and says what the check found.
+# Fails on errors and warnings, and on notes but those that say something of the machine.
+
+excusable <- c(
+  "unable to verify current time",
+  "Packages? suggested but not available for checking: *'sigmoid' *$"
+)
+
+# What R CMD build would copy before it drops it: the tools' own folders are left behind at once.
+copy_of_checkout <- function(into) {
+  left_behind <- c(".git", ".venv", ".r-library", ".cran-library", "pictures", "server")
+  files <- setdiff(list.files(all.files = TRUE, no.. = TRUE), left_behind)
+  dir.create(into)
+  stopifnot(file.copy(files, into, recursive = TRUE))
+}
+
+r_cmd <- function(...) {
+  system2(file.path(R.home("bin"), "R"), c("CMD", ...), stdout = "", stderr = "", stdin = "")
+}
+
+inexcusable <- function(log) {
+  found <- tools::check_packages_in_dir_details(logs = log, drop_ok = TRUE)
+  text <- gsub("[\u2018\u2019]", "'", gsub("\\s+", " ", found$Output))
+  excused <- grepl(paste(excusable, collapse = "|"), text) & found$Status == "NOTE"
+  found[!excused & found$Check != "*", ]
+}
+
+check_package <- function(folder) {
+  copy_of_checkout(file.path(folder, "gym"))
+  here <- setwd(folder)
+  on.exit(setwd(here))
+  if (r_cmd("build", "gym") != 0) stop("R CMD build failed", call. = FALSE)
+  tarball <- list.files(pattern = "^gym_.*[.]tar[.]gz$")
+  Sys.setenv("_R_CHECK_FORCE_SUGGESTS_" = "false")
+  status <- r_cmd("check", "--no-manual", tarball)
+  log <- file.path("gym.Rcheck", "00check.log")
+  bad <- inexcusable(log)
+  for (output in list.files("gym.Rcheck", "[.]fail$", recursive = TRUE, full.names = TRUE)) {
+    cat("\n", output, "\n", sep = "")
+    writeLines(utils::tail(readLines(output), 60))
+  }
+  if (nrow(bad) > 0) cat("\nTo mend:", paste(bad$Status, bad$Check), sep = "\n  ")
+  cat("\nR CMD check: ", sub("Status: ", "", utils::tail(readLines(log), 1)), "\n", sep = "")
+  status == 0 && nrow(bad) == 0
+}
+
+# Outside of tempdir(), which goes with this process, so that what a failed check wrote stays.
+folder <- tempfile("gym-check-", tmpdir = dirname(tempdir()))
+dir.create(folder)
+good <- check_package(folder)
+if (good) unlink(folder, recursive = TRUE) else cat("All of it is in ", folder, "\n", sep = "")
+quit(status = if (good) 0 else 1)

@@ -1,0 +1,61 @@
+# Runs tests/testthat against the installed package and closes with one line of counts.
+#   Rscript tools/run-tests.R [LIBRARY]
+# A test is one test_that() block: failed when anything in it failed, skipped when it was skipped
+# or holds no expectation. With LIBRARY, what that library holds must have been loaded from there.
+
+library(testthat)
+Sys.setenv(NOT_CRAN = "true")
+Sys.unsetenv("GYM_SERVER_URL")
+options(testthat.summary.max_reports = Inf)
+
+state_of <- function(test) {
+  has <- function(class) any(vapply(test$results, inherits, NA, class))
+  if (has("expectation_failure") || has("expectation_error")) {
+    "failed"
+  } else if (has("expectation_skip")) {
+    "skipped"
+  } else if (isTRUE(nzchar(test$test))) {
+    "passed"
+  } else {
+    "outside of any test"
+  }
+}
+
+loaded_from <- function() {
+  packages <- setdiff(loadedNamespaces(), "base")
+  vapply(packages, function(package) dirname(getNamespaceInfo(package, "path")), "")
+}
+
+versions_of <- function(packages) {
+  packages <- setdiff(packages, rownames(utils::installed.packages(priority = "base")))
+  versions <- vapply(packages, function(package) format(utils::packageVersion(package)), "")
+  toString(sort(paste(packages, versions)))
+}
+
+# What should have come from `library` and did not.
+not_loaded_from <- function(library) {
+  from <- loaded_from()
+  held <- intersect(names(from), list.files(library))
+  astray <- held[from[held] != normalizePath(library)]
+  union(astray, setdiff(c("gym", "httr", "curl", "testthat"), held))
+}
+
+run_tests <- function(library) {
+  results <- test_dir(
+    "tests/testthat",
+    package = "gym", load_package = "installed", reporter = "summary", stop_on_failure = FALSE
+  )
+  states <- vapply(results, state_of, "")
+  count <- function(state) sum(states == state)
+
+  cat("\n", R.version.string, "; ", versions_of(loadedNamespaces()), "\n", sep = "")
+  astray <- if (length(library) == 1) not_loaded_from(library)
+  if (length(astray) > 0) cat("Not loaded from ", library, ": ", toString(astray), "\n", sep = "")
+  cat(sprintf(
+    "R tests: %d passed, %d failed, %d skipped\n",
+    count("passed"), count("failed"), count("skipped")
+  ))
+  count("passed") > 0 && count("failed") == 0 && length(astray) == 0
+}
+
+quit(status = if (run_tests(commandArgs(trailingOnly = TRUE))) 0 else 1)

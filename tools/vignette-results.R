@@ -1,0 +1,72 @@
+# Computes what the vignette shows and keeps it in vignettes/results.rds, so that
+# the vignette builds without a server. Also the figures of 100 seeds.
+#
+#   tools/in-env Rscript tools/vignette-results.R
+#
+# Takes some minutes.
+
+library(gym)
+
+started <- proc.time()[["elapsed"]]
+follow_pole <- function(observation) as.integer(observation[3] > 0)
+
+results <- list()
+results$random <- rollout("CartPole-v0", policy_random(), episodes = 2000, seed = 2018)
+results$follow <- rollout("CartPole-v0", follow_pole, episodes = 200, seed = 2018)
+results$search <- search_random("CartPole-v0", seed = 2018)
+results$summary <- summary(results$search, seed = 1)
+results$episode <- rollout("CartPole-v0", results$search$policy, seed = 1, steps = TRUE)
+
+seeds <- 1:100
+searches <- lapply(seeds, function(seed) {
+  search <- search_random("CartPole-v0", seed = seed)
+  data.frame(
+    seed = seed, solved = search$solved, round = search$round,
+    rounds = nrow(search$rounds), episodes = nrow(search$episodes),
+    steps = sum(search$rounds$steps)
+  )
+})
+results$searches <- do.call(rbind, searches)
+
+env <- gym_make("CartPole-v0")
+invisible(env$reset(seed = results$episode$episodes$seed))
+actions <- as.data.frame(results$episode)$action
+for (action in utils::head(actions, 100)) env$step(action)
+results$frame <- env$render()
+env$close()
+
+console <- c(
+  "library(gym)", "env <- gym_make(\"CartPole-v0\", seed = 1)", "env", "env$reset()",
+  "str(env$step(1))", "env$close()"
+)
+results$console <- utils::capture.output(
+  source(exprs = parse(text = console), echo = TRUE, spaced = FALSE)
+)
+
+results$versions <- c(
+  gymnasium = get_request(gym_client(), "/v1/health/")$versions$gymnasium,
+  R = format(getRversion())
+)
+results$date <- format(Sys.Date())
+
+# A client belongs to the session that made it.
+strip <- function(search) {
+  search$client <- NULL
+  search
+}
+results$search <- strip(results$search)
+results$summary$search <- results$search
+
+saveRDS(results, "vignettes/results.rds", compress = "xz", version = 3)
+
+solved <- results$searches[results$searches$solved, ]
+cat(sprintf(
+  "%d of %d seeds solved within 50 rounds; mean round %.1f, median %.0f\n",
+  nrow(solved), length(seeds), mean(solved$round), stats::median(solved$round)
+))
+cat(sprintf(
+  "random policy: mean return %.2f, median %.1f over %d episodes\n",
+  mean(results$random$episodes$return), stats::median(results$random$episodes$return),
+  nrow(results$random$episodes)
+))
+cat(sprintf("%.0f seconds\n", proc.time()[["elapsed"]] - started))
