@@ -1,0 +1,17 @@
+# Solve CartPole: search for a network that balances the pole, look at what was
+# found, watch it play an episode.
+
+library(gym)
+
+set.seed(1)
+result <- search_random("CartPole-v0")
+result
+plot(result)
+
+# Is it as good as the batch of five episodes made it look?
+summary(result)
+
+# One episode of the policy found, step by step.
+d <- as.data.frame(rollout("CartPole-v0", result$policy, steps = TRUE))
+head(d)
+plot(d$step, d$pole_angle, type = "l", xlab = "step", ylab = "pole angle (rad)")
