@@ -47,7 +47,8 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config())
   }
   check_number(timeout, min = 0.001)
   if (!inherits(config, "request")) {
-    abort_argument(config, "made with httr, such as by httr::add_headers()", "config", rlang::current_env())
+    must <- "made with httr, such as by httr::add_headers()"
+    abort_argument(config, must, "config", rlang::current_env())
   }
   structure(
     list(

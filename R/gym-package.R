@@ -13,9 +13,13 @@
 #' |---|---|
 #' | `gym_error_argument` | an argument is not what the function takes; nothing was sent |
 #' | `gym_error_space` | an action or observation does not fit its space |
-#' | `gym_error_http` | the server refused; also has a class with the status, such as `gym_error_http_400`, and the fields `status`, `code`, `hint` |
+#' | `gym_error_http` | the server refused |
 #' | `gym_error_connection` | no answer: no server there, connection lost, time over |
 #' | `gym_error_server_start` | a server could not be started |
+#'
+#' A `gym_error_http` also has a class with the status, such as
+#' `gym_error_http_400`, and the fields `status` (a number), `code` (a word for
+#' programs, such as `"unknown_instance"`) and `hint` (a string or `NULL`).
 #'
 #' ```r
 #' tryCatch(

@@ -111,22 +111,23 @@ number_from_json <- function(x) {
   }
 }
 
-# Infos hold whatever an environment puts there: arrays of plain values become
-# vectors, arrays of equal rows matrices, the rest stays a list.
+# Infos hold whatever an environment puts there: arrays of plain values of one
+# kind become vectors, the rest stays a list.
 info_from_json <- function(x) {
-  if (!is.list(x)) {
-    if (is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")) {
-      return(number_from_json(x))
-    }
-    return(x)
+  if (is.list(x)) {
+    x <- lapply(x, info_from_json)
+    if (is_plain_array(x)) unlist(x) else x
+  } else if (is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")) {
+    number_from_json(x)
+  } else {
+    x
   }
-  if (length(x) == 0L) {
-    return(x)
+}
+
+is_plain_array <- function(x) {
+  if (length(x) == 0L || !is.null(names(x)) || !all(lengths(x) == 1L)) {
+    return(FALSE)
   }
-  x <- lapply(x, info_from_json)
-  if (!is.null(names(x)) || !all(lengths(x) == 1L) || any(vapply(x, is.list, NA))) {
-    return(x)
-  }
-  kinds <- unique(vapply(x, function(element) if (is.numeric(element)) "number" else typeof(element), ""))
-  if (length(kinds) == 1L) unlist(x) else x
+  kinds <- vapply(x, function(element) if (is.numeric(element)) "number" else typeof(element), "")
+  kinds[[1L]] != "list" && all(kinds == kinds[[1L]])
 }

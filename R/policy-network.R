@@ -163,9 +163,10 @@ layer_activations <- function(activation, sizes, call = rlang::caller_env()) {
   activation
 }
 
-check_sigmoid_installed <- function(activation, call) {
+check_sigmoid_installed <- function(activation, call,
+                                    installed = requireNamespace("sigmoid", quietly = TRUE)) {
   wanted <- intersect(activation, sigmoid_activations)
-  if (length(wanted) && !requireNamespace("sigmoid", quietly = TRUE)) {
+  if (length(wanted) && !installed) {
     gym_abort(
       c(
         paste0("The activation \"", wanted[[1L]], "\" comes from the package sigmoid, ",

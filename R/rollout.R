@@ -116,7 +116,7 @@ close_made <- function(env, finished) {
     gym_error = function(cnd) {
       if (finished) {
         rlang::warn(
-          c(paste0("The environment could not be closed."), x = conditionMessage(cnd)),
+          c("The environment could not be closed.", x = conditionMessage(cnd)),
           class = "gym_warning_close"
         )
       }

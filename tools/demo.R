@@ -29,10 +29,14 @@ for (attempt in 1:5) {
   seed <- sample.int(10000, 1)
   cat("search_random(seed = ", seed, ")\n\n", sep = "")
   result <- search_random(seed = seed)
-  print(summary(result))
+  print(result)
   cat("\n")
   if (result$solved) break
 }
+
+cat("100 fresh episodes with the network found (20,000 steps, some 20 s):\n\n")
+print(summary(result))
+cat("\n")
 
 pictures <- c(
   "the search" = draw("demo-search.png", result),

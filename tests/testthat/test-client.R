@@ -159,7 +159,7 @@ test_that("the end of a forked worker closes nothing of its parent's", {
   env <- local_env()
   env$reset()
   parallel::mclapply(1:2, function(i) {
-    rm(env)
+    env <<- NULL
     gc()
     i
   }, mc.cores = 2)

@@ -42,7 +42,9 @@ test_that("an array is nested row by row", {
 })
 
 test_that("infos become vectors where they are arrays of plain values", {
-  info <- info_from_json(from_json('{"mask": [1, 0, 1], "words": ["a"], "mixed": [1, "a"], "deep": {"x": null}}'))
+  info <- info_from_json(from_json(
+    '{"mask": [1, 0, 1], "words": ["a"], "mixed": [1, "a"], "deep": {"x": null}}'
+  ))
   expect_identical(info$mask, c(1L, 0L, 1L))
   expect_identical(info$words, "a")
   expect_identical(info$mixed, list(1L, "a"))

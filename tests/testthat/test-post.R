@@ -4,7 +4,7 @@ post_script <- function(name) {
   folders <- c(Sys.getenv("GYM_SEED"), file.path(test_path(), "../../../shared/seed"))
   path <- file.path(folders, name)
   path <- path[file.exists(path)]
-  skip_if(!length(path), "the post's scripts (shared/seed beside the checkout, or GYM_SEED) are not here")
+  skip_if(!length(path), "no shared/seed beside the checkout, which has the post's scripts")
   path[1]
 }
 
@@ -22,7 +22,8 @@ test_that("the post's search with a neural network runs as it is", {
   skip_if_not_installed("sigmoid")
   server <- local_server_5000()
   set.seed(1)
-  output <- capture.output(suppressMessages(sys.source(script, envir = new.env(parent = globalenv()))))
+  scope <- new.env(parent = globalenv())
+  output <- capture.output(suppressMessages(sys.source(script, envir = scope)))
   expect_match(output, "^\\[1\\] \"Solved after: [0-9]+ rounds\"$")
   expect_length(env_list_all(server), 0)
 })

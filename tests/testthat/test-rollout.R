@@ -78,6 +78,8 @@ test_that("a row of the steps has the observation that its action was taken on",
     names(steps), c("episode", "step", names, "action", "reward", "terminated", "truncated")
   )
   expect_identical(unname(as.matrix(steps[names])), do.call(rbind, seen))
+  # What the environment shows after the steps before this one, 0 of them at first.
+  expect_identical(steps$cart_position, sin(rep(env$seeds, each = 3) %% 1000 + 0:2 + 1))
   expect_identical(steps$action, as.integer(steps$pole_angle > 0))
   expect_identical(steps$episode, rep(1:3, each = 3))
   expect_identical(steps$step, rep(1:3, 3))
@@ -217,4 +219,12 @@ test_that("CartPole: 200 pushes at most in v0, and a policy's mistake is the env
   expect_identical(played$episodes$truncated, played$episodes$length == 200L)
   expect_error(rollout("CartPole-v0", function(observation) 2, client = client),
                class = "gym_error_space")
+})
+
+test_that("what was played survives an environment that cannot be closed", {
+  env <- list(close = function() gym_abort("gone", class = "gym_error_connection"))
+  expect_warning(close_made(env, finished = TRUE), "could not be closed",
+                 class = "gym_warning_close")
+  # After an error there is that error to hear of.
+  expect_silent(close_made(env, finished = FALSE))
 })

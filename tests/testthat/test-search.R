@@ -52,6 +52,8 @@ test_that("a summary plays the policy found in fresh episodes", {
   expect_identical(summary$episodes, nrow(search$episodes))
   expect_output(print(summary), "50 fresh episodes")
   expect_identical(nrow(summary(search)$fresh$episodes), 100L)
+  cut <- search_random(env, rounds = 1, max_steps = 2)
+  expect_identical(unique(summary(cut)$fresh$episodes$length), 2L)
   expect_error(summary(search, episodes = 0), "`episodes`", class = "gym_error_argument")
 })
 
