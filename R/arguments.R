@@ -70,10 +70,10 @@ is_number <- function(x) is.numeric(x) && length(x) == 1L && is.null(dim(x)) && 
 
 range_text <- function(min, max) {
   # The largest integer that R can hold limits a count without anybody meaning it.
-  bounded <- max < .Machine$integer.max
+  bounded <- max != .Machine$integer.max && max < Inf
   above <- min > -.Machine$integer.max
   if (above && bounded) {
-    paste(" from", format(min), "to", format(max))
+    paste(" from", format(min), "to", format(max, scientific = FALSE))
   } else if (above) {
     paste(" of at least", format(min))
   } else if (bounded) {
@@ -85,7 +85,10 @@ range_text <- function(min, max) {
 
 describe_argument <- function(x) {
   if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(x))) {
-    describe_value(x)
+    text <- paste(deparse(x, width.cutoff = 60L), collapse = " ")
+    if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
+  } else if (is.array(x)) {
+    paste0("an array of ", paste(dim(x), collapse = " x "))
   } else if (is.function(x)) {
     "a function"
   } else if (is.object(x)) {

@@ -45,7 +45,7 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config())
       class = "gym_error_argument"
     )
   }
-  check_number(timeout, min = 0.001)
+  check_number(timeout, min = 0.001, max = 1e6)
   if (!inherits(config, "request")) {
     must <- "made with httr, such as by httr::add_headers()"
     abort_argument(config, must, "config", rlang::current_env())
@@ -75,43 +75,82 @@ check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
 
 # The connection ----------------------------------------------------------------
 
-# What a client holds besides its address: two curl handles (setting one up anew
-# for each call costs more than the call), the key and number of its last call
-# and what it knows of the server's instances. Made anew when the client finds
-# itself in another process or restored from a file, where handles are void and
-# its key belongs to the original.
+# What a client holds besides its address: its line to the server and what it
+# knows of the server's instances. Made anew when the client finds itself in
+# another process or restored from a file, where a line is void and its key
+# belongs to the original.
 connection <- function(client) {
   state <- client$state
   if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
-    open_connection(client, state)
+    line <- open_line(client)
+    suspendInterrupts({
+      state$line <- line
+      state$instances <- new.env(parent = emptyenv())
+      state$to_close <- character()
+      state$pid <- Sys.getpid()
+      state$session <- the_session
+    })
   }
   state
 }
 
-open_connection <- function(client, state) {
-  state$session <- the_session
-  state$pid <- Sys.getpid()
-  state$key <- new_key()
-  state$number <- 0
-  state$instances <- new.env(parent = emptyenv())
-  state$to_close <- character()
-  state$get <- open_handle(client)
-  state$post <- open_handle(client)
-  state$body <- raw()
-  state$body_size <- 0L
-  curl::handle_setopt(
-    state$post,
-    post = TRUE,
-    # Called by curl when it wants the body. Asked for the body a second time
-    # (curl repeating a call by itself) it has nothing left and curl gives up:
-    # only send() may repeat a call.
-    readfunction = function(nbytes, ...) {
-      size <- min(nbytes, length(state$body))
-      chunk <- state$body[seq_len(size)]
-      state$body <- state$body[-seq_len(size)]
-      chunk
+# The line that a call may use. R may run a finalizer at any time, also while curl
+# waits for an answer, and a finalizer may close an environment: a call inside
+# another one gets a line of its own.
+free_line <- function(client) {
+  line <- connection(client)$line
+  while (line$busy) {
+    if (is.null(line$inner)) {
+      line$inner <- open_line(client, fetch_aside)
     }
+    line <- line$inner
+  }
+  line
+}
+
+# Two curl handles (setting one up anew for each call costs more than the call), and
+# the key and number of the last call that must not be done twice.
+open_line <- function(client, fetch = curl::curl_fetch_memory) {
+  line <- new.env(parent = emptyenv())
+  line$fetch <- fetch
+  line$busy <- FALSE
+  line$key <- new_key()
+  line$number <- 0
+  line$get <- open_handle(client)
+  line$post <- open_handle(client)
+  line$body <- raw()
+  line$sent <- 0L
+  line$body_size <- -1
+  curl::handle_setopt(line$post, post = TRUE, readfunction = function(nbytes, ...) {
+    read_body(line, nbytes)
+  })
+  line
+}
+
+# As curl_fetch_memory(), which has one engine for all and cannot run inside itself.
+fetch_aside <- function(url, handle) {
+  pool <- curl::new_pool()
+  outcome <- NULL
+  curl::handle_setopt(handle, url = url)
+  curl::multi_add(
+    handle,
+    done = function(response) outcome <<- response,
+    fail = function(reason) outcome <<- simpleError(reason),
+    pool = pool
   )
+  curl::multi_run(pool = pool)
+  if (inherits(outcome, "error")) stop(outcome)
+  outcome
+}
+
+# Called by curl when it wants more of the body. Asked for the body a second time
+# (curl repeating a call by itself) there is nothing left and curl gives up: only
+# send() may repeat a call.
+read_body <- function(line, nbytes) {
+  size <- min(nbytes, length(line$body) - line$sent)
+  chunk <- line$body[line$sent + seq_len(size)]
+  line$sent <- line$sent + size
+  chunk
 }
 
 open_handle <- function(client) {
@@ -122,7 +161,7 @@ open_handle <- function(client) {
     timeout_ms = client$timeout * 1000,
     followlocation = FALSE
   )
-  if (grepl("^https?://(127[.]|localhost|\\[::1\\])", client$remote_base)) {
+  if (is_loopback(client$remote_base) && is.null(client$config$options$proxy)) {
     # A proxy that the system names would look for the server on its own machine.
     curl::handle_setopt(handle, noproxy = "*")
   }
@@ -145,6 +184,10 @@ open_handle <- function(client) {
   handle
 }
 
+is_loopback <- function(base) {
+  grepl("^https?://(127[.][0-9.]+|localhost|\\[::1\\])(:[0-9]+)?(/|$)", base)
+}
+
 # Unlike anything drawn from R's generator this is never the same twice.
 new_key <- function() {
   the_session$keys <- (the_session$keys %||% 0) + 1
@@ -153,32 +196,72 @@ new_key <- function() {
   ))
 }
 
-# The next number of a call that must not be done twice, as it stands in a body.
-next_request <- function(state) {
-  state$number <- state$number + 1
-  sprintf('{"key":"%s","number":%.0f}', state$key, state$number)
-}
-
 # Requests ----------------------------------------------------------------------
 
 #' Send a request
 #'
-#' The one function that speaks HTTP. A call whose connection broke is sent
-#' again, unchanged, when `repeatable`: a GET, or a body with a number by which
-#' the server knows the repeat.
-#' @param body The JSON text of a POST, `NULL` for a GET.
-#' @return What [curl::curl_fetch_memory()] returns, whatever the status.
+#' The one function that speaks HTTP. A GET whose connection broke is sent again,
+#' and so is a POST that is done `once`, under the number by which the server
+#' knows the repeat.
+#' @param fields JSON texts of the fields of a POST's body, named; `NULL` for a GET.
+#' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the
+#'   `request` that was sent: its `key` and `number`.
 #' @noRd
-send <- function(client, route, body = NULL, repeatable = is.null(body),
-                 call = rlang::caller_env()) {
-  state <- connection(client)
+send <- function(client, route, fields = NULL, once = FALSE, call = rlang::caller_env()) {
+  # Arguments may hold calls of their own, as in env_reset(x, env_create(x, id)):
+  # those come first, or this call's number would lie behind theirs.
+  force(route)
+  force(fields)
+  line <- free_line(client)
+  line$busy <- TRUE
+  on.exit(line$busy <- FALSE)
+  request <- if (once) next_request(line)
+  if (is.null(fields)) {
+    handle <- line$get
+  } else {
+    handle <- line$post
+    fields <- c(fields, request = request_json(request))
+    load_body(line, json_object(paste0('"', names(fields), '"'), fields))
+  }
+  response <- fetch(client, line, handle, route, repeatable = once || is.null(fields), call)
+  response$request <- request
+  response
+}
+
+next_request <- function(line) {
+  line$number <- line$number + 1
+  list(key = line$key, number = line$number)
+}
+
+request_json <- function(request) {
+  if (!is.null(request)) {
+    sprintf('{"key":"%s","number":%.0f}', request$key, request$number)
+  }
+}
+
+# curl needs the length of a body beforehand, and setting it costs as much as half a
+# call: small bodies are padded with blanks to one length.
+load_body <- function(line, body) {
+  bytes <- charToRaw(body)
+  size <- max(length(bytes), small_body)
+  line$body <- c(bytes, rep(as.raw(0x20), size - length(bytes)))
+  if (size != line$body_size) {
+    suspendInterrupts({
+      curl::handle_setopt(line$post, postfieldsize_large = size)
+      line$body_size <- size
+    })
+  }
+}
+
+small_body <- 256L
+
+fetch <- function(client, line, handle, route, repeatable, call) {
   url <- paste0(client$remote_base, route)
-  handle <- if (is.null(body)) state$get else state$post
-  bytes <- if (!is.null(body)) pad_body(state, body)
+  started <- proc.time()[["elapsed"]]
   attempt <- 1L
   repeat {
-    state$body <- bytes
-    response <- tryCatch(curl::curl_fetch_memory(url, handle), error = identity)
+    line$sent <- 0L
+    response <- tryCatch(line$fetch(url, handle), error = identity)
     if (!inherits(response, "error")) {
       return(response)
     }
@@ -186,96 +269,90 @@ send <- function(client, route, body = NULL, repeatable = is.null(body),
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
-    if (!repeatable || attempt == max_attempts || !connection_broke(reason)) {
+    left <- client$timeout - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
+    if (!repeatable || attempt == max_attempts || left <= 0 || !connection_broke(reason)) {
       abort_connection(client$remote_base, reason, call)
     }
     Sys.sleep(0.1 * attempt)
+    # All attempts together may take as long as one call.
+    curl::handle_setopt(handle, timeout_ms = left * 1000)
+    on.exit(curl::handle_setopt(handle, timeout_ms = client$timeout * 1000))
     attempt <- attempt + 1L
   }
 }
 
 max_attempts <- 4L
 
-# What libcurl says when a connection that stood went away, as opposed to one
-# that could not be made or an answer that took too long.
+# What libcurl says when a connection that stood went away, as opposed to one that
+# could not be made or an answer that took too long.
 connection_broke <- function(reason) {
   grepl(
     paste(
-      "Recv failure|Send failure|Empty reply|Server returned nothing|rewind",
-      "Connection reset|Broken pipe|transfer closed|Failed (sending|receiving)",
-      "Failure when receiving|Connection died|Connection was reset|recv|send",
+      "Recv failure|Send failure|Empty reply|Server returned nothing|data rewind",
+      "Connection (reset|died)|Broken pipe|transfer closed",
+      "Failed (sending|receiving) data|Failure when receiving data",
       sep = "|"
     ),
     reason
   )
 }
 
-# curl needs the length of a body beforehand, and setting it costs as much as
-# half a call: bodies are padded with blanks to a few sizes.
-pad_body <- function(state, body) {
-  bytes <- charToRaw(body)
-  size <- 256L
-  while (size < length(bytes)) size <- size * 2L
-  if (size != state$body_size) {
-    curl::handle_setopt(state$post, postfieldsize_large = size)
-    state$body_size <- size
-  }
-  c(bytes, rep(as.raw(0x20), size - length(bytes)))
+# Make a call that the server carries out exactly once, and read its answer.
+post_once <- function(client, route, fields = NULL, call = rlang::caller_env()) {
+  fields <- fields %||% character()
+  read_answer(send(client, route, fields, once = TRUE, call = call), "POST", call)
 }
 
-#' Make a numbered call that the server carries out exactly once
-#'
-#' @param fields JSON texts of the body's fields, named; `NULL`s are left out.
+# Make any other call, and read its answer.
+get_answer <- function(client, route, call = rlang::caller_env()) {
+  read_answer(send(client, route, call = call), "GET", call)
+}
+
+post_answer <- function(client, route, data, call = rlang::caller_env()) {
+  fields <- vapply(data, to_json, "")
+  read_answer(send(client, route, fields, call = call), "POST", call)
+}
+
+#' Read an answer or raise its error
+#' @param response What [send()] returned.
 #' @return The parsed answer, `NULL` for an empty one.
 #' @noRd
-post_once <- function(client, route, fields = NULL, call = rlang::caller_env()) {
-  # Arguments may hold calls of their own, as in env_reset(x, env_create(x, id)):
-  # those come first, or this call's number would lie behind theirs.
-  force(route)
-  force(fields)
-  request <- next_request(connection(client))
-  body <- json_object(c(fields, request = request))
-  answer <- parse_answer(
-    send(client, route, body, repeatable = TRUE, call = call),
-    request = paste("POST", paste0(client$remote_base, route)), call = call
-  )
-  check_echo(answer, connection(client), client, call)
+read_answer <- function(response, method, call = rlang::caller_env()) {
+  answer <- if (response$status_code != 204L) parsed_body(response)
+  check_echo(response, answer, call)
+  if (response$status_code >= 400L) {
+    abort_http(response$status_code, answer, paste(method, response$url), call)
+  }
+  if (response$status_code != 204L && is.null(answer)) {
+    abort_no_answer(response, call)
+  }
   answer
 }
 
-json_object <- function(fields) {
-  paste0("{", paste0('"', names(fields), '":', fields, collapse = ","), "}")
+# The JSON object of an answer; NULL for whatever else somebody else may have sent.
+parsed_body <- function(response) {
+  answer <- tryCatch(from_json(rawToChar(response$content)), error = function(cnd) NULL)
+  if (is.list(answer)) answer
 }
 
 # An answer to another call would be worse than none.
-check_echo <- function(answer, state, client, call) {
-  echo <- answer$request
-  if (!is.null(echo) && !(echo$number == state$number && identical(echo$key, state$key))) {
-    abort_connection(client$remote_base, "The answer that came belongs to another call.", call)
+check_echo <- function(response, answer, call) {
+  sent <- response$request
+  if (is.null(sent)) {
+    return()
+  }
+  echo <- if (response$status_code == 204L) echo_in_header(response) else answer$request
+  if (!is.null(echo) && !(echo$number == sent$number && identical(echo$key, sent$key))) {
+    abort_connection(response$url, "The answer that came belongs to another call.", call)
   }
 }
 
-parse_answer <- function(response, request, call = rlang::caller_env()) {
-  status <- response$status_code
-  if (status == 204L) {
-    return(NULL)
+echo_in_header <- function(response) {
+  echo <- curl::parse_headers_list(response$headers)[["gym-request"]]
+  if (!is.null(echo)) {
+    parts <- strsplit(echo, " ", fixed = TRUE)[[1L]]
+    list(key = parts[[1L]], number = as.numeric(parts[[2L]]))
   }
-  answer <- tryCatch(from_json(rawToChar(response$content)), error = function(cnd) NULL)
-  if (status >= 400L) {
-    abort_http(status, answer, request, call)
-  }
-  if (status != 200L || !is.list(answer)) {
-    gym_abort(
-      c(
-        "The answer is not what a Gym server sends.",
-        x = paste0(request, " gave status ", status, " and ", response$type %||% "no type", "."),
-        i = "Is the address that of a Gym server?"
-      ),
-      class = "gym_error_connection",
-      call = call
-    )
-  }
-  answer
 }
 
 #' Send a request to any route of the server
@@ -300,25 +377,24 @@ parse_answer <- function(response, request, call = rlang::caller_env()) {
 #' post_request(client, paste0("/v1/envs/", id, "/close/"))
 post_request <- function(x, route, data = NULL) {
   check_client(x)
-  check_string(route)
-  body <- if (length(data)) to_json(as.list(data)) else "{}"
-  request_answer(x, route, body, "POST")
+  check_route(route)
+  answer <- post_answer(x, route, as.list(data))
+  if (is.null(answer)) invisible() else answer
 }
 
 #' @rdname post_request
 #' @export
 get_request <- function(x, route, data = NULL) {
   check_client(x)
-  check_string(route)
-  request_answer(x, paste0(route, query_text(data)), NULL, "GET")
+  check_route(route)
+  answer <- get_answer(x, paste0(route, query_text(data)))
+  if (is.null(answer)) invisible() else answer
 }
 
-request_answer <- function(x, route, body, method, call = rlang::caller_env()) {
-  answer <- parse_answer(
-    send(x, route, body, call = call),
-    request = paste(method, paste0(x$remote_base, route)), call = call
-  )
-  if (is.null(answer)) invisible() else answer
+check_route <- function(route, call = rlang::caller_env()) {
+  if (!rlang::is_string(route) || !startsWith(route, "/")) {
+    abort_argument(route, "a path that begins with a slash", "route", call)
+  }
 }
 
 query_text <- function(data) {
@@ -345,13 +421,9 @@ query_text <- function(data) {
 #' response <- httr::GET(paste0(gym_client()$remote_base, "/v1/envs/"))
 #' parse_server_error_or_raise_for_status(response)
 parse_server_error_or_raise_for_status <- function(response) {
-  answer <- parse_answer(
-    list(
-      status_code = httr::status_code(response),
-      type = httr::http_type(response),
-      content = response$content
-    ),
-    request = response$url %||% "The request"
-  )
+  if (!inherits(response, "response")) {
+    abort_argument(response, "an answer of httr's", "response", rlang::current_env())
+  }
+  answer <- read_answer(response, response$request$method %||% "Request to")
   if (is.null(answer)) invisible() else answer
 }

@@ -6,18 +6,17 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
     class = c(class, "gym_error"),
     ...,
     call = call,
-    parent = parent,
-    use_cli_format = TRUE
+    parent = parent
   )
 }
 
 abort_http <- function(status, problem, request, call) {
-  status_text <- httr::http_status(status)$reason
+  status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
   gym_abort(
     c(
       sentence(problem$message %||% "The server gave no reason"),
       i = sentence(problem$hint),
-      " " = paste0(request, " [", status, " ", status_text, "]")
+      " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
     ),
     class = c(
       if (identical(problem$code, "action_not_in_space")) "gym_error_space",
@@ -36,19 +35,47 @@ sentence <- function(text) {
   if (is.null(text)) {
     return(NULL)
   }
-  text <- paste0(toupper(substr(text, 1L, 1L)), substring(text, 2L))
+  if (!grepl("^[a-z_]+\\(", text)) {
+    text <- paste0(toupper(substr(text, 1L, 1L)), substring(text, 2L))
+  }
   if (grepl("[.?!]$", text)) text else paste0(text, ".")
 }
 
-abort_connection <- function(base, reason, call) {
+abort_connection <- function(url, reason, call) {
+  base <- sub("(//[^/]*).*", "\\1", url)
   gym_abort(
-    c(
-      paste0("No answer from the server at ", base, "."),
-      x = reason,
-      i = "Is a server running there? `gym_server_start()` starts one on this machine."
-    ),
+    c(paste0("No answer from the server at ", base, "."), x = reason, i = connection_mend(base)),
     class = "gym_error_connection",
     url = base,
+    call = call
+  )
+}
+
+connection_mend <- function(base) {
+  if (!is.null(the_session$servers[[base]])) {
+    return(paste(
+      "This session started it; `gym_server_log()` has its last words.",
+      "`gym_make()` starts another when it has ended."
+    ))
+  }
+  port <- sub("^https?://[^/]*:([0-9]+).*$", "\\1", base)
+  if (is_loopback(base) && grepl("^[0-9]+$", port)) {
+    paste0("Is a server running there? `gym_server_start(port = ", port, ")` starts one.")
+  } else {
+    "Is that its address, and is it running there?"
+  }
+}
+
+abort_no_answer <- function(response, call) {
+  gym_abort(
+    c(
+      "The answer is not what a Gym server sends.",
+      x = paste0(response$url, " gave status ", response$status_code, " and ",
+                 response$type %||% "content of no type", "."),
+      i = "Is the address that of a Gym server?"
+    ),
+    class = "gym_error_connection",
+    url = response$url,
     call = call
   )
 }
@@ -57,7 +84,7 @@ abort_space <- function(space, value, problem, call) {
   gym_abort(
     c(
       paste0(problem, "."),
-      x = paste0("The value ", describe_value(value), " does not fit the space ",
+      x = paste0("The value ", describe_argument(value), " does not fit the space ",
                  format(space), ".")
     ),
     class = "gym_error_space",
@@ -65,9 +92,4 @@ abort_space <- function(space, value, problem, call) {
     value = value,
     call = call
   )
-}
-
-describe_value <- function(value) {
-  text <- paste(deparse(value, width.cutoff = 60L), collapse = " ")
-  if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }

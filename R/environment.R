@@ -41,7 +41,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, kwargs = list
 #' env_list_all(gym_client())
 env_list_all <- function(x) {
   check_client(x)
-  request_answer(x, "/v1/envs/", NULL, "GET")$all_envs
+  get_answer(x, "/v1/envs/")$all_envs
 }
 
 #' Start a new episode
@@ -147,7 +147,7 @@ env_observation_space_info <- function(x, instance_id) {
 #' env_close(client, instance_id)
 env_action_space_sample <- function(x, instance_id) {
   instance <- known_instance(x, instance_id)
-  answer <- request_answer(x, paste0(instance$route, "action_space/sample"), NULL, "GET")
+  answer <- get_answer(x, paste0(instance$route, "action_space/sample"))
   decode_value(instance$action_space, answer$action)
 }
 
@@ -183,8 +183,7 @@ space_contains <- function(x, instance_id, which, value, call = rlang::caller_en
   if (length(instance[[which]]$shape) > 0L && is.null(dim(value)) && !is.list(value)) {
     value <- I(value)
   }
-  body <- json_object(c(value = to_json(value)))
-  request_answer(x, route, body, "POST", call = call)$member
+  post_answer(x, route, list(value = value), call = call)$member
 }
 
 #' Close an environment
@@ -202,11 +201,7 @@ space_contains <- function(x, instance_id, which, value, call = rlang::caller_en
 env_close <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  state <- connection(x)
-  post_once(x, paste0(instance_route(instance_id), "close/"))
-  if (!is.null(state$instances[[instance_id]])) {
-    rm(list = instance_id, envir = state$instances)
-  }
+  close_instance(x, instance_id)
   invisible()
 }
 
@@ -228,12 +223,12 @@ env_close <- function(x, instance_id) {
 #' try(upload(gym_client(), "results", api_key = "none"))
 upload <- function(x, training_dir, algorithm_id = NULL, api_key = NULL) {
   check_client(x)
-  fields <- list(
+  check_string(training_dir)
+  post_answer(x, "/v1/upload/", list(
     training_dir = training_dir,
     algorithm_id = algorithm_id,
     api_key = api_key %||% Sys.getenv("OPENAI_GYM_API_KEY")
-  )
-  request_answer(x, "/v1/upload/", to_json(fields), "POST")
+  ))
   invisible()
 }
 
@@ -251,7 +246,7 @@ upload <- function(x, training_dir, algorithm_id = NULL, api_key = NULL) {
 #' shutdown_server(server)
 shutdown_server <- function(x) {
   check_client(x)
-  request_answer(x, "/v1/shutdown/", "{}", "POST")
+  post_answer(x, "/v1/shutdown/", list())
   invisible()
 }
 
@@ -274,6 +269,24 @@ instance_route <- function(instance_id) {
   paste0("/v1/envs/", curl::curl_escape(instance_id), "/")
 }
 
+close_instance <- function(x, instance_id, call = rlang::caller_env()) {
+  post_once(x, paste0(instance_route(instance_id), "close/"), call = call)
+  instances <- connection(x)$instances
+  if (!is.null(instances[[instance_id]])) {
+    rm(list = instance_id, envir = instances)
+  }
+}
+
+# As close_instance(), for an instance that may be gone already.
+close_if_there <- function(x, instance_id, call = rlang::caller_env()) {
+  tryCatch(
+    close_instance(x, instance_id, call),
+    gym_error_http_400 = function(cnd) {
+      if (!identical(cnd$code, "unknown_instance")) rlang::cnd_signal(cnd)
+    }
+  )
+}
+
 # What the client knows of an instance; asked of the server once.
 known_instance <- function(x, instance_id, call = rlang::caller_env()) {
   check_client(x, call = call)
@@ -284,7 +297,7 @@ known_instance <- function(x, instance_id, call = rlang::caller_env()) {
 
 ask_instance <- function(x, instance_id, call) {
   route <- instance_route(instance_id)
-  answer <- request_answer(x, route, NULL, "GET", call = call)
+  answer <- get_answer(x, route, call = call)
   instance <- new.env(parent = emptyenv())
   instance$id <- instance_id
   instance$route <- route
@@ -346,7 +359,7 @@ warn_step_after_done <- function(instance, call) {
 encode_seed <- function(seed, call = rlang::caller_env()) {
   if (!is.null(seed)) {
     check_count(seed, min = 0, max = 2^53, call = call)
-    sprintf("%.0f", seed)
+    if (inherits(seed, "integer64")) as.character(seed) else sprintf("%.0f", seed)
   }
 }
 
@@ -370,7 +383,7 @@ close_abandoned <- function(x) {
   abandoned <- state$to_close
   state$to_close <- character()
   for (instance_id in abandoned) {
-    tryCatch(env_close(x, instance_id), gym_error_http = function(cnd) NULL)
+    close_if_there(x, instance_id)
   }
 }
 
@@ -386,6 +399,9 @@ close_abandoned <- function(x) {
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole.
 #' @param client A client, by default that of [gym_client()].
+#' The environment is closed by `$close()`, or some time after the object itself
+#' has been thrown away: keep the object for as long as the environment is played.
+#'
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL)`: starts an episode and returns the
 #'     first observation, as [env_reset()],
@@ -410,13 +426,10 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, client = gym_
   check_named_list(kwargs, arg = "...")
   check_client(client)
   instance_id <- create_instance(client, env_id, seed, render_mode, kwargs)
-  tryCatch(
-    gym_env$new(client, instance_id),
-    error = function(cnd) {
-      env_close(client, instance_id)
-      rlang::cnd_signal(cnd)
-    }
-  )
+  env <- NULL
+  on.exit(if (is.null(env)) close_if_there(client, instance_id))
+  env <- gym_env$new(client, instance_id)
+  env
 }
 
 gym_env <- R6::R6Class(
@@ -431,6 +444,7 @@ gym_env <- R6::R6Class(
     spec = NULL,
     initialize = function(client, instance_id) {
       private$instance <- known_instance(client, instance_id)
+      private$pid <- Sys.getpid()
       self$client <- client
       self$instance_id <- instance_id
       self$action_space <- private$instance$action_space
@@ -448,7 +462,7 @@ gym_env <- R6::R6Class(
     },
     close = function() {
       if (!private$closed) {
-        env_close(self$client, self$instance_id)
+        close_if_there(self$client, self$instance_id)
         private$closed <- TRUE
       }
       invisible(self)
@@ -462,11 +476,12 @@ gym_env <- R6::R6Class(
   ),
   private = list(
     instance = NULL,
+    pid = NULL,
     closed = FALSE,
     finalize = function() {
-      state <- self$client$state
-      if (!private$closed && !is.null(self$instance_id) &&
-            identical(state$session, the_session) && identical(state$pid, Sys.getpid())) {
+      # In a forked child the environment is still the parent's.
+      if (!private$closed && identical(private$pid, Sys.getpid())) {
+        state <- connection(self$client)
         state$to_close <- c(state$to_close, self$instance_id)
       }
     }

@@ -19,10 +19,10 @@
 env_render <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  route <- paste0(instance_route(instance_id), "render/")
-  response <- send(x, route)
-  if (response$status_code != 200L) {
-    parse_answer(response, paste0("GET ", x$remote_base, route))
+  response <- send(x, paste0(instance_route(instance_id), "render/"))
+  if (!identical(response$type, "image/png")) {
+    read_answer(response, "GET")
+    abort_no_answer(response, rlang::current_env())
   }
   pixels <- png::readPNG(response$content)[, , 1:3, drop = FALSE]
   pixels <- round(pixels * 255)

@@ -2,6 +2,9 @@
 # 15), numbers that JSON cannot write travel as "NaN", "Infinity", "-Infinity".
 
 json_number <- function(x) {
+  if (inherits(x, "integer64")) {
+    return(as.character(x))
+  }
   if (is.integer(x)) {
     text <- sprintf("%d", x)
   } else {
@@ -24,6 +27,14 @@ json_string <- function(x) {
     character(1),
     USE.NAMES = FALSE
   )
+}
+
+# An object of elements that are JSON already, its names too.
+json_object <- function(names, elements) {
+  if (!length(elements)) {
+    return("{}")
+  }
+  paste0("{", paste0(names, ":", elements, collapse = ","), "}")
 }
 
 json_array <- function(elements) paste0("[", paste0(elements, collapse = ","), "]")
@@ -55,7 +66,7 @@ to_json <- function(x) {
     if (is.null(names(x))) {
       return(json_array(elements))
     }
-    return(paste0("{", paste0(json_string(names(x)), ":", elements, collapse = ","), "}"))
+    return(json_object(json_string(names(x)), elements))
   }
   if (is.array(x)) {
     return(json_nested(json_atoms(row_major(x)), dim(x)))
@@ -67,9 +78,6 @@ json_atoms <- function(x) {
   if (is.factor(x)) {
     x <- as.character(x)
   }
-  if (inherits(x, "integer64")) {
-    return(as.character(x))
-  }
   switch(typeof(x),
     logical = ifelse(is.na(x), "null", ifelse(x, "true", "false")),
     integer = ,
@@ -77,7 +85,8 @@ json_atoms <- function(x) {
     character = ifelse(is.na(x), "null", json_string(x)),
     gym_abort(
       paste0("A value of type ", typeof(x), " cannot be sent to the server."),
-      class = "gym_error_argument"
+      class = "gym_error_argument",
+      call = NULL
     )
   )
 }

@@ -42,7 +42,7 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
   fields <- list(
     directory = directory, force = force, resume = resume, video_callable = video_callable
   )
-  request_answer(x, paste0(instance_route(instance_id), "monitor/start/"), to_json(fields), "POST")
+  post_answer(x, paste0(instance_route(instance_id), "monitor/start/"), fields)
   invisible()
 }
 
@@ -60,6 +60,6 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
 env_monitor_close <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  request_answer(x, paste0(instance_route(instance_id), "monitor/close/"), "{}", "POST")
+  post_answer(x, paste0(instance_route(instance_id), "monitor/close/"), list())
   invisible()
 }

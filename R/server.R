@@ -25,7 +25,15 @@ gym_client <- function() {
 }
 
 # One client for all calls, so that they share its connection.
-named_client <- function(url) {
+named_client <- function(url, call = rlang::caller_env()) {
+  if (!grepl("^https?://[^/]", url)) {
+    gym_abort(
+      paste0("The variable GYM_SERVER_URL must be the address of a server, such as ",
+             "\"http://127.0.0.1:5000\", not \"", url, "\"."),
+      class = "gym_error_argument",
+      call = call
+    )
+  }
   if (!identical(the_session$named_url, url)) {
     the_session$named_client <- create_GymClient(url)
     the_session$named_url <- url
@@ -69,11 +77,11 @@ is_running <- function(client) {
 #' env_list_all(server)
 #' gym_server_stop(server)
 gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
-  check_count(port, min = 0, allow_null = TRUE)
+  check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
   arguments <- c(
-    "-m", "gym_server", "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
+    "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
     server_options(list(...))
   )
   candidates <- python_candidates(python)
@@ -89,6 +97,13 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
   abort_no_python(python, candidates, refusals)
 }
 
+# As `-m gym_server`, but without the working directory among the places of modules,
+# where a file named random.py would take the place of Python's own.
+run_server <- paste0(
+  "import sys; sys.path[:] = [place for place in sys.path if place]; ",
+  "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
+)
+
 # Extra options as the command line takes them: log_level = "info" becomes
 # --log-level info, TRUE a flag, a vector one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
@@ -98,16 +113,13 @@ server_options <- function(options, call = rlang::caller_env()) {
     function(flag, values) {
       if (isTRUE(values)) {
         flag
-      } else if (!isFALSE(values)) {
+      } else if (length(values) && !isFALSE(values)) {
         as.vector(rbind(flag, as.character(values)))
       }
     },
     flags, options
   ), use.names = FALSE)
 }
-
-# The exit status by which the server says that it cannot run on this Python.
-status_wrong_python <- 78L
 
 # Start the server with one Python. Returns what is known of the running server,
 # or a string that says why this Python cannot run it.
@@ -132,11 +144,15 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
     return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
   }
   words <- log_tail(log)
-  if (!identical(process$get_exit_status(), status_wrong_python) && length(words)) {
+  if (any(grepl(server_words, words))) {
     abort_server_start("The server ended before it took connections.", words, call)
   }
   if (length(words)) utils::tail(words, 1L) else "it ended without a word"
 }
+
+# How the server itself begins when it cannot start as it was asked to; whatever else
+# is said comes from a Python that cannot run it, or from what only looks like one.
+server_words <- "^(gym_server:|gym-http-server: error)"
 
 server_environment <- function() {
   search_path <- c(system.file("server", package = "gym"), Sys.getenv("PYTHONPATH"))
@@ -163,9 +179,11 @@ await_start <- function(process, log, timeout, call) {
     }
     process$poll_io(as.integer(ceiling(left * 1000)))
     lines <- process$read_output_lines()
-    address <- sub("^Server starting at: ", "", grep("^Server starting at: ", lines, value = TRUE))
+    address <- grep("^Server starting at: ", lines, value = TRUE)
     if (length(address)) {
-      return(address[1L])
+      # A server that listens on all addresses is reached by this machine's own.
+      address <- sub("//0.0.0.0:", "//127.0.0.1:", address[1L], fixed = TRUE)
+      return(sub("^Server starting at: ", "", address))
     }
     if (!process$is_incomplete_output()) {
       process$wait(5000)
@@ -192,23 +210,44 @@ abort_server_start <- function(message, log_lines, call) {
 
 abort_no_python <- function(python, candidates, refusals, call = rlang::caller_env()) {
   looked <- if (length(candidates)) paste0(candidates, ": ", refusals)
-  server <- system.file("server", package = "gym")
-  best <- if (length(candidates)) candidates[1L] else "python3"
   gym_abort(
     c(
       "No Python was found that can run the server.",
       stats::setNames(looked, rep("x", length(looked))),
-      i = if (is.null(python) && !nzchar(Sys.getenv("GYM_PYTHON"))) {
-        "Looked in `python =`, GYM_PYTHON, an active virtual environment and the PATH."
+      i = if (is.null(python)) {
+        paste("Python is looked for in GYM_PYTHON or, where that is not set, in an active",
+              "virtual environment and on the PATH.")
       },
-      i = "The server needs Python 3.10 or newer with a few packages. In a terminal:",
-      " " = paste0(best, " -m pip install ", shQuote(server)),
-      i = "Name another Python by `gym_server_start(python = )` or the variable GYM_PYTHON."
+      i = "The server needs Python 3.10 or newer and a few packages. In a terminal:",
+      stats::setNames(installing_commands(), c(" ", " ")),
+      i = "and then, in R:",
+      " " = paste0("Sys.setenv(GYM_PYTHON = \"", installed_python(), "\")")
     ),
     class = "gym_error_server_start",
     candidates = candidates,
     call = call
   )
+}
+
+# An environment of its own: a system's Python often refuses packages.
+installing_commands <- function() {
+  server <- system.file("server", package = "gym")
+  if (is_windows()) {
+    c("py -m venv \"%USERPROFILE%\\gym-python\"",
+      paste0("\"%USERPROFILE%\\gym-python\\Scripts\\python\" -m pip install ",
+             shQuote(normalizePath(server), type = "cmd")))
+  } else {
+    c("python3 -m venv ~/gym-python",
+      paste("~/gym-python/bin/python -m pip install", shQuote(server)))
+  }
+}
+
+installed_python <- function() {
+  if (is_windows()) {
+    file.path(chartr("\\", "/", Sys.getenv("USERPROFILE")), "gym-python/Scripts/python.exe")
+  } else {
+    "~/gym-python/bin/python"
+  }
 }
 
 # Where Python may be, in the order in which it is tried.
@@ -267,6 +306,11 @@ gym_server_log <- function(server = the_session$client) {
 }
 
 session_server <- function(client, call = rlang::caller_env()) {
+  if (is.null(client)) {
+    gym_abort(
+      "This session has started no server.", class = "gym_error_argument", call = call
+    )
+  }
   check_client(client, arg = "server", call = call)
   the_session$servers[[client$remote_base]] %||% gym_abort(
     c(
@@ -284,6 +328,11 @@ stop_server <- function(server, patience = 15) {
     return(invisible())
   }
   close(process$get_input_connection())
+  process$wait(1000)
+  if (process$is_alive() && !is_windows()) {
+    # A forked child that still lives holds the server's standard input open, too.
+    process$signal(tools::SIGTERM)
+  }
   process$wait(patience * 1000)
   if (process$is_alive()) {
     process$kill()

@@ -129,6 +129,10 @@ encode_value <- function(space, value, call) UseMethod("encode_value")
 
 #' @exportS3Method
 encode_value.gym_space_discrete <- function(space, value, call) {
+  if (is.logical(value)) {
+    # As R counts, and Python.
+    value <- as.integer(value)
+  }
   if (length(value) != 1L || !is.numeric(value) || !is.finite(value) || value != trunc(value)) {
     abort_space(space, value, "A discrete action is one whole number", call)
   }
@@ -183,9 +187,12 @@ space_sample.gym_space_discrete <- function(space) {
 
 #' @exportS3Method
 space_sample.gym_space_box <- function(space) {
-  values <- mapply(draw_between, space$low, space$high)
   if (space$dtype %in% integer_dtypes) {
-    values <- pmin(floor(values), space$high)
+    # A whole number stands for all that is rounded down to it: the highest, too.
+    drawn <- mapply(draw_between, space$low, space$high + 1)
+    values <- pmin(floor(drawn), space$high)
+  } else {
+    values <- mapply(draw_between, space$low, space$high)
   }
   if (length(space$shape) > 1L) aperm(array(values, rev(space$shape))) else values
 }

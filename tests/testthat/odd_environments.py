@@ -70,6 +70,14 @@ class Telling(Odd):
         return self._observe(), float("inf"), False, True, info
 
 
+class Chatty(Odd):
+    """Prints a lot."""
+
+    def step(self, action):
+        print("x" * 20_000)
+        return super().step(action)
+
+
 def box(low, high, shape, dtype):
     return spaces.Box(low, high, shape, dtype)
 
@@ -134,6 +142,10 @@ def telling():
     return Telling(spaces.Discrete(2))
 
 
+def chatty():
+    return Chatty(spaces.Discrete(2))
+
+
 for maker in (
     image,
     large_integers,
@@ -147,6 +159,7 @@ for maker in (
     failing,
     slow,
     telling,
+    chatty,
 ):
     name = "".join(word.title() for word in maker.__name__.split("_"))
     gym.register(f"{name}-v0", entry_point=maker, disable_env_checker=True)

@@ -26,7 +26,7 @@ test_that("with no server there the error names the address and the mend", {
   client <- create_GymClient(paste0("http://127.0.0.1:", port))
   error <- expect_error(env_list_all(client), class = "gym_error_connection")
   expect_match(conditionMessage(error), paste0("http://127.0.0.1:", port), fixed = TRUE)
-  expect_match(conditionMessage(error), "gym_server_start()", fixed = TRUE)
+  expect_match(conditionMessage(error), paste0("gym_server_start(port = ", port, ")"), fixed = TRUE)
 })
 
 test_that("a server that stops in the middle is an error, one that is back is used again", {
@@ -114,7 +114,7 @@ test_that("a client survives saveRDS() and makes calls of its own", {
   expect_length(env_reset(copies[[1]], id), 4)
   expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
   expect_equal(env_step(client, id, 0)$reward, 1)
-  keys <- vapply(c(list(client), copies), function(copy) copy$state$key, "")
+  keys <- vapply(c(list(client), copies), function(copy) copy$state$line$key, "")
   expect_length(unique(keys), 3)
 })
 
@@ -154,16 +154,105 @@ test_that("a client works in spawned workers", {
   expect_identical(answer[[1]], env$reset())
 })
 
-test_that("the end of a forked worker closes nothing of its parent's", {
+test_that("a forked worker closes nothing of its parent's", {
   skip_on_os("windows")
   env <- local_env()
   env$reset()
   parallel::mclapply(1:2, function(i) {
+    local_env(client = env$client)
+    client <- env$client
     env <<- NULL
     gc()
-    i
+    local_env(client = client)
   }, mc.cores = 2)
   expect_equal(env$step(1)$reward, 1)
+})
+
+test_that("a call inside another call disturbs neither", {
+  server <- local_server()
+  id <- env_create(server, "CartPole-v1", seed = 1)
+  twin <- env_create(server, "CartPole-v1", seed = 1)
+  env_reset(server, id)
+  env_reset(server, twin)
+  # curl asks R for a call's body, and there R may run finalizers: here it does.
+  line <- connection(server)$line
+  curl::handle_setopt(line$post, readfunction = function(nbytes, ...) {
+    if (line$sent == 0L) {
+      thrown_away <- new.env()
+      reg.finalizer(thrown_away, function(x) {
+        env_close(server, env_create(server, "CartPole-v1"))
+      })
+      rm(thrown_away)
+      gc()
+    }
+    read_body(line, nbytes)
+  })
+  other <- create_GymClient(server$remote_base)
+  for (action in c(1, 0, 1)) {
+    expect_identical(env_step(server, id, action), env_step(other, twin, action))
+  }
+  expect_setequal(names(env_list_all(server)), c(id, twin))
+})
+
+test_that("interrupts at any moment leave a client that works", {
+  skip_on_os("windows")
+  skip_if_no_server()
+  script <- withr::local_tempfile(lines = c(
+    paste0(".libPaths(", deparse1(.libPaths()), ")"),
+    "library(gym)",
+    "server <- gym_server_start()",
+    "interrupts <- 0",
+    "storm <- processx::process$new('sh', c('-c', paste(",
+    "  'for i in $(seq 100); do kill -INT', Sys.getpid(), '; sleep 0.02; done')))",
+    "suspendInterrupts(while (storm$is_alive()) {",
+    "  tryCatch(allowInterrupts({",
+    "    client <- create_GymClient(server$remote_base)",
+    "    id <- env_create(client, 'CartPole-v1')",
+    "    env_reset(client, id)",
+    "    env_close(client, id)",
+    "  }), interrupt = function(cnd) interrupts <<- interrupts + 1)",
+    "})",
+    "id <- env_create(client, 'CartPole-v1')",
+    "cat(interrupts > 10, length(env_reset(client, id)), env_step(client, id, 1)$reward)"
+  ))
+  output <- processx::run(file.path(R.home("bin"), "Rscript"), script, timeout = 60)
+  expect_identical(output$stdout, "TRUE 4 1")
+})
+
+test_that("an answer to another call is an error, in a body and in a header", {
+  sent <- list(key = "k", number = 4)
+  answer <- function(status, body, headers = "") {
+    list(status_code = status, content = charToRaw(body), headers = charToRaw(headers),
+         url = "http://127.0.0.1:1/v1/envs/", request = sent)
+  }
+  echo <- function(number) sprintf('{"request":{"key":"k","number":%d}}', number)
+  header <- function(number) {
+    sprintf("HTTP/1.1 204 No Content\r\nGym-Request: k %d\r\n\r\n", number)
+  }
+  expect_equal(read_answer(answer(200, echo(4)), "POST")$request$number, 4)
+  expect_null(read_answer(answer(204, "", header(4)), "POST"))
+  for (wrong in list(answer(200, echo(3)), answer(400, echo(5)), answer(204, "", header(3)))) {
+    expect_error(read_answer(wrong, "POST"), "another call", class = "gym_error_connection")
+  }
+})
+
+test_that("what is no answer of a Gym server is an error with a class", {
+  answer <- function(status, body) {
+    list(status_code = status, content = charToRaw(body), url = "http://127.0.0.1:1/",
+         type = "text/html")
+  }
+  expect_error(read_answer(answer(200, "<html>"), "GET"), class = "gym_error_connection")
+  expect_error(read_answer(answer(200, "\"oops\""), "GET"), class = "gym_error_connection")
+  expect_error(read_answer(answer(302, ""), "GET"), class = "gym_error_connection")
+  expect_error(read_answer(answer(520, "\"oops\""), "GET"), class = "gym_error_http_520")
+})
+
+test_that("a large body arrives, one that is too large is told", {
+  env <- local_env()
+  # CartPole looks at two of its options and lets the others be.
+  expect_length(env$reset(options = list(x = as.numeric(1:1e5))), 4)
+  expect_error(env$reset(options = list(x = strrep("x", 17 * 2^20))), class = "gym_error_http_413")
+  expect_length(env$reset(), 4)
 })
 
 test_that("classic requests go to any route", {

@@ -90,6 +90,21 @@ test_that("a seed that is none is refused before anything is sent", {
   }
 })
 
+test_that("a seed that is an integer64 is that seed", {
+  skip_if_not_installed("bit64")
+  env <- local_env()
+  expect_identical(env$reset(seed = bit64::as.integer64(5)), env$reset(seed = 5))
+})
+
+test_that("an info may be handed back as options", {
+  env <- local_env()
+  info <- (function() {
+    env$reset()
+    env$step(1)$info
+  })()
+  expect_length(env$reset(options = info), 4)
+})
+
 test_that("options reach the environment's reset", {
   env <- local_env()
   expect_true(all(abs(env$reset(options = list(low = 0.2, high = 0.3))) >= 0.2))
@@ -109,6 +124,9 @@ test_that("an environment is an object with Gymnasium's names", {
   env$close()
   expect_output(print(env), "closed")
   expect_error(env$close(), NA)
+  gone <- local_env()
+  env_close(gone$client, gone$instance_id)
+  expect_error(gone$close(), NA)
   expect_error(env$step(1), "unknown", class = "gym_error_http_400")
 })
 
@@ -208,6 +226,9 @@ test_that("an exception inside an environment is told and touches no other", {
   expect_identical(error$code, "environment_error")
   expect_equal(other$step(1)$reward, 1)
   expect_error(env$close(), NA)
+  gone <- local_env()
+  env_close(gone$client, gone$instance_id)
+  expect_error(gone$close(), NA)
 })
 
 test_that("what an environment tells besides arrives", {
@@ -245,4 +266,13 @@ test_that("an interrupt during a call arrives as an interrupt", {
     error = function(cnd) "error"
   )
   expect_identical(outcome, "interrupted")
+  # The step that was interrupted goes on at the server; the next waits for it.
+  expect_equal(env$step(0)$reward, 1)
+})
+
+test_that("what an environment prints does not hold it up", {
+  env <- make_odd("Chatty", local_odd_server())
+  env$reset()
+  for (i in 1:10) expect_equal(env$step(0)$reward, 1)
+  expect_match(gym_server_log(env$client), "xxxx", all = FALSE)
 })

@@ -25,6 +25,12 @@ test_that("a named list is an object, an unnamed one an array", {
     '{"a":1,"b":[true,"x",null],"c":[1,2]}'
   )
   expect_equal(to_json(list()), "[]")
+  expect_equal(to_json(structure(list(), names = character())), "{}")
+})
+
+test_that("an integer64 keeps its digits", {
+  skip_if_not_installed("bit64")
+  expect_equal(to_json(bit64::as.integer64("9007199254740993")), "9007199254740993")
 })
 
 test_that("text is escaped and arrives as it was", {

@@ -58,19 +58,23 @@ test_that("the first Python that can run the server is taken", {
       "exit 78"), bare
   )
   Sys.chmod(bare, "755")
+  # One that only says how to get another, as on macOS.
+  stub <- file.path(folder, "stub", "python3")
+  dir.create(dirname(stub))
+  writeLines(c("#!/bin/sh", "echo 'xcode-select: note: No developer tools' >&2", "exit 1"), stub)
+  Sys.chmod(stub, "755")
   good <- file.path(folder, "good", "python3")
   dir.create(dirname(good))
-  writeLines(c("#!/bin/sh", paste0("exec '", working, "' \"$@\"")), good)
+  writeLines(c("#!/bin/sh", paste0("exec ", shQuote(working), " \"$@\"")), good)
   Sys.chmod(good, "755")
   withr::local_envvar(
     GYM_PYTHON = NA, VIRTUAL_ENV = NA, CONDA_PREFIX = NA,
-    PATH = paste(c(dirname(bare), dirname(good), Sys.getenv("PATH")), collapse = ":")
+    PATH = paste(c(dirname(c(bare, stub, good)), Sys.getenv("PATH")), collapse = ":")
   )
   server <- gym_server_start()
   withr::defer(gym_server_stop(server))
   expect_identical(the_session$servers[[server$remote_base]]$python, good)
 
-  withr::local_envvar(PATH = paste(dirname(bare), "/bin", sep = ":"))
   withr::local_envvar(PATH = dirname(bare))
   error <- expect_error(gym_server_start(), class = "gym_error_server_start")
   expect_match(conditionMessage(error), "No module named 'flask'", fixed = TRUE)
@@ -95,6 +99,36 @@ test_that("Python is looked for in the order that the help page tells", {
   withr::local_envvar(GYM_PYTHON = "/its/python")
   expect_identical(python_candidates(), "/its/python")
   expect_identical(python_candidates("/my/python"), "/my/python")
+})
+
+test_that("a file in the working directory takes no Python module's place", {
+  skip_if_no_server()
+  withr::local_dir(withr::local_tempdir())
+  writeLines("raise RuntimeError", "random.py")
+  expect_type(env_list_all(local_server()), "list")
+})
+
+test_that("a server stops in order while a forked child lives", {
+  skip_on_os("windows")
+  server <- local_server()
+  child <- parallel::mcparallel(Sys.sleep(30))
+  withr::defer(tools::pskill(child$pid, tools::SIGKILL))
+  gym_server_stop(server)
+  expect_identical(the_session$servers[[server$remote_base]]$process$get_exit_status(), 0L)
+})
+
+test_that("the end of a forked child is not the session's", {
+  skip_on_os("windows")
+  server <- local_server()
+  parallel::mclapply(1:2, function(i) stop_session_servers(the_session), mc.cores = 2)
+  expect_type(env_list_all(server), "list")
+})
+
+test_that("what cannot be a server of this session is refused with the reason", {
+  expect_error(gym_server_start(port = 70000), "65535", class = "gym_error_argument")
+  expect_error(session_server(NULL), "no server", class = "gym_error_argument")
+  withr::local_envvar(GYM_SERVER_URL = "127.0.0.1:5000")
+  expect_error(gym_client(), "GYM_SERVER_URL", class = "gym_error_argument")
 })
 
 test_that("options reach the server by name", {

@@ -36,7 +36,8 @@ test_that("a discrete action is one whole number", {
   space <- discrete(2)
   expect_equal(encode_value(space, 1, NULL), "1")
   expect_equal(encode_value(space, 1L, NULL), "1")
-  for (bad in list(0.5, NA, NA_real_, NULL, "1", c(0, 1), TRUE, Inf, NaN, list(1), integer())) {
+  expect_equal(encode_value(space, TRUE, NULL), "1")
+  for (bad in list(0.5, NA, NA_real_, NULL, "1", c(0, 1), Inf, NaN, list(1), integer())) {
     expect_error(encode_value(space, bad, NULL), "<Discrete 2>", class = "gym_error_space")
   }
 })
@@ -109,6 +110,12 @@ test_that("drawing a value stays inside the bounds and follows R's generator", {
     expect_identical(space_sample(space), first)
   }
   expect_equal(dim(space_sample(box(c(2, 3)))), c(2, 3))
+})
+
+test_that("a Box of integers draws both its bounds", {
+  set.seed(1)
+  drawn <- replicate(200, space_sample(box(1, "int8", 0, 1)))
+  expect_setequal(drawn, 0:1)
 })
 
 test_that("values of every sort arrive from a real server as Python had them", {

@@ -64,6 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
+    # What environments print must not fill a pipe that nobody reads.
+    os.dup2(2, 1)
     _serve(app, server)
     return 0
 
