@@ -432,7 +432,8 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, client = gym_
   env
 }
 
-gym_env <- R6::R6Class(
+#' @importFrom R6 R6Class
+gym_env <- R6Class(
   "gym_env",
   cloneable = FALSE,
   lock_class = TRUE,
