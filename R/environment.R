@@ -432,7 +432,6 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, client = gym_
   env
 }
 
-#' @importFrom R6 R6Class
 gym_env <- R6Class(
   "gym_env",
   cloneable = FALSE,

@@ -30,6 +30,7 @@
 #' )
 #' ```
 #'
+#' @importFrom R6 R6Class
 #' @importFrom rlang %||%
 #' @keywords internal
 "_PACKAGE"
