@@ -209,7 +209,7 @@ new_key <- function() {
 #' @noRd
 send <- function(client, route, fields = NULL, once = FALSE, call = rlang::caller_env()) {
   # Arguments may hold calls of their own, as in env_reset(x, env_create(x, id)):
-  # those come first, or this call's number would lie behind theirs.
+  # those come first and have the line for themselves.
   force(route)
   force(fields)
   line <- free_line(client)

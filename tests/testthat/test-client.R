@@ -156,16 +156,17 @@ test_that("a client works in spawned workers", {
 
 test_that("a forked worker closes nothing of its parent's", {
   skip_on_os("windows")
-  env <- local_env()
+  client <- test_client()
+  env <- gym_make("CartPole-v1", client = client)
   env$reset()
   parallel::mclapply(1:2, function(i) {
-    local_env(client = env$client)
-    client <- env$client
+    gym_make("CartPole-v1", client = client)$close()
     env <<- NULL
     gc()
-    local_env(client = client)
+    gym_make("CartPole-v1", client = client)$close()
   }, mc.cores = 2)
   expect_equal(env$step(1)$reward, 1)
+  env$close()
 })
 
 test_that("a call inside another call disturbs neither", {
