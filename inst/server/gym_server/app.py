@@ -17,6 +17,7 @@ from gym_server.frames import RenderThread
 from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services
+from gym_server.tensors import TENSORS
 from gym_server.wire import Answer
 
 
@@ -82,18 +83,28 @@ def _view(
     route: Route, services: Services, exactly_once: ExactlyOnce[Answer]
 ) -> Callable[..., Response]:
     def view(**path: str) -> Response:
-        raw = request.get_data(cache=False) if route.method == "POST" else b""
-        body = wire.loads(raw)
+        sends_tensors = route.tensor_body and TENSORS in request.environ.get("CONTENT_TYPE", "")
+        if route.method == "GET":
+            raw, body = b"", request.args.to_dict()
+        else:
+            raw = request.get_data(cache=False)
+            body = wire.loads_tensors(raw) if sends_tensors else wire.loads(raw)
+        wants_tensors = route.tensors and _accepts_tensors(route)
         request_id = wire.read(body, (wire.REQUEST,))["request"] if route.once else None
+
+        def perform() -> Answer:
+            try:
+                call = Call(services, path, body, wire.read(body, route.fields), wants_tensors)
+                return wire.answer(route.handler(call), request_id)
+            except Exception as error:
+                return _failure(error, request_id)
+
         if request_id is None:
-            return _response(_perform(route, services, path, body, None))
-        content = (request.method, request.path, blake2b(raw, digest_size=16).digest())
+            return _response(perform())
+        digest = blake2b(raw, digest_size=16).digest()
+        content = (request.method, request.path, digest, sends_tensors, wants_tensors)
         try:
-            answer = exactly_once.answer(
-                request_id,
-                content,
-                lambda: _perform(route, services, path, body, request_id),
-            )
+            answer = exactly_once.answer(request_id, content, perform)
         except Exception as error:
             answer = _failure(error, request_id)
         return _response(answer)
@@ -101,14 +112,11 @@ def _view(
     return view
 
 
-def _perform(
-    route: Route, services: Services, path: dict, body: dict, request_id: RequestId | None
-) -> Answer:
-    try:
-        call = Call(services, path, body, wire.read(body, route.fields))
-        return wire.answer(route.handler(call), request_id)
-    except Exception as error:
-        return _failure(error, request_id)
+def _accepts_tensors(route: Route) -> bool:
+    # Reading the header properly takes time in each step, and few clients name tensors in it.
+    if TENSORS not in request.environ.get("HTTP_ACCEPT", ""):
+        return False
+    return request.accept_mimetypes.best_match([TENSORS, route.content_type]) == TENSORS
 
 
 def _failure(error: Exception, request_id: RequestId | None) -> Answer:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import difflib
 import importlib
-import threading
 from collections.abc import Callable, Collection
 
 import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
 
+from gym_server import mujoco_setup
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
+from gym_server.extras import extra_of, is_available, missing_extra
 from gym_server.plain import brief
-
-_importing = threading.Lock()
+from gym_server.registry import importing, look_up, near
 
 
 def make(
@@ -42,8 +40,14 @@ def make(
             "render_mode is a parameter of its own",
         )
     spec = find_spec(env_id, allowed_modules)
-    chosen = _choose_render_mode(ask(_load_creator, spec), spec, render_mode)
-    return ask(_make, spec, chosen, kwargs)
+    try:
+        chosen = _choose_render_mode(ask(_load_creator, spec), spec, render_mode)
+        return ask(_make, spec, chosen, kwargs)
+    except GymServerError as refusal:
+        extra = extra_of(spec)
+        if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):
+            raise missing_extra(spec.id, extra) from refusal
+        raise
 
 
 def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
@@ -63,38 +67,17 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
             f"This server may not import the module '{module}'",
             f"start the server with --allow-module {module}",
         )
-    with _importing:
-        if module:
-            ask(importlib.import_module, module)
-        _register_package_of(name)
     try:
-        return gymnasium.spec(_with_version(name))
+        with importing:
+            if module:
+                ask(importlib.import_module, module)
+            return look_up(name)
     except error.Error as failure:
         raise _explain(failure, env_id, name) from failure
 
 
 def _is_module(text: str) -> bool:
     return all(part.isidentifier() for part in text.split("."))
-
-
-def _register_package_of(name: str) -> None:
-    """Import the package that registers a namespace, when it is installed."""
-    namespace, _, _ = registration.parse_env_id(name)
-    if namespace in _PACKAGES:
-        with contextlib.suppress(ImportError):
-            importlib.import_module(_PACKAGES[namespace])
-
-
-# Since Gymnasium 1.0 packages are no longer found by themselves.
-_PACKAGES = {"ALE": "ale_py"}
-
-
-def _with_version(name: str) -> str:
-    """Return the newest version of an id that names none, as Gymnasium does."""
-    namespace, bare_name, version = registration.parse_env_id(name)
-    if version is None and name not in gymnasium.registry:
-        version = registration.find_highest_version(namespace, bare_name)
-    return registration.get_env_id(namespace, bare_name, version)
 
 
 def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
@@ -109,7 +92,10 @@ def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
             )
         case _:
             return _unusable(
-                "unknown_env_id", env_id, "no environment of that name is registered", _near(name)
+                "unknown_env_id",
+                env_id,
+                "no environment of that name is registered",
+                _did_you_mean(name),
             )
 
 
@@ -127,24 +113,22 @@ def _use_latest(name: str) -> str:
     return f"use {registration.get_env_id(namespace, bare_name, latest)}"
 
 
-def _near(name: str) -> str | None:
-    ids = list(gymnasium.registry)
-    near = difflib.get_close_matches(name, ids, n=3, cutoff=0.6)
-    if not near:
-        by_lower_case = {env_id.lower(): env_id for env_id in ids}
-        matches = difflib.get_close_matches(name.lower(), by_lower_case, n=3, cutoff=0.6)
-        near = [by_lower_case[match] for match in matches]
-    return f"did you mean {' or '.join(near)}?" if near else None
+def _did_you_mean(name: str) -> str | None:
+    ids = near(name)
+    return f"did you mean {' or '.join(ids)}?" if ids else None
 
 
 def _load_creator(spec: registration.EnvSpec) -> Callable:
-    # Python lets go of its import locks where modules import each other in a circle, as
-    # Gymnasium's do; two threads would see them half made.
-    with _importing:
+    with importing:
         importlib.import_module("gymnasium.wrappers")
         if callable(spec.entry_point):
             return spec.entry_point
-        return registration.load_env_creator(spec.entry_point)
+        if extra_of(spec) != "mujoco":
+            return registration.load_env_creator(spec.entry_point)
+        mujoco_setup.choose_gl()
+        creator = registration.load_env_creator(spec.entry_point)
+        mujoco_setup.log_warnings()
+        return creator
 
 
 def _choose_render_mode(

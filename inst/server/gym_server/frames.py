@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 import sys
+import threading
 import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -25,10 +26,18 @@ class RenderThread:
     def __init__(self) -> None:
         """Start no thread yet: a server that never draws has none."""
         self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+        self._here = threading.local()
 
     def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
         """Run a function on the render thread; return its result or raise what it raises."""
-        return self._executor.submit(_keep_pygame_and, draw, *args).result()
+        if getattr(self._here, "is_render_thread", False):
+            # Drawing calls for drawing, as a monitor does of an environment that always draws.
+            return draw(*args)
+        return self._executor.submit(self._draw, draw, *args).result()
+
+    def _draw(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
+        self._here.is_render_thread = True
+        return _keep_pygame_and(draw, *args)
 
     def stop(self) -> None:
         """Let what is queued finish, and end the thread."""
@@ -53,20 +62,27 @@ def _quit_later() -> None:
 _COLOUR_TYPES = {1: 0, 3: 2, 4: 6}
 
 
-def png(frame: np.ndarray) -> bytes:
-    """Return a picture as a PNG file.
+def picture(frame: object) -> np.ndarray:
+    """Return what an environment drew as a uint8 array of shape (height, width, channels).
 
     Args:
         frame: uint8 array of shape (height, width), (height, width, 1), (height, width, 3) for
             RGB or (height, width, 4) for RGBA.
 
     Raises:
-        ValueError: for another dtype or shape.
+        ValueError: for anything else.
     """
+    if not isinstance(frame, np.ndarray):
+        raise ValueError(f"no picture: {type(frame).__name__}")
     if frame.ndim == 2:
         frame = frame[:, :, np.newaxis]
     if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] not in _COLOUR_TYPES:
         raise ValueError(f"no picture: {frame.dtype} of shape {frame.shape}")
+    return frame
+
+
+def png(frame: np.ndarray) -> bytes:
+    """Return a ``picture()`` as a PNG file."""
     height, width, channels = frame.shape
     # Each row starts with the number of its filter: 0, none.
     rows = np.zeros((height, 1 + width * channels), dtype=np.uint8)

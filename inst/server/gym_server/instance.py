@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import gymnasium
+import numpy as np
 
 from gym_server import spaces
 from gym_server.creation import ask
 from gym_server.errors import GymServerError, unknown_instance
-from gym_server.frames import RenderThread, png
+from gym_server.frames import RenderThread, picture
 from gym_server.monitor import Monitor
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.plain import plain
+from gym_server.wrappers import Wrapper, draws_when_stepped
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,7 @@ class Choices:
     seed: int | None = None
     render_mode: str | None = None
     kwargs: dict | None = None
+    wrappers: tuple[Wrapper, ...] = ()
 
 
 class Instance:
@@ -49,12 +52,14 @@ class Instance:
         self.observation_space = env.observation_space
         self.action_space_info = spaces.describe(self.action_space)
         self.observation_space_info = spaces.describe(self.observation_space)
+        self._observes_tensors = spaces.travels_as_tensors(self.observation_space)
         # Whoever reads it can create another: with the module, and with the version found.
         module, colon, name = str(choices.env_id).rpartition(":")
         self.env_id = f"{module}{colon}{env.spec.id if env.spec else name}"
         self._env = env
         self._choices = choices
         self._renderer = renderer
+        self._draws_when_stepped = draws_when_stepped(env)
         self._lock = threading.Lock()
         self._closed = False
         self._monitor: Monitor | None = None
@@ -67,22 +72,24 @@ class Instance:
         if choices.seed is not None:
             self.action_space.seed(choices.seed)
 
-    def reset(self, seed: int | None, options: dict | None) -> dict:
+    def reset(self, seed: int | None, options: dict | None, tensors: bool = False) -> dict:
         """Start an episode.
 
         Args:
             seed: seeds the environment and the action space; None leaves both as they are, or
                 takes the seed given at creation the first time.
             options: the environment's own.
+            tensors: whether the observation is wanted as tensors.
 
         Returns:
-            ``{"observation", "info"}`` as JSON values.
+            ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
+            are wanted and its space can travel so.
         """
         with self._held():
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed
             self._was_reset = False
-            observation, info = ask(lambda: reset(seed=seed_to_use, options=options))
+            observation, info = ask(self._move, lambda: reset(seed=seed_to_use, options=options))
             if seed is None:
                 self._seed_for_reset = None
             else:
@@ -91,19 +98,20 @@ class Instance:
             self._done = False
             self._episode_steps = 0
             return {
-                "observation": ask(spaces.encode, self.observation_space, observation),
+                "observation": ask(self._encode, observation, tensors),
                 "info": ask(plain, info) if info else {},
             }
 
-    def step(self, action: object) -> dict:
+    def step(self, action: object, tensors: bool = False) -> dict:
         """Take one step.
 
         Args:
-            action: the JSON value of a member of the action space.
+            action: the JSON value of a member of the action space, or the member as ``Parts``.
+            tensors: whether the observation is wanted as tensors.
 
         Returns:
             ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
-            values.
+            values; the observation as for ``reset()``.
 
         Raises:
             GymServerError: ``reset_needed`` or ``action_not_in_space``, both before the
@@ -113,20 +121,20 @@ class Instance:
             if not self._was_reset:
                 raise _reset_needed("step()")
             try:
-                decoded = spaces.decode(self.action_space, action)
+                decoded = self._decode(action)
             except spaces.NotInSpace as refusal:
                 raise GymServerError("action_not_in_space", f"The action {refusal}") from None
-            return ask(self._step, decoded)
+            return ask(self._step, decoded, tensors)
 
-    def _step(self, action: object) -> dict:
+    def _step(self, action: object, tensors: bool) -> dict:
         step = self._monitor.step if self._monitor else self._env.step
-        observation, reward, terminated, truncated, info = step(action)
+        observation, reward, terminated, truncated, info = self._move(step, action)
         terminated, truncated = bool(terminated), bool(truncated)
         self._steps += 1
         self._episode_steps += 1
         self._done = terminated or truncated
         return {
-            "observation": spaces.encode(self.observation_space, observation),
+            "observation": self._encode(observation, tensors),
             "reward": float(reward),
             "done": self._done,
             "terminated": terminated,
@@ -134,6 +142,21 @@ class Instance:
             # Converted while the environment cannot change it.
             "info": plain(info) if info else {},
         }
+
+    def _move(self, move: Callable, *args: object) -> tuple:
+        if self._draws_when_stepped:
+            return self._renderer.run(move, *args)
+        return move(*args)
+
+    def _encode(self, observation: object, tensors: bool) -> object:
+        if tensors and self._observes_tensors:
+            return spaces.encode_tensors(self.observation_space, "observation", observation)
+        return spaces.encode(self.observation_space, observation)
+
+    def _decode(self, action: object) -> object:
+        if isinstance(action, spaces.Parts):
+            return spaces.decode_tensors(self.action_space, "action", action)
+        return spaces.decode(self.action_space, action)
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
@@ -148,8 +171,8 @@ class Instance:
         """Answer a client's "contains"; see ``spaces.contains()``."""
         return spaces.contains(self.observation_space, self.observation_space_info, claim)
 
-    def render(self) -> bytes:
-        """Draw the current state as a PNG.
+    def render(self) -> np.ndarray:
+        """Draw the current state; see ``frames.picture()`` for the array.
 
         Raises:
             GymServerError: ``cannot_render`` or ``reset_needed``.
@@ -163,8 +186,8 @@ class Instance:
                 raise _reset_needed("render()")
             frame = ask(self._renderer.run, self._env.render)
         try:
-            return png(frame)
-        except (ValueError, AttributeError) as error:
+            return picture(frame)
+        except ValueError as error:
             raise GymServerError(
                 "cannot_render", f"What {self.env_id} draws is no picture: {error}"
             ) from error
@@ -226,6 +249,7 @@ class Instance:
             "lanes": 1,
             "render_mode": self._choices.render_mode or self._env.render_mode,
             "kwargs": self._choices.kwargs or {},
+            "wrappers": [wrapper._asdict() for wrapper in self._choices.wrappers],
             "seed": self._choices.seed,
             "age_seconds": now - self._made,
             "idle_seconds": now - self._used,

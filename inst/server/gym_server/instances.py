@@ -8,7 +8,7 @@ import secrets
 import threading
 from collections.abc import Collection
 
-from gym_server import creation
+from gym_server import creation, registry, wrappers
 from gym_server.errors import GymServerError, unknown_instance
 from gym_server.frames import RenderThread
 from gym_server.instance import Choices, Instance
@@ -33,23 +33,36 @@ class Instances:
         self._stopping = False
 
     def create(self, choices: Choices) -> str:
-        """Make an environment and return its instance_id, 8 hex digits."""
+        """Make an environment and return its instance_id, 8 hex digits.
+
+        Raises:
+            GymServerError: see ``creation.make()``, ``wrappers.wrap()`` and ``Instance``;
+                ``shutting_down``.
+        """
+        # Before an environment is made for nothing.
+        wrappers.check_names(choices.wrappers)
         env = creation.make(
             choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
         )
         try:
+            env = wrappers.wrap(env, choices.wrappers, self._renderer)
             instance = Instance(env, choices, self._renderer)
             with self._lock:
                 if self._stopping:
                     raise GymServerError("shutting_down", "The server is stopping")
                 instance.instance_id = self._new_id()
                 self._instances[instance.instance_id] = instance
+            log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
             return instance.instance_id
         except Exception:
             # What the client must hear of is why it gets no instance.
             with contextlib.suppress(Exception):
                 self._renderer.run(env.close)
             raise
+
+    def registered(self, search: str | None) -> list[dict]:
+        """Return what can be created; see ``registry.search()``."""
+        return registry.search(search, self._allowed_modules)
 
     def get(self, instance_id: str) -> Instance:
         """Return an instance.
@@ -74,6 +87,7 @@ class Instances:
         if instance is None:
             raise unknown_instance(instance_id)
         instance.close()
+        log.info("Closed instance %s", instance_id)
 
     def close_all(self) -> None:
         """Close every instance and take no more."""

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from gym_server import __version__, wire
+from gym_server.tensors import TENSORS
 
 if TYPE_CHECKING:
     from gym_server.routes import Route
@@ -47,26 +48,68 @@ def _operation(route: Route) -> dict:
         "operationId": route.handler.__name__,
         "summary": doc.split("\n")[0],
         "responses": {
-            str(route.status): {"description": route.answer},
+            str(route.status): _answer(route),
             "default": {
                 "description": "What went wrong.",
-                "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Error"}}},
+                "content": {wire.JSON: {"schema": {"$ref": "#/components/schemas/Error"}}},
             },
         },
     }
-    names = re.findall(r"<(\w+)>", route.path)
-    if names:
-        operation["parameters"] = [
-            {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-            for name in names
-        ]
-    fields = (*route.fields, wire.REQUEST) if route.once else route.fields
-    if fields:
-        operation["requestBody"] = {
-            "required": any(field.required for field in fields),
-            "content": {"application/json": {"schema": _body(fields)}},
-        }
+    parameters = [
+        {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
+        for name in re.findall(r"<(\w+)>", route.path)
+    ]
+    if route.method == "GET":
+        parameters += map(_query, route.fields)
+    elif fields := (*route.fields, wire.REQUEST) if route.once else route.fields:
+        operation["requestBody"] = _request_body(route, fields)
+    if parameters:
+        operation["parameters"] = parameters
     return operation
+
+
+def _answer(route: Route) -> dict:
+    if not route.answer:
+        answer: dict = {"description": "Done."}
+        if route.once:
+            answer["headers"] = {
+                "Gym-Request": {
+                    "description": "Key and number of the request, when it had them.",
+                    "schema": {"type": "string"},
+                }
+            }
+        return answer
+    is_json = route.content_type == wire.JSON
+    content: dict = {route.content_type: {"schema": {"type": "object"}} if is_json else {}}
+    if route.tensors:
+        # Raw bytes have no schema.
+        content[TENSORS] = {}
+    return {"description": route.answer, "content": content}
+
+
+def _query(field: Field) -> dict:
+    return {
+        "name": field.name,
+        "in": "query",
+        "required": field.required,
+        "description": field.doc,
+        "schema": field.kind.schema,
+    }
+
+
+def _request_body(route: Route, fields: Iterable[Field]) -> dict:
+    body = {
+        "required": any(field.required for field in fields),
+        "content": {wire.JSON: {"schema": _body(fields)}},
+    }
+    if route.tensor_body:
+        body["content"][TENSORS] = {}
+        body["description"] = (
+            "As tensors: one safetensors file of the tensors 'action' (parts of nested ones by "
+            "JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so "
+            "are 'texts', an object of those by name."
+        )
+    return body
 
 
 def _body(fields: Iterable[Field]) -> dict:

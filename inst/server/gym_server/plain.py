@@ -12,7 +12,7 @@ NONFINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
 # Deeper than any honest info, and shallow enough for the JSON encoder's own recursion;
 # a structure that contains itself ends here.
-_DEEPEST = 64
+_DEEPEST = 128
 
 
 def plain(value: object, depth: int = 0) -> object:

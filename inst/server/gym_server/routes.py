@@ -6,16 +6,20 @@ import os
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import gymnasium
 import numpy
 
 from gym_server import __version__, openapi, wire
 from gym_server.errors import GymServerError
+from gym_server.frames import png
 from gym_server.instance import Choices, Instance
 from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
-from gym_server.wire import Field, Png
+from gym_server.tensors import TENSORS, Tensor
+from gym_server.tensors import write as write_tensors
+from gym_server.wire import Content, Field
 
 
 @dataclass(frozen=True)
@@ -40,14 +44,16 @@ class Call:
     Attributes:
         services: what to work on.
         path: the variable parts of the URL.
-        body: the request's JSON object.
+        body: the request's JSON object, or the query of a GET.
         fields: the values of the fields that the route declares; None for absent ones.
+        tensors: whether the client wants tensors where the route has them.
     """
 
     services: Services
     path: dict[str, str]
     body: dict
     fields: dict
+    tensors: bool = False
 
     @property
     def instance(self) -> Instance:
@@ -55,7 +61,7 @@ class Call:
         return self.services.instances.get(self.path["instance_id"])
 
 
-Handler = Callable[[Call], dict | Png | None]
+Handler = Callable[[Call], dict | Content | None]
 
 
 @dataclass(frozen=True)
@@ -65,19 +71,25 @@ class Route:
     Attributes:
         method: "GET" or "POST".
         path: Flask's rule, which also matches without its last slash.
-        fields: what the body may hold.
-        handler: returns a JSON object, an image, or None for 204.
+        fields: what the body may hold, or the query of a GET.
+        handler: returns a JSON object, a content of its own, or None for 204.
         answer: what the answer holds, in words.
         once: whether the body may also number the request, which is then done once however
             often it arrives.
+        content_type: what an ordinary answer is.
+        tensors: whether the answer may also be tensors, when the client accepts them.
+        tensor_body: whether the body may also be tensors.
     """
 
     method: str
     path: str
     fields: tuple[Field, ...]
     handler: Handler
-    answer: str
+    answer: str = ""
     once: bool = False
+    content_type: str = wire.JSON
+    tensors: bool = False
+    tensor_body: bool = False
 
     @property
     def status(self) -> int:
@@ -90,11 +102,11 @@ ROUTES: list[Route] = []
 _INSTANCE = "/v1/envs/<instance_id>/"
 
 
-def _route(
-    method: str, path: str, *fields: Field, answer: str = "", once: bool = False
-) -> Callable[[Handler], Handler]:
+def _route(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Handler], Handler]:
+    """Declare a handler as a route; ``how`` are the later attributes of Route."""
+
     def declare(handler: Handler) -> Handler:
-        ROUTES.append(Route(method, path, fields, handler, answer, once))
+        ROUTES.append(Route(method, path, fields, handler, **how))
         return handler
 
     return declare
@@ -107,14 +119,21 @@ def _route(
     Field("seed", wire.INTEGER, "Seeds the action space, and the first reset without a seed."),
     Field("render_mode", wire.TEXT, "rgb_array (the default where it is supported) or human."),
     Field("kwargs", wire.OBJECT, "Handed to the environment."),
-    *map(wire.not_yet, ("num_envs", "vectorization_mode", "autoreset_mode", "wrappers")),
+    Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    *map(wire.not_yet, ("num_envs", "vectorization_mode", "autoreset_mode")),
     answer="instance_id",
     once=True,
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = call.fields
-    choices = Choices(fields["env_id"], fields["seed"], fields["render_mode"], fields["kwargs"])
+    choices = Choices(
+        fields["env_id"],
+        fields["seed"],
+        fields["render_mode"],
+        fields["kwargs"],
+        fields["wrappers"] or (),
+    )
     return {"instance_id": call.services.instances.create(choices)}
 
 
@@ -138,10 +157,11 @@ def env_about(call: Call) -> dict:
     wire.not_yet("reset_mask"),
     answer="observation, info",
     once=True,
+    tensors=True,
 )
 def env_reset(call: Call) -> dict:
     """Start an episode."""
-    return call.instance.reset(call.fields["seed"], call.fields["options"])
+    return call.instance.reset(call.fields["seed"], call.fields["options"], call.tensors)
 
 
 @_route(
@@ -151,10 +171,12 @@ def env_reset(call: Call) -> dict:
     Field("render", wire.BOOLEAN, "Classic; a frame is drawn when somebody asks for it."),
     answer="observation, reward, done, terminated, truncated, info",
     once=True,
+    tensors=True,
+    tensor_body=True,
 )
 def env_step(call: Call) -> dict:
     """Take one step."""
-    return call.instance.step(call.fields["action"])
+    return call.instance.step(call.fields["action"], call.tensors)
 
 
 @_route("GET", _INSTANCE + "action_space/", answer="info: the space")
@@ -197,10 +219,19 @@ def env_observation_space_contains(call: Call) -> dict:
     return {"member": call.instance.observation_contains(call.body)}
 
 
-@_route("GET", _INSTANCE + "render/", answer="the current frame, image/png")
-def env_render(call: Call) -> Png:
+@_route(
+    "GET",
+    _INSTANCE + "render/",
+    answer="the current frame",
+    content_type="image/png",
+    tensors=True,
+)
+def env_render(call: Call) -> Content:
     """Draw the current state."""
-    return Png(call.instance.render())
+    frame = call.instance.render()
+    if call.tensors:
+        return Content(write_tensors({"frame": Tensor.of(frame)}, {}), TENSORS)
+    return Content(png(frame), "image/png")
 
 
 @_route(
@@ -257,6 +288,17 @@ def shutdown(call: Call) -> dict:
     """Answer the requests under way and stop the server."""
     call.services.stop()
     return {"message": "Server shutting down"}
+
+
+@_route(
+    "GET",
+    "/v1/registry/",
+    Field("search", wire.TEXT, "A part of the id; when it is part of none, the nearest ids."),
+    answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available",
+)
+def env_registry(call: Call) -> dict:
+    """List what can be created."""
+    return {"environments": call.services.instances.registered(call.fields["search"])}
 
 
 @_route("GET", "/v1/health/", answer="status, instances, versions, pid")

@@ -8,9 +8,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from gym_server.errors import GymServerError, invalid_parameter, missing_parameter
 from gym_server.exactly_once import RequestId
 from gym_server.plain import plain
+from gym_server.spaces import Parts
+from gym_server.tensors import TENSORS, Tensor, malformed_tensors
+from gym_server.tensors import read as read_tensors
+from gym_server.tensors import write as write_tensors
+from gym_server.wrappers import Wrapper
 
 JSON = "application/json"
 
@@ -55,6 +62,40 @@ def loads(raw: bytes) -> dict:
         )
     return body
 
+
+def loads_tensors(raw: bytes) -> dict:
+    """Return the fields in a request's body that is a safetensors file.
+
+    Args:
+        raw: the body; its metadata holds the other fields as JSON, and the texts by name.
+
+    Returns:
+        What ``loads()`` returns, but an action is ``Parts``.
+
+    Raises:
+        GymServerError: ``malformed_tensors``.
+    """
+    file = read_tensors(raw)
+    body = {name: _json_metadata(name, text) for name, text in file.metadata.items()}
+    texts = body.pop("texts", {})
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise malformed_tensors("the metadata 'texts' is no JSON object of texts")
+    if any(name.partition("/")[0] == "action" for name in (*file.tensors, *texts)):
+        body["action"] = Parts(file.tensors, texts)
+    return body
+
+
+def _json_metadata(name: str, text: str) -> object:
+    if name not in _JSON_METADATA:
+        return None
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise malformed_tensors(f"the metadata {name!r} is not valid JSON: {error}") from None
+
+
+# Writers such as safetensors' own add texts of theirs ("format": "pt").
+_JSON_METADATA = ("render", "request", "texts")
 
 _KIND_NAMES = {
     bool: "a boolean",
@@ -149,6 +190,16 @@ def _object(value: object) -> dict:
     return value
 
 
+def _wrappers(value: object) -> tuple[Wrapper, ...]:
+    if not isinstance(value, list):
+        raise ValueError
+    wrappers = [
+        Wrapper(_text(item.get("name")), _object(item.get("kwargs") or {}))
+        for item in map(_object, value)
+    ]
+    return tuple(wrappers)
+
+
 def _video_callable(value: object) -> int:
     """Return 0 for no videos, n for every n-th episode."""
     if isinstance(value, (bool, str)):
@@ -178,6 +229,18 @@ BOOLEAN = Kind({"type": "boolean"}, "true or false", _boolean)
 INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 TEXT = Kind({"type": "string"}, "a string", _text)
 OBJECT = Kind({"type": "object"}, "an object", _object)
+WRAPPERS = Kind(
+    {
+        "type": "array",
+        "items": {
+            "type": "object",
+            "required": ["name"],
+            "properties": {"name": {"type": "string"}, "kwargs": {"type": "object"}},
+        },
+    },
+    'a list of objects of a "name" and "kwargs"',
+    _wrappers,
+)
 VIDEO_CALLABLE = Kind(
     {"type": ["boolean", "integer"], "minimum": 0},
     "true, false or an integer n for every n-th episode",
@@ -222,29 +285,53 @@ class Answer(NamedTuple):
     headers: tuple[tuple[str, str], ...] = ()
 
 
-def answer(result: dict | Png | None, request_id: RequestId | None, status: int = 200) -> Answer:
+class Content(NamedTuple):
+    """A result that is no JSON."""
+
+    data: bytes
+    content_type: str
+
+
+def answer(
+    result: dict | Content | None, request_id: RequestId | None, status: int = 200
+) -> Answer:
     """Put a route's result into an answer.
 
     Args:
-        result: a JSON object, an image, or None for an answer without content (204).
+        result: a JSON object, whose observation may be tensors, a content of its own, or None
+            for an answer without content (204).
         request_id: what the client called its request, echoed when given.
         status: the HTTP status of a JSON answer.
     """
-    if isinstance(result, Png):
-        return Answer(200, result.data, "image/png")
+    if isinstance(result, Content):
+        return Answer(200, *result)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default type here.
         return Answer(204, b"", "text/html; charset=utf-8", headers)
     if request_id is not None:
         result = {**result, "request": request_id._asdict()}
+    if isinstance(result.get("observation"), Parts):
+        return Answer(status, _dumps_tensors(**result), TENSORS)
     return Answer(status, dumps(result))
 
 
-class Png(NamedTuple):
-    """A PNG image."""
+def _dumps_tensors(observation: Parts, **others: object) -> bytes:
+    """Return a reset's or a step's result as a safetensors file."""
+    tensors = dict(observation.tensors)
+    for name, dtype in _SCALARS.items():
+        if name in others:
+            tensors[name] = Tensor.of(np.array(others[name], dtype))
+    metadata = {name: others[name] for name in ("info", "request") if name in others}
+    if observation.texts:
+        metadata["texts"] = observation.texts
+    return write_tensors(
+        tensors, {name: dumps(value).decode("ascii") for name, value in metadata.items()}
+    )
 
-    data: bytes
+
+# What an answer holds beside the observation; done is one of the two flags.
+_SCALARS = {"reward": np.float64, "terminated": np.bool_, "truncated": np.bool_}
 
 
 def parse_path_value(text: str) -> object:

@@ -150,8 +150,35 @@ class OldRenderModes(Counting):
     metadata = {"render_modes": ["ansi"]}  # noqa: RUF012
 
 
-class DictSpace(Counting):
-    observation_space = spaces.Dict({"camera": spaces.Discrete(3)})
+class Nested(Counting):
+    """Observes the action that it got, of all kinds that travel as tensors."""
+
+    action_space = observation_space = spaces.Dict(
+        {
+            "a/b~": spaces.Tuple([spaces.Discrete(3, start=-1), spaces.Box(0, 1, (1,), float)]),
+            "pixels": spaces.Box(0, 255, (2, 2), np.uint8),
+            "word": spaces.Text(2, charset="aä"),
+        }
+    )
+
+    def observe(self):
+        self.observation_space.seed(0)
+        return self.observation_space.sample()
+
+    def step(self, action):
+        return action, 0.0, False, False, {}
+
+
+class Letters(Counting):
+    """Spaces that travel as JSON only."""
+
+    action_space = observation_space = spaces.Sequence(spaces.Discrete(26))
+
+    def observe(self):
+        return (1, 2)
+
+    def step(self, action):
+        return action, 0.0, False, False, {}
 
 
 class OwnSpace(spaces.Space):
@@ -178,12 +205,13 @@ _NAMED = ("inf", "-inf")
 for _kind in (
     Counting,
     CustomSpace,
-    DictSpace,
     Drawing,
     Echo,
     ExitsInStep,
     Hanging,
+    Letters,
     LongDouble,
+    Nested,
     NotANumber,
     OldRenderModes,
     RaisesInClose,

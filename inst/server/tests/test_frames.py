@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from gym_server.frames import RenderThread, png
+from gym_server.frames import RenderThread, picture, png
 
 
 def decode(data):
@@ -28,7 +28,7 @@ def decode(data):
 @pytest.mark.parametrize("shape", [(4, 6, 3), (4, 6, 4), (4, 6, 1), (4, 6)])
 def test_a_png_holds_every_pixel(shape):
     frame = np.arange(np.prod(shape), dtype=np.uint8).reshape(shape)
-    assert np.array_equal(decode(png(frame)), frame.reshape(4, 6, -1))
+    assert np.array_equal(decode(png(picture(frame))), frame.reshape(4, 6, -1))
 
 
 def test_a_frame_may_be_a_transposed_view():
@@ -37,11 +37,12 @@ def test_a_frame_may_be_a_transposed_view():
 
 
 @pytest.mark.parametrize(
-    "frame", [np.zeros((4, 6, 3)), np.zeros((4,), np.uint8), np.zeros((4, 6, 2), np.uint8)]
+    "frame",
+    [np.zeros((4, 6, 3)), np.zeros((4,), np.uint8), np.zeros((4, 6, 2), np.uint8), None, "ansi"],
 )
 def test_what_is_no_picture_is_refused(frame):
     with pytest.raises(ValueError, match="no picture"):
-        png(frame)
+        picture(frame)
 
 
 def test_everything_is_drawn_on_one_thread():
@@ -73,4 +74,11 @@ def test_pygame_outlives_an_environment_that_quits_it():
     renderer.run(pygame.font.init)
     renderer.run(lambda: (pygame.display.quit(), pygame.quit()))
     assert renderer.run(pygame.font.get_init)
+    renderer.stop()
+
+
+def test_drawing_may_call_for_drawing():
+    renderer = RenderThread()
+    threads = renderer.run(lambda: (threading.get_ident(), renderer.run(threading.get_ident)))
+    assert threads[0] == threads[1] != threading.get_ident()
     renderer.stop()

@@ -200,6 +200,7 @@ def test_all_about_an_instance(client, create):
         "lanes": 1,
         "render_mode": "human",
         "kwargs": {"sutton_barto_reward": True},
+        "wrappers": [],
         "seed": 3,
         "steps": 1,
         "episode_steps": 1,

@@ -98,7 +98,7 @@ def test_calls_of_one_environment_wait_for_each_other(client, faulty, in_backgro
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("DictSpace", "Dict"), ("CustomSpace", "OwnSpace"), ("LongDouble", "Box")],
+    [("CustomSpace", "OwnSpace"), ("LongDouble", "Box")],
 )
 def test_an_environment_whose_space_is_not_supported_is_refused_by_name(client, name, kind):
     answer = client.post("/v1/envs/", json={"env_id": f"faulty_envs:{name}-v0"})

@@ -1,5 +1,6 @@
 import json
 
+import openapi_spec_validator
 import pytest
 
 from gym_server.openapi import document
@@ -35,3 +36,40 @@ def test_every_route_is_described(route):
 def test_operation_ids_are_unique():
     names = [route.handler.__name__ for route in ROUTES]
     assert len(names) == len(set(names))
+
+
+def test_the_document_is_valid(client):
+    openapi_spec_validator.validate(client.get("/v1/openapi.json").json)
+
+
+def test_tensors_stand_where_they_are_taken_and_given():
+    paths = document(ROUTES)["paths"]
+    tensors = "application/x-safetensors"
+    given = {
+        operation["operationId"]
+        for methods in paths.values()
+        for operation in methods.values()
+        if tensors in operation["responses"].get("200", {}).get("content", {})
+    }
+    taken = {
+        operation["operationId"]
+        for methods in paths.values()
+        for operation in methods.values()
+        if tensors in operation.get("requestBody", {}).get("content", {})
+    }
+    assert given == {"env_reset", "env_step", "env_render"}
+    assert taken == {"env_step"}
+
+
+def test_the_query_of_a_get_is_no_body():
+    operation = document(ROUTES)["paths"]["/v1/registry/"]["get"]
+    assert "requestBody" not in operation
+    assert [(p["name"], p["in"]) for p in operation["parameters"]] == [("search", "query")]
+
+
+@pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.handler.__name__)
+def test_every_kind_of_answer_is_named(route):
+    operation = document([route])["paths"].popitem()[1][route.method.lower()]
+    content = operation["responses"][str(route.status)].get("content", {})
+    assert (route.content_type in content) is (route.status == 200)
+    assert operation["responses"]["default"]["content"]["application/json"]

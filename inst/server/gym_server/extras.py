@@ -1,0 +1,77 @@
+"""What environments need beyond the server's own dependencies: the extras of its package."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import sys
+
+from gymnasium.envs.registration import EnvSpec
+
+from gym_server.errors import GymServerError
+
+# What pyproject.toml says of each extra.
+REQUIREMENTS = {
+    "toy-text": ("gymnasium[toy-text]",),
+    "box2d": ("gymnasium[box2d]",),
+    "mujoco": ("gymnasium[mujoco]",),
+    "atari": ("gymnasium[atari]", "opencv-python-headless"),
+    "video": ("moviepy",),
+}
+
+# By the package that an environment comes from: its extra, and the module that the extra brings.
+_PACKAGES = {
+    "gymnasium.envs.toy_text": ("toy-text", "pygame"),
+    "gymnasium.envs.box2d": ("box2d", "Box2D"),
+    "gymnasium.envs.mujoco": ("mujoco", "mujoco"),
+    "gymnasium.envs.phys2d": (None, "jax"),
+    "gymnasium.envs.tabular": (None, "jax"),
+    "ale_py": ("atari", "ale_py"),
+}
+
+# Gymnasium refuses to make it with a later MuJoCo, which computes something else.
+_BEFORE_MUJOCO_3 = ("Pusher-v4",)
+
+
+def extra_of(spec: EnvSpec) -> str | None:
+    """Return the extra that an environment needs, or None."""
+    return _needs(spec)[0]
+
+
+def is_available(spec: EnvSpec) -> bool:
+    """Tell whether what an environment needs is installed, without importing it."""
+    if not isinstance(spec.entry_point, str):
+        # Gymnasium's word for an environment that has moved away is a function that raises.
+        return spec.entry_point is not None and not spec.entry_point.__name__.startswith("_raise")
+    _, module = _needs(spec)
+    if spec.id in _BEFORE_MUJOCO_3 and _is_installed("mujoco"):
+        return int(importlib.metadata.version("mujoco").partition(".")[0]) < 3
+    return _is_installed(spec.entry_point.partition(":")[0]) and (
+        module is None or _is_installed(module)
+    )
+
+
+def missing_extra(what: str, extra: str) -> GymServerError:
+    """Something cannot be had without an extra of the server."""
+    wanted = " ".join(f'"{requirement}"' for requirement in REQUIREMENTS[extra])
+    return GymServerError(
+        "missing_dependency",
+        f"{what} needs the server's extra '{extra}'",
+        f'"{sys.executable}" -m pip install {wanted}',
+    )
+
+
+def _needs(spec: EnvSpec) -> tuple[str | None, str | None]:
+    if isinstance(spec.entry_point, str):
+        for package, needs in _PACKAGES.items():
+            if spec.entry_point.startswith((f"{package}.", f"{package}:")):
+                return needs
+    return None, None
+
+
+def _is_installed(module: str) -> bool:
+    # Only the package itself is looked for: looking inside it would import it.
+    package = module.partition(".")[0]
+    if package in sys.modules:
+        return sys.modules[package] is not None
+    return importlib.util.find_spec(package) is not None

@@ -1,0 +1,78 @@
+"""What MuJoCo needs of its host: OpenGL without a display, and somebody who hears it warn."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import logging
+import os
+import sys
+
+log = logging.getLogger(__name__)
+
+# https://registry.khronos.org/EGL/extensions/EXT/EGL_EXT_platform_device.txt
+_EGL_PLATFORM_DEVICE_EXT = 0x313F
+
+
+def choose_gl() -> None:
+    """Name the kind of OpenGL that works here, unless MUJOCO_GL names one.
+
+    MuJoCo reads the variable when it is first imported.  Left to itself it opens a window,
+    which fails on a Linux machine without a display, and ends the process on macOS, where only
+    the main thread may do so.
+    """
+    if "MUJOCO_GL" in os.environ:
+        return
+    if sys.platform == "darwin":
+        _choose_cgl()
+    elif sys.platform.startswith("linux") and not _has_display():
+        if _has_egl():
+            os.environ["MUJOCO_GL"] = "egl"
+        elif ctypes.util.find_library("OSMesa"):
+            os.environ["MUJOCO_GL"] = "osmesa"
+
+
+def log_warnings() -> None:
+    """Let MuJoCo warn in the server's log; it would write a file into the working directory."""
+    import mujoco
+
+    mujoco.set_mju_user_warning(lambda words: log.warning("MuJoCo: %s", words))
+
+
+def _has_display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _choose_cgl() -> None:
+    # Gymnasium's list of renderers lacks the one that needs no window.
+    os.environ["MUJOCO_GL"] = "cgl"
+    from gymnasium.envs.mujoco import mujoco_rendering
+    from mujoco.cgl import GLContext
+
+    mujoco_rendering._ALL_RENDERERS.setdefault("cgl", GLContext)
+
+
+def _has_egl() -> bool:
+    """Tell whether EGL has a device that can be opened, as MuJoCo will do."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    pointer = ctypes.c_void_p
+    egl.eglGetProcAddress.restype = pointer
+    query_at = egl.eglGetProcAddress(b"eglQueryDevicesEXT")
+    display_at = egl.eglGetProcAddress(b"eglGetPlatformDisplayEXT")
+    if not query_at or not display_at:
+        return False
+    query = ctypes.CFUNCTYPE(
+        ctypes.c_uint, ctypes.c_int, ctypes.POINTER(pointer), ctypes.POINTER(ctypes.c_int)
+    )(query_at)
+    display_of = ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)(display_at)
+    devices, found = (pointer * 16)(), ctypes.c_int()
+    if not query(16, devices, ctypes.byref(found)):
+        return False
+    egl.eglInitialize.argtypes = (pointer, pointer, pointer)
+    displays = (
+        display_of(_EGL_PLATFORM_DEVICE_EXT, device, None) for device in devices[: found.value]
+    )
+    return any(display and egl.eglInitialize(display, None, None) for display in displays)

@@ -1,0 +1,41 @@
+"""Spaces on the wire: describe them, encode their members, decode what a client sends.
+
+Each of the three is a ``functools.singledispatch`` function; every kind of space registers its
+own in a file of its name.  ``tensor_parts`` encodes and decodes members as tensors.
+"""
+
+# Importing a kind registers it.
+from gym_server.spaces import (  # noqa: F401
+    box,
+    dict_,
+    discrete,
+    graph,
+    multi_binary,
+    multi_discrete,
+    one_of,
+    sequence,
+    text,
+    tuple_,
+)
+from gym_server.spaces.kinds import NotInSpace, brief_space, decode, encode
+from gym_server.spaces.membership import contains
+from gym_server.spaces.support import describe
+from gym_server.spaces.tensor_parts import (
+    Parts,
+    decode_tensors,
+    encode_tensors,
+    travels_as_tensors,
+)
+
+__all__ = [
+    "NotInSpace",
+    "Parts",
+    "brief_space",
+    "contains",
+    "decode",
+    "decode_tensors",
+    "describe",
+    "encode",
+    "encode_tensors",
+    "travels_as_tensors",
+]

@@ -1,0 +1,43 @@
+"""Dict: members by name, each of a space of its own."""
+
+from __future__ import annotations
+
+from gymnasium.spaces import Dict
+
+from gym_server.plain import brief
+from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
+
+
+@description.register
+def _(space: Dict) -> dict[str, object]:
+    return {
+        "name": "Dict",
+        "dtype": None,
+        # A list: not every reader of JSON keeps the order of an object.
+        "spaces": [
+            {"key": str(key), "space": description(part)} for key, part in space.spaces.items()
+        ],
+    }
+
+
+@encode.register
+def _(space: Dict, value: object) -> object:
+    return {
+        str(key): encode(part, value[key])  # type: ignore[index]
+        for key, part in space.spaces.items()
+    }
+
+
+@decode.register
+def _(space: Dict, value: object) -> object:
+    if value == [] and not space.spaces:
+        # R has one empty list for both.
+        return {}
+    if not isinstance(value, dict):
+        raise NotInSpace(space, value, "an object is needed")
+    by_text = {str(key): key for key in space.spaces}
+    for text in by_text.keys() - value.keys():
+        raise NotInSpace(space, value, f"{brief(text)} is missing")
+    for text in value.keys() - by_text.keys():
+        raise NotInSpace(space, value, f"{brief(text)} is none of its keys")
+    return {key: decode_part(space.spaces[key], value[text], text) for text, key in by_text.items()}

@@ -1,0 +1,82 @@
+"""What every kind of space registers, and how a value that is no member is refused."""
+
+from __future__ import annotations
+
+import re
+from functools import singledispatch
+
+from gymnasium.spaces import Space
+
+from gym_server.plain import brief
+
+
+class NotInSpace(Exception):  # noqa: N818 - it answers a question as often as it is an error
+    """A value that is no member of a space."""
+
+    def __init__(self, space: Space, value: object, reason: str = "") -> None:
+        """Say what is not where.
+
+        Args:
+            space: the space that the value should be in; a part of the one that was asked.
+            value: the part of the value that is wrong.
+            reason: what is wrong with it, where space and value do not show it.
+        """
+        super().__init__(space, value, reason)
+        # Steps from the outermost value to this one: the keys and the indices, which begin at 0.
+        self.path: list[str | int] = []
+
+    def __str__(self) -> str:
+        space, value, reason = self.args
+        where = f" at {_written(self.path)}" if self.path else ""
+        because = f": {reason}" if reason else ""
+        return f"{brief(value)}{where} is not in {brief_space(space)}{because}"
+
+
+def _written(path: list[str | int]) -> str:
+    """Return a path as R writes it, ``$position[2]``, with indices that begin at 0."""
+    return "".join(f"[{step}]" if isinstance(step, int) else _named(step) for step in path)
+
+
+def _named(key: str) -> str:
+    return f"${key}" if re.fullmatch(r"[A-Za-z.][\w.]*", key) else f"$`{key}`"
+
+
+def brief_space(space: Space, width: int = 120) -> str:
+    """Return a space as short text, for error messages."""
+    try:
+        text = repr(space)
+    except Exception:
+        # An environment's own, or one that contains itself.
+        text = type(space).__name__
+    return text if len(text) <= width else text[: width - 3] + "..."
+
+
+@singledispatch
+def description(space: Space) -> dict[str, object]:
+    """Return a space's name, dtype and all that its constructor needs, as JSON values."""
+    raise TypeError(f"no description for {type(space).__name__}")
+
+
+@singledispatch
+def encode(space: Space, value: object) -> object:
+    """Return a member of a space as JSON values (floats may still be non-finite)."""
+    raise TypeError(f"no encoding for {type(space).__name__}")
+
+
+@singledispatch
+def decode(space: Space, value: object) -> object:
+    """Return the member of a space that a JSON value stands for, in the space's dtype.
+
+    Raises:
+        NotInSpace: when the value stands for none.
+    """
+    raise TypeError(f"no decoding for {type(space).__name__}")
+
+
+def decode_part(space: Space, value: object, *path: str | int) -> object:
+    """Decode what lies at a path inside a value; a refusal names the path."""
+    try:
+        return decode(space, value)
+    except NotInSpace as refusal:
+        refusal.path[:0] = path
+        raise

@@ -1,0 +1,50 @@
+"""Answer whether a value is a member of a space, or a description its own."""
+
+from __future__ import annotations
+
+import math
+
+from gymnasium.spaces import Space
+
+from gym_server.spaces.arrays import is_number
+from gym_server.spaces.kinds import NotInSpace, decode
+
+
+def contains(space: Space, space_info: dict, claim: dict) -> bool:
+    """Answer "contains" as a client asks it.
+
+    Args:
+        space: the space.
+        space_info: its description.
+        claim: ``{"value": ...}`` asks whether a JSON value stands for a member; anything else is
+            a classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
+            whether all of it is so.
+    """
+    if "value" not in claim:
+        return all(
+            name in space_info and _same(value, space_info[name]) for name, value in claim.items()
+        )
+    try:
+        decode(space, claim["value"])
+    except NotInSpace:
+        return False
+    return True
+
+
+def _same(claimed: object, real: object) -> bool:
+    if isinstance(real, dict):
+        return (
+            isinstance(claimed, dict)
+            and claimed.keys() == real.keys()
+            and all(_same(claimed[name], real[name]) for name in real)
+        )
+    if isinstance(real, list):
+        # R's jsonlite writes a vector of length one as a bare value.
+        claimed = claimed if isinstance(claimed, list) else [claimed]
+        return len(claimed) == len(real) and all(map(_same, claimed, real))
+    if isinstance(real, bool):
+        return claimed is real
+    if is_number(claimed) and isinstance(real, float):
+        # It also writes 15 digits of a bound that has 17.
+        return math.isclose(claimed, real, rel_tol=1e-12)  # type: ignore[arg-type]
+    return type(claimed) is not bool and claimed == real

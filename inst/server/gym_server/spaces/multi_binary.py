@@ -1,0 +1,26 @@
+"""MultiBinary: an array of bits."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium.spaces import MultiBinary
+
+from gym_server.spaces.arrays import Bounds, read_array, read_bit
+from gym_server.spaces.kinds import decode, description, encode
+
+BITS = Bounds(np.int8(0), np.int8(1))
+
+
+@description.register
+def _(space: MultiBinary) -> dict[str, object]:
+    return {"name": "MultiBinary", "shape": list(space.shape), "dtype": space.dtype.name}
+
+
+@encode.register
+def _(space: MultiBinary, value: object) -> object:
+    return np.asarray(value, dtype=space.dtype).tolist()
+
+
+@decode.register
+def _(space: MultiBinary, value: object) -> object:
+    return read_array(space, BITS, read_bit, value)

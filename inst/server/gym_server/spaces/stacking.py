@@ -1,0 +1,60 @@
+"""Members of one space as a batch, as Gymnasium stacks them, and apart again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import singledispatch
+
+import numpy as np
+from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Tuple
+
+
+@singledispatch
+def stack(space: Space, members: list) -> object:
+    """Return members of a space as one batch: arrays with the members along the first axis.
+
+    Tuples and Dicts are stacked part by part; Text, Sequence, Graph and OneOf have no batch but
+    a tuple.
+    """
+    return tuple(members)
+
+
+@stack.register(Box)
+@stack.register(Discrete)
+@stack.register(MultiBinary)
+@stack.register(MultiDiscrete)
+def _(space: Space, members: list) -> object:
+    return np.array(members, dtype=space.dtype).reshape(len(members), *(space.shape or ()))
+
+
+@stack.register
+def _(space: Tuple, members: list) -> object:
+    return tuple(
+        stack(part, [member[index] for member in members])
+        for index, part in enumerate(space.spaces)
+    )
+
+
+@stack.register
+def _(space: Dict, members: list) -> object:
+    return {
+        key: stack(part, [member[key] for member in members]) for key, part in space.spaces.items()
+    }
+
+
+@singledispatch
+def unstack(space: Space, batch: Iterable) -> list:
+    """Return the members of a batch."""
+    return list(batch)
+
+
+@unstack.register
+def _(space: Tuple, batch: Iterable) -> list:
+    parts = [unstack(part, items) for part, items in zip(space.spaces, batch, strict=True)]
+    return list(zip(*parts, strict=True))
+
+
+@unstack.register
+def _(space: Dict, batch: dict) -> list:
+    parts = [unstack(part, batch[key]) for key, part in space.spaces.items()]
+    return [dict(zip(space.spaces, member, strict=True)) for member in zip(*parts, strict=True)]

@@ -1,0 +1,67 @@
+"""Describe a space to clients, or refuse one that the wire has no words for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gymnasium.spaces import Box, Dict, Graph, OneOf, Sequence, Space, Tuple
+
+from gym_server.errors import GymServerError
+from gym_server.spaces.kinds import brief_space, description
+
+# Lists and objects in each other that a member may have as JSON. Python's recursion and that of
+# JSON readers end somewhere, and a space that contains itself must.
+DEEPEST = 100
+
+
+def describe(space: Space) -> dict[str, object]:
+    """Return a space's name, dtype and all that its constructor needs, as JSON values.
+
+    Raises:
+        GymServerError: ``unsupported_space`` for one that cannot be described in full.
+    """
+    _check(space, space, 0)
+    return description(space)
+
+
+def _check(space: Space, whole: Space, depth: int) -> None:
+    if description.dispatch(type(space)) is description.dispatch(object):
+        raise _unsupported(
+            whole,
+            f"spaces of kind {type(space).__name__} are not supported",
+            "supported are " + ", ".join(sorted(_supported())),
+        )
+    if depth + len(space.shape or ()) > DEEPEST:
+        raise _unsupported(whole, f"it is nested deeper than {DEEPEST} levels")
+    if isinstance(space, Box) and space.dtype.kind == "f" and space.dtype.itemsize > 8:
+        raise _unsupported(whole, f"its dtype {space.dtype.name} has more digits than the wire")
+    if isinstance(space, Dict) and len(set(map(str, space.spaces))) < len(space.spaces):
+        raise _unsupported(whole, "two of its keys are the same as text")
+    for part in _parts(space):
+        _check(part, whole, depth + (2 if isinstance(space, Graph) else 1))
+
+
+def _parts(space: Space) -> Iterable[Space]:
+    match space:
+        case Dict():
+            return space.spaces.values()
+        case Tuple() | OneOf():
+            return space.spaces
+        case Sequence():
+            return (space.feature_space,)
+        case Graph():
+            return (part for part in (space.node_space, space.edge_space) if part is not None)
+        case _:
+            return ()
+
+
+def _supported() -> list[str]:
+    return [kind.__name__ for kind in description.registry if kind is not object]
+
+
+def _unsupported(space: Space, reason: str, hint: str | None = None) -> GymServerError:
+    return GymServerError(
+        "unsupported_space",
+        f"This server cannot speak of the space {brief_space(space)}: {reason}",
+        hint,
+    )

@@ -1,0 +1,145 @@
+"""Gymnasium's wrappers around an environment, chosen by name at creation."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+from gymnasium import error
+
+from gym_server.errors import GymServerError
+from gym_server.extras import missing_extra
+from gym_server.frames import RenderThread
+
+# Those that take numbers, texts and lists, keep one environment one environment, and write no
+# files.  (Not: Autoreset, whose resets nobody would see; what takes functions or devices; what
+# opens windows.)
+_ALLOWED = (
+    "AddRenderObservation",
+    "AddWhiteNoise",
+    "AtariPreprocessing",
+    "ClipAction",
+    "ClipReward",
+    "DelayObservation",
+    "DiscretizeAction",
+    "DiscretizeObservation",
+    "DtypeObservation",
+    "FilterObservation",
+    "FlattenObservation",
+    "FrameStackObservation",
+    "GrayscaleObservation",
+    "MaxAndSkipObservation",
+    "NormalizeObservation",
+    "NormalizeReward",
+    "ObstructView",
+    "RecordEpisodeStatistics",
+    "RepeatAction",
+    "RescaleAction",
+    "RescaleObservation",
+    "ReshapeObservation",
+    "ResizeObservation",
+    "StickyAction",
+    "TimeAwareObservation",
+    "TimeLimit",
+)
+
+# Arguments whose lists are arrays, of a space's dtype; Gymnasium wants other lists as tuples.
+_ARRAYS = {
+    "min_action": "action_space",
+    "max_action": "action_space",
+    "min_obs": "observation_space",
+    "max_obs": "observation_space",
+}
+
+# They draw when they are made and in each step.
+_DRAWING = ("AddRenderObservation",)
+
+# Environments whose observation is a picture that they draw themselves, in each step.
+_DRAWING_ENVIRONMENTS = ("gymnasium.envs.box2d.car_racing",)
+
+
+class Wrapper(NamedTuple):
+    """A wrapper that a client chose."""
+
+    name: str
+    kwargs: dict
+
+
+def allowed() -> list[str]:
+    """Return the names of the wrappers that this Gymnasium has and a client may choose."""
+    return [name for name in _ALLOWED if hasattr(gymnasium.wrappers, name)]
+
+
+def check_names(wrappers: Sequence[Wrapper]) -> None:
+    """Raise ``wrapper_not_allowed`` for a wrapper that is not on the list."""
+    for wrapper in wrappers:
+        if wrapper.name not in allowed():
+            raise GymServerError(
+                "wrapper_not_allowed",
+                f"The wrapper '{wrapper.name}' is none that this server takes",
+                f"it takes {', '.join(allowed())}",
+            )
+
+
+def wrap(env: gymnasium.Env, wrappers: Sequence[Wrapper], renderer: RenderThread) -> gymnasium.Env:
+    """Put wrappers around an environment, the first one innermost; see ``check_names()``.
+
+    Raises:
+        GymServerError: ``invalid_kwargs``, ``missing_dependency``.
+    """
+    for wrapper in wrappers:
+        drawing = wrapper.name in _DRAWING
+        env = renderer.run(_wrap, env, wrapper) if drawing else _wrap(env, wrapper)
+    return env
+
+
+def draws_when_stepped(env: gymnasium.Env) -> bool:
+    """Tell whether an environment draws in each reset and step, not only in ``render()``."""
+    if type(env.unwrapped).__module__ in _DRAWING_ENVIRONMENTS:
+        return True
+    while isinstance(env, gymnasium.Wrapper):
+        if type(env).__name__ in _DRAWING:
+            return True
+        env = env.env
+    return False
+
+
+def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
+    kind = getattr(gymnasium.wrappers, wrapper.name)
+    try:
+        # What it does not know says more than what is missing.
+        inspect.signature(kind).bind_partial(env, **wrapper.kwargs)
+        inspect.signature(kind).bind(env, **wrapper.kwargs)
+    except TypeError as failure:
+        raise GymServerError("invalid_kwargs", f"{wrapper.name}: {failure}") from failure
+    try:
+        return kind(
+            env, **{name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}
+        )
+    except error.DependencyNotInstalled as failure:
+        # All of them need OpenCV, which no extra of Gymnasium's own brings alone.
+        raise missing_extra(wrapper.name, "atari") from failure
+    except Exception as failure:
+        words = str(failure) or "it says no more"
+        raise GymServerError(
+            "invalid_kwargs",
+            f"{wrapper.name} cannot wrap this environment: {type(failure).__name__}: {words}",
+        ) from failure
+
+
+def _argument(env: gymnasium.Env, name: str, value: object) -> object:
+    if isinstance(value, list):
+        items = [_argument(env, name, item) for item in value]
+        return _array(getattr(env, _ARRAYS[name]), items) if name in _ARRAYS else tuple(items)
+    # Many of them insist on integers, which a client may write as 4.0.
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _array(space: gymnasium.Space, items: list) -> np.ndarray:
+    array = np.array(items)
+    # Gymnasium warns of precision lost where nothing is.
+    is_float = space.dtype is not None and space.dtype.kind == "f"
+    return array.astype(space.dtype) if is_float else array

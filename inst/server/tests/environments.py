@@ -1,0 +1,56 @@
+"""Every environment that is registered here: which of them run, and why the others do not.
+
+For tests: ``runnable()`` and ``not_runnable()`` are written out from the registry.
+"""
+
+import contextlib
+import importlib
+
+import gymnasium
+from gymnasium.envs.registration import EnvSpec
+
+from gym_server.extras import is_available
+
+with contextlib.suppress(ImportError):
+    importlib.import_module("ale_py")
+
+# Tests register some of their own.
+REGISTERED = [
+    spec
+    for spec in gymnasium.registry.values()
+    if not isinstance(spec.entry_point, type) and not spec.id.startswith("faulty")
+]
+
+
+def family(spec: EnvSpec) -> str:
+    """Return the package's word for environments of a kind, such as ``mujoco``."""
+    if not isinstance(spec.entry_point, str):
+        return "moved away"
+    module = spec.entry_point.partition(":")[0].split(".")
+    return module[2] if module[0] == "gymnasium" else module[0]
+
+
+ATARI = {spec.id for spec in REGISTERED if family(spec) == "ale_py"}
+
+
+def reason(spec: EnvSpec) -> str | None:
+    """Return why an environment cannot run here, or None for one that should."""
+    if not isinstance(spec.entry_point, str):
+        if spec.name.startswith("GymV2"):
+            return "may import any module that its env_id names; the server refuses it"
+        return "MuJoCo v2 and v3 moved to gymnasium-robotics; Gymnasium keeps the name only"
+    if family(spec) in ("phys2d", "tabular"):
+        return None if is_available(spec) else "needs jax, which no extra of the server brings"
+    if spec.id == "Pusher-v4" and not is_available(spec):
+        return "Gymnasium makes it with MuJoCo 2 only"
+    return None if is_available(spec) else f"its extra is not installed ({family(spec)})"
+
+
+def runnable() -> list[str]:
+    """Return the ids that a server here can make."""
+    return [spec.id for spec in REGISTERED if reason(spec) is None]
+
+
+def not_runnable() -> dict[str, str]:
+    """Return the reason by the id of each of the others."""
+    return {spec.id: why for spec in REGISTERED if (why := reason(spec)) is not None}

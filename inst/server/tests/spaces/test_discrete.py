@@ -1,0 +1,31 @@
+import numpy as np
+import pytest
+from gymnasium.spaces import Discrete
+from refusals import refused
+
+from gym_server.spaces import decode, describe
+
+
+def test_a_discrete_space_is_described():
+    assert describe(Discrete(2)) == {"name": "Discrete", "n": 2, "start": 0, "dtype": "int64"}
+    assert describe(Discrete(3, start=-1))["start"] == -1
+
+
+@pytest.mark.parametrize("value", [1, 1.0])
+def test_1_and_1_0_are_the_discrete_action_1(value):
+    action = decode(Discrete(2), value)
+    assert action == 1
+    assert action.dtype == np.int64
+
+
+def test_a_discrete_space_may_begin_elsewhere():
+    space = Discrete(3, start=-1)
+    assert decode(space, -1) == -1
+    assert refused(space, 2)
+
+
+@pytest.mark.parametrize(
+    "value", [2, -1, 0.5, True, "1", None, [1], {}, "NaN", float("nan"), float("inf"), 1e300, 2**70]
+)
+def test_what_is_no_discrete_action_is_refused(value):
+    assert refused(Discrete(2), value)

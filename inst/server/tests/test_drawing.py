@@ -1,0 +1,146 @@
+"""Every family of environments draws, from any thread, while others close, and is recorded."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from conftest import SERVER
+
+from gym_server.extras import is_available
+from gym_server.registry import look_up
+from gym_server.tensors import TENSORS, read
+
+FAMILIES = [
+    "CartPole-v1",
+    "FrozenLake-v1",
+    "Taxi",
+    "LunarLander-v3",
+    "CarRacing-v3",
+    "Ant-v5",
+    "Hopper-v4",
+    "ALE/Pong-v5",
+]
+
+
+@pytest.fixture
+def installed():
+    def installed(env_id):
+        try:
+            return is_available(look_up(env_id))
+        except Exception:
+            return False
+
+    return installed
+
+
+def test_all_families_draw_from_any_thread_while_others_close(app, installed):
+    failures = []
+
+    def draw_and_close(env_id):
+        client = app.test_client()
+        try:
+            for seed in range(2):
+                made = client.post("/v1/envs/", json={"env_id": env_id}).json
+                url = f"/v1/envs/{made['instance_id']}"
+                client.post(f"{url}/reset/", json={"seed": seed})
+                for _ in range(3):
+                    action = client.get(f"{url}/action_space/sample").json["action"]
+                    client.post(f"{url}/step/", json={"action": action})
+                    answer = client.get(f"{url}/render/", headers={"Accept": TENSORS})
+                    assert answer.status_code == 200, answer.json
+                    assert np.ptp(read(answer.data).tensors["frame"].array()) > 50
+                assert client.post(f"{url}/close/").status_code == 204
+        except Exception as failure:
+            failures.append((env_id, failure))
+
+    families = [env_id for env_id in FAMILIES if installed(env_id)]
+    threads = [threading.Thread(target=draw_and_close, args=(e,)) for e in families * 2]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures
+
+
+@pytest.mark.parametrize("env_id", FAMILIES)
+def test_it_is_recorded(client, create, installed, monitor_dir, env_id):
+    pytest.importorskip("moviepy")
+    if not installed(env_id):
+        pytest.skip("not installed")
+    limit = {"name": "TimeLimit", "kwargs": {"max_episode_steps": 3}}
+    url = create(env_id, wrappers=[limit])
+    start = {"directory": "run", "video_callable": True}
+    assert client.post(f"{url}/monitor/start/", json=start).status_code == 204
+    client.post(f"{url}/reset/", json={"seed": 1})
+    done = False
+    while not done:
+        action = client.get(f"{url}/action_space/sample").json["action"]
+        done = client.post(f"{url}/step/", json={"action": action}).json["done"]
+    assert client.post(f"{url}/monitor/close/").status_code == 204
+    assert (monitor_dir / "run" / "rl-video-episode-0.mp4").stat().st_size > 0
+
+
+def test_car_racing_moves_on_the_render_thread(app, create, client, installed, monkeypatch):
+    if not installed("CarRacing-v3"):
+        pytest.skip("not installed")
+    url = create("CarRacing-v3")
+    env = app._instances.get(url.rsplit("/", 1)[1])._env.unwrapped
+    threads = set()
+    for name in ("reset", "step", "render"):
+        original = getattr(env, name)
+
+        def noting(*args, original=original, **kwargs):
+            threads.add(threading.get_ident())
+            return original(*args, **kwargs)
+
+        monkeypatch.setattr(env, name, noting)
+    client.post(f"{url}/reset/")
+    assert client.post(f"{url}/step/", json={"action": [0, 0, 0]}).status_code == 200
+    client.get(f"{url}/render/")
+    assert threads == {app._renderer.run(threading.get_ident)}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="OpenGL without a display")
+@pytest.mark.parametrize(
+    ("variables", "chosen"),
+    [
+        ({}, "egl"),
+        ({"DISPLAY": ":99"}, "None"),
+        ({"WAYLAND_DISPLAY": "x"}, "None"),
+        ({"MUJOCO_GL": "osmesa"}, "osmesa"),
+    ],
+)
+def test_opengl_is_chosen_for_a_machine_without_a_display(variables, chosen):
+    from gym_server import mujoco_setup
+
+    if not mujoco_setup._has_egl():
+        pytest.skip("this machine has no EGL")
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    }
+    code = (
+        "import os; from gym_server import mujoco_setup; mujoco_setup.choose_gl(); "
+        "print(os.environ.get('MUJOCO_GL'))"
+    )
+    command = [sys.executable, "-c", code]
+    output = subprocess.check_output(command, cwd=SERVER, env={**clean, **variables}, text=True)
+    assert output.strip() == chosen
+
+
+def test_mujoco_warns_in_the_log_and_leaves_no_file(
+    client, installed, monkeypatch, tmp_path, caplog
+):
+    if not installed("HalfCheetah-v5"):
+        pytest.skip("not installed")
+    monkeypatch.chdir(tmp_path)
+    assert client.post("/v1/envs/", json={"env_id": "HalfCheetah-v5"}).status_code == 200
+    import mujoco
+
+    mujoco.get_mju_user_warning()("the model is odd")
+    assert "MuJoCo: the model is odd" in caplog.text
+    assert list(tmp_path.glob("MUJOCO*")) == []
