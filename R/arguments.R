@@ -85,8 +85,7 @@ range_text <- function(min, max) {
 
 describe_argument <- function(x) {
   if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(x))) {
-    text <- paste(deparse(x, width.cutoff = 60L), collapse = " ")
-    if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
+    describe_value(x)
   } else if (is.array(x)) {
     paste0("an array of ", paste(dim(x), collapse = " x "))
   } else if (is.function(x)) {

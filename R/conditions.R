@@ -80,16 +80,24 @@ abort_no_answer <- function(response, call) {
   )
 }
 
-abort_space <- function(space, value, problem, call) {
+# `path` is the place of the value in the whole, "" for the whole.
+abort_space <- function(space, value, problem, call, path = "") {
+  place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")
   gym_abort(
     c(
       paste0(problem, "."),
-      x = paste0("The value ", describe_argument(value), " does not fit the space ",
+      x = paste0(place %||% "The", " value ", describe_value(value), " does not fit the space ",
                  format(space), ".")
     ),
     class = "gym_error_space",
     space = space,
     value = value,
+    path = path,
     call = call
   )
+}
+
+describe_value <- function(value) {
+  text <- paste(deparse(value, width.cutoff = 60L, nlines = 3L), collapse = " ")
+  if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }

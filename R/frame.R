@@ -19,15 +19,9 @@
 env_render <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  response <- send(x, paste0(instance_route(instance_id), "render/"))
-  if (!identical(response$type, "image/png")) {
-    read_answer(response, "GET")
-    abort_no_answer(response, rlang::current_env())
-  }
-  pixels <- png::readPNG(response$content)[, , 1:3, drop = FALSE]
-  pixels <- round(pixels * 255)
-  storage.mode(pixels) <- "integer"
-  structure(pixels, class = "gym_frame")
+  route <- paste0(instance_route(instance_id), "render/")
+  answer <- get_answer(x, route, take_tensors = TRUE)
+  structure(answer$tensors$frame, class = "gym_frame")
 }
 
 #' @importFrom grDevices as.raster

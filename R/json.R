@@ -2,13 +2,14 @@
 # 15), numbers that JSON cannot write travel as "NaN", "Infinity", "-Infinity".
 
 json_number <- function(x) {
-  if (inherits(x, "integer64")) {
-    return(as.character(x))
-  }
   if (is.integer(x)) {
     text <- sprintf("%d", x)
+  } else if (is.logical(x)) {
+    text <- ifelse(x, "true", "false")
   } else {
     text <- sprintf("%.17g", x)
+    # "-0" is an integer to most readers, and has no sign.
+    text[text == "-0"] <- "-0.0"
   }
   odd <- !is.finite(x)
   if (any(odd)) {
@@ -21,21 +22,29 @@ json_number <- function(x) {
 }
 
 json_string <- function(x) {
-  vapply(
-    enc2utf8(x),
-    function(string) as.character(jsonlite::toJSON(string, auto_unbox = TRUE)),
-    character(1),
-    USE.NAMES = FALSE
-  )
+  x <- enc2utf8(x)
+  special <- grepl("[\"\\\\\\x01-\\x1f]", x, perl = TRUE)
+  x[special] <- json_escape(x[special])
+  paste0("\"", x, "\"", recycle0 = TRUE)
 }
 
-# An object of elements that are JSON already, its names too.
-json_object <- function(names, elements) {
-  if (!length(elements)) {
-    return("{}")
+json_escape <- function(x) {
+  x <- gsub("\\", "\\\\", x, fixed = TRUE)
+  x <- gsub("\"", "\\\"", x, fixed = TRUE)
+  if (any(grepl("[\\x01-\\x1f]", x, perl = TRUE))) {
+    for (code in 1:31) {
+      x <- gsub(rawToChar(as.raw(code)), sprintf("\\u%04x", code), x, fixed = TRUE)
+    }
   }
-  paste0("{", paste0(names, ":", elements, collapse = ","), "}")
+  x
 }
+
+# The fields of a request: JSON texts under names that need no escaping.
+json_object <- function(fields) {
+  paste0("{", paste0("\"", names(fields), "\":", fields, recycle0 = TRUE, collapse = ","), "}")
+}
+
+json_texts <- function(values) vapply(values, to_json, "")
 
 json_array <- function(elements) paste0("[", paste0(elements, collapse = ","), "]")
 
@@ -66,7 +75,8 @@ to_json <- function(x) {
     if (is.null(names(x))) {
       return(json_array(elements))
     }
-    return(json_object(json_string(names(x)), elements))
+    fields <- paste0(json_string(names(x)), ":", elements, recycle0 = TRUE)
+    return(paste0("{", paste0(fields, collapse = ","), "}"))
   }
   if (is.array(x)) {
     return(json_nested(json_atoms(row_major(x)), dim(x)))
@@ -77,6 +87,9 @@ to_json <- function(x) {
 json_atoms <- function(x) {
   if (is.factor(x)) {
     x <- as.character(x)
+  }
+  if (inherits(x, "integer64")) {
+    return(as.character(x))
   }
   switch(typeof(x),
     logical = ifelse(is.na(x), "null", ifelse(x, "true", "false")),
@@ -93,13 +106,30 @@ json_atoms <- function(x) {
 
 # The elements of an array with its last index running fastest, as on the wire.
 row_major <- function(x) {
-  if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x)
+  if (!is.object(x) || !inherits(x, "integer64")) {
+    return(if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x))
+  }
+  structure(row_major(unclass(x)), class = "integer64")
 }
 
 # Parse an answer. Integers beyond 2^53 come as text, so that none is rounded.
 from_json <- function(text) {
   Encoding(text) <- "UTF-8"
+  if (grepl("\\u0000", text, fixed = TRUE, useBytes = TRUE)) {
+    refuse_nul(text)
+  }
   jsonlite::parse_json(text, bigint_as_char = TRUE)
+}
+
+# An even number of backslashes before it stand for themselves.
+refuse_nul <- function(text) {
+  if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE)) {
+    gym_abort(
+      "A text from the server has the character NUL, which no string in R can hold.",
+      class = "gym_error_space",
+      call = NULL
+    )
+  }
 }
 
 # JSON numbers, nested or not, some perhaps the words for NaN and the infinities,
@@ -107,7 +137,7 @@ from_json <- function(text) {
 numbers_from_json <- function(elements) {
   numbers <- unlist(elements, use.names = FALSE)
   if (is.character(numbers)) {
-    numbers <- rapply(elements, number_from_json, how = "unlist")
+    numbers <- rapply(as.list(elements), number_from_json, how = "unlist")
   }
   if (is.null(numbers)) numeric() else numbers
 }
@@ -120,23 +150,67 @@ number_from_json <- function(x) {
   }
 }
 
-# Infos hold whatever an environment puts there: arrays of plain values of one
-# kind become vectors, the rest stays a list.
+# Infos --------------------------------------------------------------------------
+
+# Infos hold whatever an environment puts there, and no space says what: arrays of
+# plain values of one kind become vectors, arrays of such arrays that have one
+# shape become arrays, the rest stays a list.
 info_from_json <- function(x) {
-  if (is.list(x)) {
-    x <- lapply(x, info_from_json)
-    if (is_plain_array(x)) unlist(x) else x
-  } else if (is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")) {
-    number_from_json(x)
-  } else {
+  if (!is.list(x)) {
+    if (is_number_word(x)) number_from_json(x) else x
+  } else if (!length(x)) {
     x
+  } else if (!is.null(names(x))) {
+    lapply(x, info_from_json)
+  } else if (any(vapply(x, is.list, NA))) {
+    stack_rows(lapply(x, info_from_json), x)
+  } else {
+    info_vector(x)
   }
 }
 
-is_plain_array <- function(x) {
-  if (length(x) == 0L || !is.null(names(x)) || !all(lengths(x) == 1L)) {
-    return(FALSE)
+is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
+
+# The words for numbers are text where there is other text beside them.
+info_vector <- function(x) {
+  kinds <- unique(vapply(x, info_kind, ""))
+  if (all(kinds %in% c("number", "word"))) {
+    numbers_from_json(x)
+  } else if (identical(kinds, "logical") || all(kinds %in% c("text", "word"))) {
+    unlist(x)
+  } else {
+    lapply(x, info_from_json)
   }
-  kinds <- vapply(x, function(element) if (is.numeric(element)) "number" else typeof(element), "")
-  kinds[[1L]] != "list" && all(kinds == kinds[[1L]])
 }
+
+info_kind <- function(x) {
+  if (is.null(x)) {
+    "null"
+  } else if (is.numeric(x)) {
+    "number"
+  } else if (is.logical(x)) {
+    "logical"
+  } else if (is_number_word(x)) {
+    "word"
+  } else {
+    "text"
+  }
+}
+
+# `rows` as they were read from the JSON arrays `json`.
+stack_rows <- function(rows, json) {
+  first <- rows[[1L]]
+  shape <- array_shape(first)
+  kind <- function(row) if (is.numeric(row)) "number" else typeof(row)
+  alike <- function(row, elements) {
+    is.list(elements) && is.null(names(elements)) && is.atomic(row) &&
+      identical(array_shape(row), shape) && kind(row) == kind(first)
+  }
+  if (all(mapply(alike, rows, json))) {
+    shape_values(unlist(lapply(rows, row_major)), c(length(rows), shape))
+  } else {
+    rows
+  }
+}
+
+array_shape <- function(x) dim(x) %||% length(x)

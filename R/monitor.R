@@ -7,7 +7,10 @@
 #' @inheritParams env_reset
 #' @param directory Where the server writes, a string: a path below the server's
 #'   directory for monitors (its option `--monitor-dir`), or, for a server on
-#'   this machine, below the system's directory for temporary files.
+#'   this machine, below the system's directory for temporary files. A server
+#'   started from R without `monitor_dir` has a new temporary directory for relative
+#'   paths: name an absolute one, such as `file.path(tempdir(), "runs")`, or start it
+#'   by `gym_server_start(monitor_dir = "runs")`.
 #' @param force Whether to delete what an earlier monitor left in the directory;
 #'   other files are never touched. Default `FALSE`.
 #' @param resume Whether to go on counting where an earlier monitor stopped.
@@ -40,9 +43,10 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
     check_count(video_callable, min = 1)
   }
   fields <- list(
-    directory = directory, force = force, resume = resume, video_callable = video_callable
+    directory = path.expand(directory), force = force, resume = resume,
+    video_callable = video_callable
   )
-  post_answer(x, paste0(instance_route(instance_id), "monitor/start/"), fields)
+  post_answer(x, paste0(instance_route(instance_id), "monitor/start/"), json_texts(fields))
   invisible()
 }
 
@@ -60,6 +64,6 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
 env_monitor_close <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  post_answer(x, paste0(instance_route(instance_id), "monitor/close/"), list())
+  post_answer(x, paste0(instance_route(instance_id), "monitor/close/"))
   invisible()
 }

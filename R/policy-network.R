@@ -309,8 +309,13 @@ check_inputs <- function(policy, env, call) {
   }
   if (gives != inputs) {
     problem <- paste0(
-      "The network takes ", count_of(inputs, "input"), ", but ", environment_label(env),
-      " gives ", count_of(gives, "observation")
+      "The network takes ", count_of(inputs, "input"), ", but an observation of ",
+      environment_label(env),
+      if (inherits(space, "gym_space_discrete")) {
+        paste0(" is one of ", gives, " and needs an input for each")
+      } else {
+        paste0(" has ", count_of(gives, "number"))
+      }
     )
     abort_fit(policy, problem, env, call)
   }

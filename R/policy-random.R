@@ -59,7 +59,9 @@ act.gym_policy_random <- function(policy, observation, ...) {
   }
   # What is observed matters only for how many there are, and observations that
   # are lists (of an environment with several parts) come one at a time.
-  lanes <- if (!is.list(observation)) observation_lanes(observation, policy$observation_space)
+  lanes <- if (counts_lanes(observation, policy$observation_space)) {
+    observation_lanes(observation, policy$observation_space)
+  }
   if (is.null(lanes) || lanes$one) {
     space_sample(space)
   } else {
@@ -68,14 +70,22 @@ act.gym_policy_random <- function(policy, observation, ...) {
 }
 
 # Many actions: an integer vector, or an array with one action for each value of
-# its first index.
+# its first index. Actions that are no numbers stay a list.
 stack_actions <- function(actions) {
+  if (is.list(actions[[1L]]) || is.character(actions[[1L]])) {
+    return(actions)
+  }
   shape <- dim(actions[[1L]]) %||% length(actions[[1L]])
   stacked <- unlist(actions)
   if (identical(shape, 1L) && is.integer(stacked)) {
     return(stacked)
   }
   aperm(array(stacked, c(shape, length(actions))), c(length(shape) + 1L, seq_along(shape)))
+}
+
+# Only of numbers can it be said how many observations there are.
+counts_lanes <- function(observation, space) {
+  !is.list(observation) && (is.null(space) || is_stackable(space))
 }
 
 #' @exportS3Method

@@ -55,6 +55,13 @@ print.gym_policy <- function(x, ...) {
 }
 
 check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (identical(x, policy_random) || identical(x, policy_network)) {
+    gym_abort(
+      c(paste0("`", arg, "` must be a policy, not the function that makes one."),
+        i = "Did you forget the parentheses, as in `policy_random()`?"),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
   if (!inherits(x, "gym_policy") && !is.function(x)) {
     abort_argument(x, "a policy or a function of an observation", arg, call)
   }

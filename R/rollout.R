@@ -11,8 +11,8 @@
 #' policy. So [set.seed()] alone fixes everything, and `env$reset(seed = )` with a
 #' seed of the table begins the same episode again.
 #'
-#' @param env The environment: an id, such as `"CartPole-v1"`, or an environment
-#'   made by [gym_make()].
+#' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
+#'   see [gym_wrap()]), or an environment made by [gym_make()].
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
 #'   function that takes an observation and returns an action.
 #' @param episodes How many episodes to play, a whole number of at least 1; the
@@ -38,7 +38,8 @@
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
 #'       step: `episode`, `step` (integers), the observation that the action was taken
 #'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
-#'       elsewhere `obs_1`, `obs_2`, ...), `action` (or `action_1`, `action_2`, ...),
+#'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
+#'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
 #'       `reward` (double), `terminated`, `truncated` (logical).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
@@ -84,12 +85,15 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
 
 check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
-  playable <- (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
-  if (!named && !playable) {
+  if (!named && !is_playable(x) && !inherits(x, "gym_wrapped")) {
     must <- "the id of an environment or an environment made by `gym_make()`"
     abort_argument(x, must, arg, call)
   }
   invisible(x)
+}
+
+is_playable <- function(x) {
+  (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
 }
 
 #' Call a function with an environment
@@ -97,7 +101,7 @@ check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::calle
 #' One that is named by its id is made first and closed when `use` is left.
 #' @noRd
 with_environment <- function(env, client, use) {
-  if (!is.character(env)) {
+  if (!is.character(env) && !inherits(env, "gym_wrapped")) {
     return(use(env))
   }
   env <- gym_make(env, client = client)
@@ -196,28 +200,28 @@ steps_table <- function(played, env) {
   lengths <- vapply(played, function(episode) episode$length, integer(1))
   steps <- do.call(c, lapply(played, function(episode) episode$steps))
   column <- function(name, type) vapply(steps, function(step) step[[name]], type)
-  observations <- value_columns(lapply(steps, function(step) step$observation))
-  names(observations) <- observation_names(env$spec$id, length(observations))
-  actions <- value_columns(lapply(steps, function(step) step$action))
-  numbered <- paste0("action_", seq_along(actions))
-  names(actions) <- if (length(actions) == 1L) "action" else numbered
+  values <- function(name) lapply(steps, function(step) step[[name]])
+  observations <- value_columns(env$observation_space, values("observation"), "obs")
+  if (is_stackable(env$observation_space)) {
+    names(observations) <- paste0("obs_", seq_along(observations), recycle0 = TRUE)
+  }
+  names(observations) <- observation_names(env$spec$id, names(observations))
+  actions <- value_columns(env$action_space, values("action"), "action")
   truncated <- column("truncated", logical(1))
   truncated[cumsum(lengths)] <- vapply(played, function(episode) episode$truncated, NA)
   data.frame(
-    episode = rep(seq_along(played), lengths),
-    step = sequence(lengths),
-    observations,
-    actions,
-    reward = column("reward", numeric(1)),
-    terminated = column("terminated", logical(1)),
-    truncated = truncated
+    c(
+      list(episode = rep(seq_along(played), lengths), step = sequence(lengths)),
+      observations,
+      actions,
+      list(
+        reward = column("reward", numeric(1)),
+        terminated = column("terminated", logical(1)),
+        truncated = truncated
+      )
+    ),
+    check.names = FALSE
   )
-}
-
-# Values of one space as columns: one for each number in them, in row-major order.
-value_columns <- function(values) {
-  flat <- matrix(unlist(lapply(values, row_major)), ncol = length(values))
-  lapply(seq_len(nrow(flat)), function(i) flat[i, ])
 }
 
 #' @export

@@ -196,7 +196,9 @@ observations_from <- function(newdata, policy, env_id, call) {
     return(newdata)
   }
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  names <- observation_names(env_id, if (discrete) 1L else policy$sizes[[1L]])
+  size <- if (discrete) 1L else policy$sizes[[1L]]
+  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
+  names <- observation_names(env_id, columns)
   if (any(names %in% names(newdata))) {
     absent <- setdiff(names, names(newdata))
     if (length(absent)) {

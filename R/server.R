@@ -62,7 +62,7 @@ is_running <- function(client) {
 #'   a free one.
 #' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
 #' @param ... Further options of the server, by name: `monitor_dir = "runs"` is
-#'   its `--monitor-dir runs`. `log_level = "info"` logs every start and stop,
+#'   its `--monitor-dir runs`. `log_level = "info"` logs what is made and closed,
 #'   `allow_module = c("a", "b")` names Python modules whose environments may be
 #'   made.
 #' @param timeout How long the start may take, in seconds; the default is 60.
@@ -107,7 +107,7 @@ run_server <- paste0(
 # Extra options as the command line takes them: log_level = "info" becomes
 # --log-level info, TRUE a flag, a vector one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
-  check_named_list(options, arg = "...", call = call)
+  check_dots_named(options, "log_level = \"info\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
   unlist(Map(
     function(flag, values) {
@@ -125,7 +125,8 @@ server_options <- function(options, call = rlang::caller_env()) {
 # or a string that says why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- tempfile("gym-server-", fileext = ".log")
-  process <- tryCatch(
+  # processx draws a name from R's generator.
+  process <- keep_random_state(tryCatch(
     processx::process$new(
       python, arguments,
       stdin = "|", stdout = "|", stderr = log,
@@ -135,7 +136,7 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
       cleanup = FALSE, windows_hide_window = TRUE
     ),
     error = function(cnd) conditionMessage(cnd)
-  )
+  ))
   if (is.character(process)) {
     return("it cannot be run")
   }
@@ -144,8 +145,9 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
     return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
   }
   words <- log_tail(log)
-  if (any(grepl(server_words, words))) {
-    abort_server_start("The server ended before it took connections.", words, call)
+  own <- grep(server_words, words, value = TRUE)
+  if (length(own)) {
+    abort_server_start("The server ended before it took connections.", own, call)
   }
   if (length(words)) utils::tail(words, 1L) else "it ended without a word"
 }
@@ -221,7 +223,8 @@ abort_no_python <- function(python, candidates, refusals, call = rlang::caller_e
       i = "The server needs Python 3.10 or newer and a few packages. In a terminal:",
       stats::setNames(installing_commands(), c(" ", " ")),
       i = "and then, in R:",
-      " " = paste0("Sys.setenv(GYM_PYTHON = \"", installed_python(), "\")")
+      " " = paste0("Sys.setenv(GYM_PYTHON = \"", installed_python(), "\")"),
+      i = "To make that last, put it into ~/.Renviron as GYM_PYTHON=..."
     ),
     class = "gym_error_server_start",
     candidates = candidates,
@@ -275,8 +278,8 @@ is_windows <- function() .Platform$OS.type == "windows"
 #' The server finishes the calls under way and closes its environments; one that
 #' does not end within 15 seconds is killed.
 #'
-#' @param server The client that [gym_server_start()] returned; by default the
-#'   session's own.
+#' @param server The client that [gym_server_start()] returned; `NULL`, the
+#'   default, stands for the session's own server, that of [gym_client()].
 #' @return Nothing, invisibly. Stopping a server twice does no harm.
 #' @section Errors: `gym_error_argument` for a server that this session did not
 #'   start.
@@ -284,28 +287,31 @@ is_windows <- function() .Platform$OS.type == "windows"
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start()
 #' gym_server_stop(server)
-gym_server_stop <- function(server = the_session$client) {
+gym_server_stop <- function(server = NULL) {
   stop_server(session_server(server))
   invisible()
 }
 
 #' Read a server's log
 #'
-#' What a server that this session started has had to say, also after its end.
+#' Warnings and errors of a server that this session started, and what its
+#' environments print; also after its end.
 #'
 #' @inheritParams gym_server_stop
-#' @return A character vector, one element a line.
+#' @return A character vector, one element a line; `character(0)` when the server
+#'   had nothing to say.
 #' @inheritSection gym_server_stop Errors
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start(log_level = "info")
 #' gym_server_log(server)
 #' gym_server_stop(server)
-gym_server_log <- function(server = the_session$client) {
+gym_server_log <- function(server = NULL) {
   log_tail(session_server(server)$log, n = Inf)
 }
 
 session_server <- function(client, call = rlang::caller_env()) {
+  client <- client %||% the_session$client
   if (is.null(client)) {
     gym_abort(
       "This session has started no server.", class = "gym_error_argument", call = call

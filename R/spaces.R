@@ -1,13 +1,13 @@
 # Spaces as R objects: what the server says of a space, with one small method
-# per kind for reading, writing, drawing and checking its values.
+# per kind for reading, checking, writing and drawing its values. The kinds are
+# in the files space-*.R; here is what they share.
 
 #' Make a space from the server's description
 #' @noRd
 new_space <- function(description) {
-  kind <- description$name
   space <- structure(
     description,
-    class = c(paste0("gym_space_", tolower(kind)), "gym_space")
+    class = c(paste0("gym_space_", tolower(description$name)), "gym_space")
   )
   init_space(space)
 }
@@ -22,37 +22,18 @@ init_space.default <- function(space) {
   )
 }
 
-#' @exportS3Method
-init_space.gym_space_discrete <- function(space) {
-  space$start <- space$start %||% 0L
-  space
-}
+# In words ------------------------------------------------------------------------
 
-#' @exportS3Method
-init_space.gym_space_box <- function(space) {
-  space$shape <- as.integer(unlist(space$shape))
-  space$low <- bound_from_json(space$low)
-  space$high <- bound_from_json(space$high)
-  space
-}
-
-# Infinite bounds travel as +-1e100, which classic clients expect.
-bound_from_json <- function(bound) {
-  bound <- numbers_from_json(bound)
-  bound[bound == 1e100] <- Inf
-  bound[bound == -1e100] <- -Inf
-  bound
-}
+# A space in words, without the brackets around the outermost.
+space_text <- function(space) UseMethod("space_text")
 
 #' @export
-format.gym_space_discrete <- function(x, ...) {
-  start <- if (x$start != 0) paste0(" from ", x$start)
-  paste0("<Discrete ", x$n, start, ">")
-}
-
-#' @export
-format.gym_space_box <- function(x, ...) {
-  paste0("<Box ", x$dtype, " [", paste(x$shape, collapse = ", "), "]>")
+format.gym_space <- function(x, ..., width = 100L) {
+  text <- space_text(x)
+  if (nchar(text) > width) {
+    text <- paste0(substr(text, 1L, width - 3L), "...")
+  }
+  paste0("<", text, ">")
 }
 
 #' @export
@@ -61,150 +42,130 @@ print.gym_space <- function(x, ...) {
   invisible(x)
 }
 
-# Reading ---------------------------------------------------------------------
+shape_text <- function(shape) paste0("[", paste(shape, collapse = ", "), "]")
+
+# Values --------------------------------------------------------------------------
 
 #' Turn a value from the wire into an R value
+#' @param json What [from_json()] made of it.
 #' @noRd
 decode_value <- function(space, json) UseMethod("decode_value")
 
-#' @exportS3Method
-decode_value.gym_space_discrete <- function(space, json) {
-  integers_from_json(list(json))
-}
+#' Check a value's type and shape, down to its parts
+#'
+#' Whether what is sent lies inside the bounds is for the server to say, which
+#' has the numbers in the space's own dtype.
+#' @param path Where the value lies in the whole, such as `$position[2]`.
+#' @param bounds Check against the bounds, too?
+#' @noRd
+check_value <- function(space, value, path, call, bounds = FALSE) UseMethod("check_value")
 
-#' @exportS3Method
-decode_value.gym_space_box <- function(space, json) {
-  shape <- space$shape
-  rank <- length(shape)
-  values <- if (space$dtype %in% integer_dtypes) {
-    integers_from_json(json)
-  } else {
-    as.numeric(numbers_from_json(json))
-  }
-  if (rank > 1L) aperm(array(values, rev(shape))) else values
-}
-
-integer_dtypes <- c(
-  "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "bool"
-)
-
-# Integers are integer where they fit, double up to 2^53, integer64 beyond.
-integers_from_json <- function(elements) {
-  integers <- unlist(elements, use.names = FALSE)
-  if (is.character(integers)) {
-    digits <- rapply(as.list(elements), integer_digits, how = "unlist")
-    return(integers_beyond_double(digits))
-  }
-  if (is.logical(integers)) {
-    return(as.integer(integers))
-  }
-  if (is.null(integers)) integer() else integers
-}
-
-integer_digits <- function(x) if (is.character(x)) x else sprintf("%.0f", x)
-
-integers_beyond_double <- function(digits,
-                                   has_bit64 = requireNamespace("bit64", quietly = TRUE)) {
-  if (!has_bit64) {
-    gym_abort(
-      c(
-        paste0("The integer ", digits[which.max(nchar(digits))], " is beyond 2^53, ",
-               "where R's numbers have gaps."),
-        i = "With the package bit64 installed it arrives exactly: install.packages(\"bit64\")."
-      ),
-      class = "gym_error_space"
-    )
-  }
-  bit64::as.integer64(digits)
-}
-
-# Writing ---------------------------------------------------------------------
+#' Write a value that was checked as JSON
+#' @noRd
+write_value <- function(space, value) UseMethod("write_value")
 
 #' Write an R value as JSON for a space
-#'
-#' Checks type and shape; whether the value lies inside the bounds is for the
-#' server to say.
 #' @noRd
-encode_value <- function(space, value, call) UseMethod("encode_value")
-
-#' @exportS3Method
-encode_value.gym_space_discrete <- function(space, value, call) {
-  if (is.logical(value)) {
-    # As R counts, and Python.
-    value <- as.integer(value)
-  }
-  if (length(value) != 1L || !is.numeric(value) || !is.finite(value) || value != trunc(value)) {
-    abort_space(space, value, "A discrete action is one whole number", call)
-  }
-  json_number(value)
+encode_value <- function(space, value, call) {
+  check_value(space, value, "", call)
+  write_value(space, value)
 }
 
-#' @exportS3Method
-encode_value.gym_space_box <- function(space, value, call) {
-  if (!is.numeric(value)) {
-    abort_space(space, value, "An action of a Box is numeric", call)
-  }
-  if (anyNA(value)) {
-    abort_space(space, value, "An action of a Box has no missing values", call)
-  }
-  shape <- space$shape
-  if (!identical(value_shape(value, shape), shape)) {
-    wanted <- if (length(shape) <= 1L) {
-      paste("of length", prod(shape))
-    } else {
-      paste("an array with dim", paste(shape, collapse = " x "))
-    }
-    abort_space(space, value, paste("The action must be", wanted), call)
-  }
-  elements <- json_number(row_major(value))
-  if (length(shape) == 0L) elements else json_nested(elements, shape)
-}
-
-# A vector without dim is one-dimensional, or a scalar where the space is one.
-value_shape <- function(value, shape) {
-  if (!is.null(dim(value))) {
-    dim(value)
-  } else if (length(value) == 1L && length(shape) == 0L) {
-    integer()
-  } else {
-    length(value)
-  }
-}
-
-# Drawing ---------------------------------------------------------------------
-
-#' Draw a value of a space from R's generator
+#' Draw a value of a space, or ask whether a value belongs to it
+#'
+#' `space_sample()` draws a value from R's generator, so that [set.seed()] fixes
+#' it; [env_action_space_sample()] draws on the server. `space_contains()` looks
+#' at type, shape and bounds of a value, all in R and without a server.
+#'
+#' A space has the same parts as in Gymnasium, as list elements: `name` and
+#' `dtype`; for Discrete `n` and `start`; for Box `shape`, `low` and `high` (its
+#' bounds, element by element and row by row); for MultiDiscrete `shape`, `nvec`
+#' and `start`; for MultiBinary `shape`; for Text `min_length`, `max_length` and
+#' `characters`; for Tuple, Dict and OneOf `spaces`, a list of spaces, with names
+#' for Dict; for Sequence `space` and `stack`; for Graph `node_space` and
+#' `edge_space`. Bounds of 64-bit integers are doubles, exact up to 2^53.
+#'
+#' # Values in R
+#'
+#' * Discrete: a whole number.
+#' * Box, MultiDiscrete, MultiBinary: a vector; an array where the shape has two
+#'   dimensions or more.
+#' * Text: a string.
+#' * Tuple: a list without names. Dict: a list with names.
+#' * Sequence: a list of elements; a stacked one of numbers is an array with the
+#'   elements along the first dimension.
+#' * Graph: a list of `nodes`, `edges` (arrays with the first dimension along the
+#'   nodes or edges) and `edge_links` (a matrix of two columns, counting nodes from
+#'   0 as Python does); `edges` and `edge_links` are `NULL` where there are none.
+#' * OneOf: a list of the index of the space, counted from 0, and the value.
+#'
+#' Whole numbers are integer where they all fit, double up to 2^53 and
+#' [bit64::integer64] beyond. The smallest int64, -2^63, is `NA` for bit64, and
+#' uint64 goes on beyond its largest number: such a value is an error, not another
+#' number. A Box of dtype bool is logical.
+#'
+#' # Where a value is wrong
+#'
+#' Errors of class `gym_error_space` name the place inside a nested value, such
+#' as `$position[2]`: the element `position`, and in it the number with index 2.
+#' Indices count from 0, as on the server and in Python, so that the same place
+#' has the same name everywhere: in R it is `value$position[3]`.
 #'
 #' The distributions are Gymnasium's: uniform between two bounds, exponential
-#' from a single one, normal without any.
-#' @noRd
+#' from a single one, normal without any; the length of a sequence is geometric.
+#'
+#' @param space A space, such as `gym_make("CartPole-v1")$action_space`.
+#' @param value The value to look at: anything.
+#' @return `space_sample()` a value as listed above; `space_contains()` `TRUE` or
+#'   `FALSE`.
+#' @section Errors: `gym_error_argument` when `space` is no space;
+#'   `gym_error_space` from `space_sample()` when an integer beyond 2^53 is drawn
+#'   and the package bit64 is not installed.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1")
+#' env$action_space
+#' set.seed(1)
+#' space_sample(env$action_space)
+#' space_contains(env$action_space, 1)
+#' space_contains(env$action_space, 2)
+#' space_contains(env$observation_space, c(0, 0, 0, 0))
+#' env$observation_space$high
+#' env$close()
 space_sample <- function(space) UseMethod("space_sample")
 
-#' @exportS3Method
-space_sample.gym_space_discrete <- function(space) {
-  as.integer(space$start) + sample.int(space$n, 1L) - 1L
+#' @export
+space_sample.default <- function(space) {
+  abort_argument(space, "a space", "space", rlang::caller_env())
 }
 
-#' @exportS3Method
-space_sample.gym_space_box <- function(space) {
-  if (space$dtype %in% integer_dtypes) {
-    # A whole number stands for all that is rounded down to it: the highest, too.
-    drawn <- mapply(draw_between, space$low, space$high + 1)
-    values <- pmin(floor(drawn), space$high)
-  } else {
-    values <- mapply(draw_between, space$low, space$high)
+#' @rdname space_sample
+#' @export
+space_contains <- function(space, value) {
+  if (!inherits(space, "gym_space")) {
+    abort_argument(space, "a space", "space", rlang::current_env())
   }
-  if (length(space$shape) > 1L) aperm(array(values, rev(space$shape))) else values
+  fits_space(space, value, bounds = TRUE)
 }
 
-draw_between <- function(low, high) {
-  if (is.finite(low) && is.finite(high)) {
-    stats::runif(1L, low, high)
-  } else if (is.finite(low)) {
-    low + stats::rexp(1L)
-  } else if (is.finite(high)) {
-    high - stats::rexp(1L)
-  } else {
-    stats::rnorm(1L)
-  }
+fits_space <- function(space, value, bounds = FALSE) {
+  tryCatch(
+    {
+      check_value(space, value, "", NULL, bounds)
+      TRUE
+    },
+    gym_error_space = function(cnd) FALSE
+  )
+}
+
+# Places inside a value --------------------------------------------------------------
+
+path_key <- function(path, key) {
+  syntactic <- grepl("^[A-Za-z.][A-Za-z0-9._]*$", key)
+  paste0(path, "$", if (syntactic) key else paste0("`", key, "`"))
+}
+
+# `index` counts from 0; one number for each dimension.
+path_index <- function(path, index) {
+  paste0(path, paste0("[", index, "]", recycle0 = TRUE, collapse = ""))
 }

@@ -92,8 +92,19 @@ def image():
 
 def large_integers():
     limits = np.iinfo(np.int64)
-    values = np.array([limits.min, -1, 2**53 + 1, limits.max], dtype=np.int64)
-    return Odd(box(limits.min, limits.max, (4,), np.int64), observation=values)
+    values = np.array([-1, 2**53 + 1, limits.max], dtype=np.int64)
+    return Odd(box(limits.min, limits.max, (3,), np.int64), observation=values)
+
+
+def smallest_integer():
+    limits = np.iinfo(np.int64)
+    values = np.array([0, limits.min], dtype=np.int64)
+    return Odd(box(limits.min, limits.max, (2,), np.int64), observation=values)
+
+
+def largest_natural():
+    values = np.array([2**64 - 1], dtype=np.uint64)
+    return Odd(box(0, 2**64 - 1, (1,), np.uint64), observation=values)
 
 
 def middling_integers():
@@ -126,8 +137,17 @@ def shifted():
     return Odd(spaces.Discrete(3, start=-1), spaces.Discrete(3, start=5))
 
 
-def mapping():
-    return Odd(spaces.Dict({"a": spaces.Discrete(2)}))
+class Riddle(spaces.Space):
+    """A kind of space that nobody knows."""
+
+
+def riddle():
+    return Odd(Riddle())
+
+
+def nested():
+    position = box(-1, 1, (3,), np.float64)
+    return Odd(spaces.Discrete(2), spaces.Dict({"position": position, "a.b": spaces.Discrete(2)}))
 
 
 def failing():
@@ -149,13 +169,16 @@ def chatty():
 for maker in (
     image,
     large_integers,
+    smallest_integer,
+    largest_natural,
     middling_integers,
     not_finite,
     echo,
     lopsided,
     one_number,
     shifted,
-    mapping,
+    riddle,
+    nested,
     failing,
     slow,
     telling,

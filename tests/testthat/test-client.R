@@ -177,7 +177,7 @@ test_that("a call inside another call disturbs neither", {
   env_reset(server, twin)
   # curl asks R for a call's body, and there R may run finalizers: here it does.
   line <- connection(server)$line
-  curl::handle_setopt(line$post, readfunction = function(nbytes, ...) {
+  curl::handle_setopt(line$channels$post$handle, readfunction = function(nbytes, ...) {
     if (line$sent == 0L) {
       thrown_away <- new.env()
       reg.finalizer(thrown_away, function(x) {

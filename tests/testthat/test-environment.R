@@ -41,7 +41,10 @@ test_that("what belongs to a space is told from what does not", {
   member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
   expect_true(member(0))
   expect_true(member(1L))
-  for (value in list(2, -1, 0.5, "a", NULL, NA, c(0, 1))) expect_false(member(value))
+  for (value in list(2, -1, 0.5, "a", NULL, NA, c(0, 1))) {
+    expect_false(member(value))
+    expect_false(space_contains(env$action_space, value))
+  }
   observed <- function(value) env_observation_space_contains(env$client, env$instance_id, value)
   expect_true(observed(c(0, 1e30, 0, 0)))
   expect_true(observed(env$reset()))
@@ -90,6 +93,21 @@ test_that("a seed that is none is refused before anything is sent", {
   }
 })
 
+test_that("a reset tells what the environment tells besides, when asked", {
+  client <- test_client()
+  env <- local_env(seed = 1)
+  both <- env$reset(seed = 3, return_info = TRUE)
+  expect_named(both, c("observation", "info"))
+  expect_identical(both$observation, env$reset(seed = 3))
+  expect_identical(both$info, structure(list(), names = character()))
+  expect_identical(env_reset(client, env$instance_id, seed = 3, return_info = TRUE), both)
+  taxi <- local_env("Taxi-v4")
+  info <- taxi$reset(seed = 1, return_info = TRUE)$info
+  expect_length(info$action_mask, 6)
+  expect_identical(info$prob, 1)
+  expect_error(env$reset(return_info = 1), "return_info", class = "gym_error_argument")
+})
+
 test_that("a seed that is an integer64 is that seed", {
   skip_if_not_installed("bit64")
   env <- local_env()
@@ -127,7 +145,8 @@ test_that("an environment is an object with Gymnasium's names", {
   gone <- local_env()
   env_close(gone$client, gone$instance_id)
   expect_error(gone$close(), NA)
-  expect_error(env$step(1), "unknown", class = "gym_error_http_400")
+  expect_error(env$step(1), "was closed", class = "gym_error_argument")
+  expect_error(env$reset(), "was closed", class = "gym_error_argument")
 })
 
 test_that("arguments by name go to the environment", {
@@ -249,7 +268,7 @@ test_that("what an environment tells besides arrives", {
   expect_identical(out$info$words, c("a", "\u00e9"))
   expect_identical(out$info$nested$x, 0.5)
   expect_identical(out$info$nan, NaN)
-  expect_identical(out$info$grid, list(0:2, 3:5))
+  expect_identical(out$info$grid, matrix(0:5, 2, byrow = TRUE))
 })
 
 test_that("uploading fails with the reason", {

@@ -57,6 +57,41 @@ test_that("infos become vectors where they are arrays of plain values", {
   expect_null(info$deep$x)
 })
 
+test_that("arrays of equal arrays in an info become matrices and arrays", {
+  read <- function(text) info_from_json(from_json(text))
+  expect_identical(read('{"x": [[1, 2, 3], [4, 5, 6]]}')$x, matrix(1:6, 2, byrow = TRUE))
+  expect_identical(read('{"x": [[[1], [2]], [[3], [4]]]}')$x, array(c(1L, 3L, 2L, 4L), c(2, 2, 1)))
+  expect_identical(read('{"x": [[1], [2]]}')$x, matrix(1:2, 2))
+  expect_identical(read('{"x": [[1, 2], [3]]}')$x, list(1:2, 3L))
+  expect_identical(read('{"x": [[1, 2], ["a", "b"]]}')$x, list(1:2, c("a", "b")))
+  expect_identical(read('{"x": [[true, false]]}')$x, matrix(c(TRUE, FALSE), 1))
+  expect_identical(read('{"x": [{"a": 1}, {"a": 2}]}')$x, list(list(a = 1L), list(a = 2L)))
+  expect_identical(read('{"x": [[1, 2.5], ["NaN", 0]]}')$x, matrix(c(1, NaN, 2.5, 0), 2))
+  expect_identical(read('{"x": [1, [1, 2]]}')$x, list(1L, 1:2))
+  expect_identical(read('{"x": [], "y": {}, "z": [[]]}')$x, list())
+})
+
+test_that("the words for numbers are numbers, and text beside other text", {
+  read <- function(text) info_from_json(from_json(text))
+  expect_identical(read('["NaN", 1, "-Infinity"]'), c(NaN, 1, -Inf))
+  expect_identical(read('["NaN"]'), NaN)
+  expect_identical(read('["NaN", "Nan"]'), c("NaN", "Nan"))
+})
+
+test_that("the sign of zero is kept", {
+  expect_identical(1 / from_json(to_json(list(-0)))[[1]], -Inf)
+})
+
+test_that("text with control characters, quotes and emoji arrives as it was", {
+  text <- c("tab\tquote\"back\\slash", "\x01\x1f\x7f", "\U1F600 \u00e9", "", "\\u0000")
+  expect_identical(unlist(from_json(json_array(json_string(text)))), text)
+  expect_error(from_json('["a\\u0000b"]'), "NUL", class = "gym_error_space")
+})
+
+test_that("an empty list with names is an object", {
+  expect_identical(to_json(structure(list(), names = character())), "{}")
+})
+
 test_that("a value that JSON has no form for is refused", {
   expect_error(to_json(quote(a)), class = "gym_error_argument")
 })

@@ -177,7 +177,7 @@ test_that("a discrete observation is one input for each of its values", {
 test_that("sizes that do not fit the environment are refused with both numbers", {
   env <- fake_environment(id = "CartPole-v1")
   expect_error(policy_bind(policy_network(c(3, 2, 1)), env),
-               "The network takes 3 inputs, but CartPole-v1 gives 4 observations.",
+               "The network takes 3 inputs, but an observation of CartPole-v1 has 4 numbers.",
                fixed = TRUE, class = "gym_error_argument")
   expect_error(policy_bind(policy_network(c(3, 2, 1)), env), "sizes = c(4, 2, 1)", fixed = TRUE)
   expect_error(policy_bind(policy_network(c(4, 2, 3)), env),

@@ -143,7 +143,8 @@ test_that("bad arguments are refused before anything is made, naming argument an
 
 test_that("a network that does not fit plays no step", {
   env <- fake_environment()
-  expect_error(rollout(env, policy_network(c(3, 1))), "3 inputs, but Fake-v0 gives 4 observations")
+  expect_error(rollout(env, policy_network(c(3, 1))),
+               "3 inputs, but an observation of Fake-v0 has 4 numbers")
   expect_length(env$seeds, 0)
 })
 
@@ -227,4 +228,18 @@ test_that("what was played survives an environment that cannot be closed", {
                  class = "gym_warning_close")
   # After an error there is that error to hear of.
   expect_silent(close_made(env, finished = FALSE))
+})
+
+test_that("Blackjack: observations with several parts have named columns", {
+  client <- test_client()
+  skip_if_not("Blackjack-v1" %in% env_registry(client)$id, "the extra toy-text")
+  stop_at_17 <- function(observation) as.integer(observation[[1]] < 17)
+  steps <- rollout("Blackjack-v1", stop_at_17, 5, seed = 1, steps = TRUE, client = client)$steps
+  expect_identical(names(steps)[3:6], c("player_sum", "dealer_card", "usable_ace", "action"))
+  expect_identical(steps$action, as.integer(steps$player_sum < 17))
+  expect_true(all(steps$usable_ace %in% 0:1))
+  random <- rollout("Blackjack-v1", policy_random(), 5, seed = 1, client = client)
+  expect_identical(nrow(random$episodes), 5L)
+  expect_error(rollout("Blackjack-v1", policy_network(c(3, 1)), client = client),
+               "cannot observe <Tuple", class = "gym_error_argument")
 })

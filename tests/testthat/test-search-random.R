@@ -118,7 +118,8 @@ test_that("bad arguments are refused before anything is made, naming argument an
 test_that("sizes that do not fit are refused with both numbers before a step is taken", {
   env <- fake_environment(id = "CartPole-v1")
   expect_error(search_random(env, policy_network(c(3, 2, 1))),
-               "The network takes 3 inputs, but CartPole-v1 gives 4 observations.", fixed = TRUE,
+               "The network takes 3 inputs, but an observation of CartPole-v1 has 4 numbers.",
+               fixed = TRUE,
                class = "gym_error_argument")
   expect_length(env$seeds, 0)
 })

@@ -9,6 +9,8 @@ pid_runs <- function(pid) {
 
 test_that("a server starts on a free port, tells its log and stops", {
   server <- local_server(log_level = "info")
+  env_close(server, env_create(server, "CartPole-v1"))
+  expect_match(gym_server_log(server), "CartPole-v1", all = FALSE)
   expect_s3_class(server, "GymClient")
   expect_match(server$remote_base, "^http://127.0.0.1:[0-9]+$")
   expect_type(env_list_all(server), "list")
@@ -20,6 +22,14 @@ test_that("a server starts on a free port, tells its log and stops", {
   expect_error(gym_server_stop(server), NA)
   expect_type(gym_server_log(server), "character")
   expect_error(env_list_all(server), class = "gym_error_connection")
+})
+
+test_that("starting a server leaves R's generator alone", {
+  skip_if_no_server()
+  set.seed(1)
+  before <- .Random.seed
+  local_server()
+  expect_identical(.Random.seed, before)
 })
 
 test_that("shutdown_server() stops any server", {
@@ -112,7 +122,10 @@ test_that("a server stops in order while a forked child lives", {
   skip_on_os("windows")
   server <- local_server()
   child <- parallel::mcparallel(Sys.sleep(30))
-  withr::defer(tools::pskill(child$pid, tools::SIGKILL))
+  withr::defer({
+    tools::pskill(child$pid, tools::SIGKILL)
+    suppressWarnings(parallel::mccollect(child))
+  })
   gym_server_stop(server)
   expect_identical(the_session$servers[[server$remote_base]]$process$get_exit_status(), 0L)
 })
@@ -126,7 +139,10 @@ test_that("the end of a forked child is not the session's", {
 
 test_that("what cannot be a server of this session is refused with the reason", {
   expect_error(gym_server_start(port = 70000), "65535", class = "gym_error_argument")
-  expect_error(session_server(NULL), "no server", class = "gym_error_argument")
+  own <- the_session$client
+  withr::defer(the_session$client <- own)
+  the_session$client <- NULL
+  expect_error(gym_server_stop(), "no server", class = "gym_error_argument")
   withr::local_envvar(GYM_SERVER_URL = "127.0.0.1:5000")
   expect_error(gym_client(), "GYM_SERVER_URL", class = "gym_error_argument")
 })

@@ -137,10 +137,20 @@ test_that("values of every sort arrive from a real server as Python had them", {
 
 test_that("int64 beyond 2^53 arrives exactly from a real server", {
   skip_if_not_installed("bit64")
+  value <- make_odd("LargeIntegers", local_odd_server())$reset()
+  expect_s3_class(value, "integer64")
+  expect_equal(as.character(value), c("-1", "9007199254740993", "9223372036854775807"))
+})
+
+test_that("the smallest int64 and large uint64 are errors that name them, not NA", {
   server <- local_odd_server()
-  value <- make_odd("LargeIntegers", server)$reset()
-  # The smallest int64 is bit64's NA.
-  expect_equal(as.character(value)[-1], c("-1", "9007199254740993", "9223372036854775807"))
+  expect_error(
+    make_odd("SmallestInteger", server)$reset(), "-9223372036854775808", class = "gym_error_space"
+  )
+  expect_error(
+    make_odd("LargestNatural", server)$reset(), "1844674407370955161[0-9].*uint64",
+    class = "gym_error_space"
+  )
 })
 
 test_that("an action comes back from a real server as it was sent", {
@@ -160,5 +170,113 @@ test_that("a bare number is an action of a Box of one number", {
 })
 
 test_that("a space that is not known is refused at creation and named", {
-  expect_error(make_odd("Mapping", local_odd_server()), "Dict", class = "gym_error_http_400")
+  expect_error(make_odd("Riddle", local_odd_server()), "Riddle", class = "gym_error_http_400")
+})
+
+nested <- function() {
+  new_space(describe_dict(
+    position = describe_box(c(-1, -1, -1), c(1, 1, 1)),
+    "a/b" = list(name = "Tuple", spaces = list(
+      list(name = "Discrete", n = 3L, start = 0L),
+      list(name = "Text", min_length = 1L, max_length = 3L, characters = "abc")
+    )),
+    bits = list(name = "MultiBinary", shape = list(2L), dtype = "int8"),
+    items = list(name = "Sequence", space = list(name = "Discrete", n = 2L), stack = FALSE),
+    graph = list(
+      name = "Graph", node_space = describe_box(c(0, 0), c(1, 1)),
+      edge_space = list(name = "Discrete", n = 3L)
+    ),
+    one = list(name = "OneOf", spaces = list(
+      list(name = "Discrete", n = 2L), list(name = "MultiDiscrete", shape = list(2L),
+                                            dtype = "int64", nvec = list(2L, 3L))
+    ))
+  ))
+}
+
+member <- function() {
+  list(
+    position = c(0, 0, 0), "a/b" = list(1, "ab"), bits = c(0, 1), items = list(0, 1),
+    graph = list(nodes = matrix(0.5, 2, 2), edges = 1, edge_links = matrix(0:1, 1)),
+    one = list(1, c(1, 2))
+  )
+}
+
+test_that("nested spaces print in one line, shortened when they are long", {
+  space <- nested()
+  expect_output(print(space), "^<Dict \\(position: Box float64 \\[3\\], a/b: Tuple .*\\.\\.\\.>$")
+  lines <- c(
+    "a/b" = "<Tuple (Discrete 3, Text of 1 to 3 characters)>", bits = "<MultiBinary [2]>",
+    items = "<Sequence of Discrete 2>",
+    graph = "<Graph of nodes Box float64 [2], edges Discrete 3>",
+    one = "<OneOf (Discrete 2, MultiDiscrete [2, 3])>"
+  )
+  for (part in names(lines)) expect_identical(format(space$spaces[[part]]), lines[[part]])
+})
+
+test_that("a value that does not fit is refused with its place, the space there, and itself", {
+  space <- nested()
+  expect_true(space_contains(space, member()))
+  refused <- function(change, place, part) {
+    value <- change(member())
+    expect_false(space_contains(space, value))
+    error <- expect_error(check_value(space, value, "", NULL, bounds = TRUE),
+                          class = "gym_error_space")
+    expect_match(conditionMessage(error), paste0("`", place, "`"), fixed = TRUE)
+    expect_match(conditionMessage(error), part, fixed = TRUE)
+  }
+  with <- function(expr) {
+    expr <- substitute(expr)
+    function(value) {
+      eval(expr)
+      value
+    }
+  }
+  refused(with(value$position[3] <- 2), "$position[2]", "<Box float64 [3]>")
+  refused(with(value$position[2] <- NA), "$position[1]", "<Box float64 [3]>")
+  refused(with(value$position <- 1:2), "$position", "1:2")
+  refused(with(value$`a/b`[[1]] <- 0.5), "$`a/b`[0]", "<Discrete 3>")
+  refused(with(value$`a/b`[[2]] <- "abx"), "$`a/b`[1]", "abx")
+  refused(with(value$`a/b`[[2]] <- ""), "$`a/b`[1]", "0 characters")
+  refused(with(value$bits[2] <- 2), "$bits[1]", "<MultiBinary [2]>")
+  refused(with(value$items[[2]] <- 7), "$items[1]", "7")
+  refused(with(value$graph$nodes[2, 1] <- 9), "$graph$nodes[1][0]", "Box float64 [2, 2]")
+  refused(with(value$graph$edge_links[1, 2] <- 5L), "$graph$edge_links[0][1]", "Box")
+  refused(with(value$one[[1]] <- 2), "$one[0]", "<OneOf")
+  refused(with(value$one[[2]][2] <- 3), "$one[1][1]", "<MultiDiscrete [2, 3]>")
+})
+
+test_that("keys that are missing or strange are named", {
+  space <- nested()
+  expect_error(check_value(space, member()[-1], "", NULL), "no element named \"position\"",
+               class = "gym_error_space")
+  expect_error(check_value(space, c(member(), extra = 1), "", NULL), "\"extra\"",
+               class = "gym_error_space")
+  expect_error(check_value(space, unname(member()), "", NULL), "names", class = "gym_error_space")
+  # The order of the names does not matter.
+  expect_identical(encode_value(space, rev(member()), NULL), encode_value(space, member(), NULL))
+})
+
+test_that("a value outside of a nested space is named by a real server, too", {
+  env <- make_odd("Nested", local_odd_server())
+  env$reset()
+  good <- list(position = c(0, 0, 0), "a.b" = 1)
+  expect_identical(env$step(good)$reward, 1)
+  expect_error(env$step(list(position = c(0, 0, 5), "a.b" = 1)), "$position[2]", fixed = TRUE,
+               class = "gym_error_space")
+  expect_error(env$step(list(position = c(0, 0, NA), "a.b" = 1)), "$position[2]", fixed = TRUE,
+               class = "gym_error_space")
+})
+
+test_that("a Box of dtype bool is logical", {
+  space <- new_space(describe_box(c(0, 0), c(1, 1), dtype = "bool"))
+  expect_identical(decode_value(space, from_json("[true, false]")), c(TRUE, FALSE))
+  expect_identical(encode_value(space, c(TRUE, FALSE), NULL), "[true,false]")
+  expect_type(space_sample(space), "logical")
+})
+
+test_that("a float32 is looked at as Python will have it", {
+  high <- 0.41887903213500977
+  space <- new_space(describe_box(-high, high, dtype = "float32"))
+  expect_true(space_contains(space, 0.418879032135))
+  expect_false(space_contains(space, 0.4188791))
 })

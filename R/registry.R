@@ -1,0 +1,42 @@
+#' List the environments that a server can make
+#'
+#' @inheritParams env_create
+#' @param search A text to look for in the ids, whatever its case; where none has
+#'   it the nearest ids are listed. `NULL`, the default, lists all.
+#' @return A data frame with one row for each environment: `id` (a string),
+#'   `max_episode_steps` (integer, the limit of an episode, `NA` for none),
+#'   `reward_threshold` (double, the mean return from which it counts as solved,
+#'   `NA` for none), `vectorised` (logical, whether it has a vector
+#'   implementation of its own), `extra` (a string, the part of the server that it
+#'   needs, such as `"box2d"`, `NA` for none) and `available` (logical, whether
+#'   that part is installed).
+#' @section Errors: `gym_error_argument`, `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' nrow(env_registry())
+#' env_registry(search = "cartpole")
+#' env_registry(search = "FrozenLaek")$id
+env_registry <- function(x = gym_client(), search = NULL) {
+  check_client(x)
+  check_string(search, allow_null = TRUE)
+  route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
+  environments <- get_answer(x, route)$environments
+  column <- function(name, missing) {
+    vapply(environments, function(environment) environment[[name]] %||% missing, missing)
+  }
+  data.frame(
+    id = column("id", ""),
+    max_episode_steps = column("max_episode_steps", NA_integer_),
+    reward_threshold = registry_thresholds(environments),
+    vectorised = column("vectorised", NA),
+    extra = column("extra", NA_character_),
+    available = column("available", NA)
+  )
+}
+
+# JSON writes a whole threshold without a point, as an integer.
+registry_thresholds <- function(environments) {
+  vapply(environments, function(environment) {
+    number_from_json(environment$reward_threshold %||% NA_real_)
+  }, 0)
+}

@@ -1,0 +1,244 @@
+# Spaces whose values are numbers in an array: Box, MultiDiscrete, MultiBinary. In
+# R a vector, or an array where there is more than one dimension. Discrete shares
+# the numbers' part.
+
+#' @exportS3Method
+init_space.gym_space_box <- function(space) {
+  space$shape <- shape_from_json(space$shape)
+  space$low <- bound_from_json(space$low)
+  space$high <- bound_from_json(space$high)
+  class(space) <- append(class(space), "gym_space_array", 1L)
+  space
+}
+
+#' @exportS3Method
+init_space.gym_space_multidiscrete <- function(space) {
+  space$shape <- shape_from_json(space$shape)
+  space$nvec <- whole_from_json(space$nvec)
+  space$start <- if (is.null(space$start)) 0L * space$nvec else whole_from_json(space$start)
+  class(space) <- append(class(space), "gym_space_array", 1L)
+  space
+}
+
+#' @exportS3Method
+init_space.gym_space_multibinary <- function(space) {
+  space$shape <- shape_from_json(space$shape)
+  class(space) <- append(class(space), "gym_space_array", 1L)
+  space
+}
+
+shape_from_json <- function(shape) as.integer(unlist(shape))
+
+# Infinite bounds travel as +-1e100, which classic clients expect.
+bound_from_json <- function(bound) {
+  bound <- as.numeric(numbers_from_json(bound))
+  bound[bound == 1e100] <- Inf
+  bound[bound == -1e100] <- -Inf
+  bound
+}
+
+#' @exportS3Method
+space_text.gym_space_box <- function(space) paste("Box", space$dtype, shape_text(space$shape))
+
+#' @exportS3Method
+space_text.gym_space_multidiscrete <- function(space) {
+  flat <- length(space$shape) == 1L && length(space$nvec) <= 10L
+  from <- if (any(space$start != 0)) paste(" from", shape_text(space$start))
+  if (flat) {
+    paste0("MultiDiscrete ", shape_text(space$nvec), from)
+  } else {
+    paste("MultiDiscrete of shape", shape_text(space$shape))
+  }
+}
+
+#' @exportS3Method
+space_text.gym_space_multibinary <- function(space) {
+  paste("MultiBinary", shape_text(space$shape))
+}
+
+# The least and the greatest value of each element, row by row.
+space_bounds <- function(space) UseMethod("space_bounds")
+
+#' @exportS3Method
+space_bounds.gym_space_box <- function(space) list(low = space$low, high = space$high)
+
+#' @exportS3Method
+space_bounds.gym_space_multidiscrete <- function(space) {
+  start <- as_double(space$start)
+  list(low = start, high = start + (as_double(space$nvec) - 1))
+}
+
+#' @exportS3Method
+space_bounds.gym_space_multibinary <- function(space) {
+  n <- prod(space$shape)
+  list(low = rep(0, n), high = rep(1, n))
+}
+
+# Reading ---------------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_array <- function(space, json) {
+  shape_values(decode_numbers(space$dtype, json), space$shape)
+}
+
+# Numbers, nested however they are, as a vector of the type that stands for the
+# dtype in R.
+decode_numbers <- function(dtype, json) {
+  switch(dtype,
+    float16 = ,
+    float32 = ,
+    float64 = as.numeric(numbers_from_json(json)),
+    bool = as.logical(unlist(json, use.names = FALSE)),
+    whole_from_json(json)
+  )
+}
+
+# Put elements that come row by row (last index fastest) into an array.
+shape_values <- function(values, shape) {
+  if (length(shape) <= 1L) {
+    return(values)
+  }
+  wide <- inherits(values, "integer64")
+  values <- unclass(values)
+  dim(values) <- rev(shape)
+  values <- aperm(values)
+  if (wide) structure(values, class = "integer64") else values
+}
+
+# Checking --------------------------------------------------------------------------
+
+#' @exportS3Method
+check_value.gym_space_array <- function(space, value, path, call, bounds = FALSE) {
+  refuse <- function(problem, path) abort_space(space, value, problem, call, path)
+  logical <- is.logical(value) && (space$dtype == "bool" || space$name == "MultiBinary")
+  if (!is.numeric(value) && !logical) {
+    refuse(paste("A value of a", space$name, "is numeric"), path)
+  }
+  if (!identical(value_shape(value, space$shape), space$shape)) {
+    refuse(paste("The value must be", wanted_shape(space$shape)), path)
+  }
+  flat <- row_major(value)
+  wrong <- wrong_number(space, flat)
+  if (is.null(wrong) && bounds) {
+    wrong <- out_of_bounds(space, flat)
+  }
+  if (!is.null(wrong)) {
+    refuse(wrong$problem, path_index(path, unravel(wrong$at, space$shape)))
+  }
+}
+
+wanted_shape <- function(shape) {
+  if (length(shape) <= 1L) {
+    paste("of length", prod(shape))
+  } else {
+    paste("an array with dim", paste(shape, collapse = " x "))
+  }
+}
+
+# A vector without dim is one-dimensional, or a scalar where the space is one.
+value_shape <- function(value, shape) {
+  if (!is.null(dim(value))) {
+    dim(value)
+  } else if (length(value) == 1L && length(shape) == 0L) {
+    integer()
+  } else {
+    length(value)
+  }
+}
+
+# The first number that cannot be one of the space's, NULL if all can. NaN is a
+# number; whether it is allowed is a matter of the bounds.
+wrong_number <- function(space, flat) {
+  if (anyNA(flat)) {
+    missing <- is.na(flat) & !is.nan(flat)
+    if (any(missing)) {
+      return(list(problem = "There is a missing value", at = which(missing)[[1L]]))
+    }
+  }
+  if (is.double(flat) && !inherits(flat, "integer64") && space$dtype %in% integer_dtypes) {
+    broken <- !is.finite(flat) | flat != trunc(flat)
+    if (any(broken)) {
+      return(list(problem = "There is a number that is not whole", at = which(broken)[[1L]]))
+    }
+  }
+}
+
+out_of_bounds <- function(space, flat) {
+  flat <- round_to_dtype(as_double(flat), space$dtype)
+  bounds <- space_bounds(space)
+  outside <- !(flat >= bounds$low & flat <= bounds$high)
+  outside <- is.na(outside) | outside
+  if (any(outside)) {
+    list(problem = "There is a number outside of the bounds", at = which(outside)[[1L]])
+  }
+}
+
+# Indices from 0 of an element of an array, given its number from 1, row by row.
+unravel <- function(at, shape) {
+  if (length(shape) == 0L) integer() else rev(arrayInd(at, rev(shape))) - 1L
+}
+
+# What a double becomes in a smaller dtype.
+round_to_dtype <- function(x, dtype) {
+  switch(dtype,
+    float32 = readBin(writeBin(as.double(x), raw(), size = 4L), "double", length(x), size = 4L),
+    float16 = double_from_half(half_from_double(x)),
+    x
+  )
+}
+
+# Writing ---------------------------------------------------------------------------
+
+#' @exportS3Method
+write_value.gym_space_array <- function(space, value) {
+  elements <- number_text_json(space$dtype, row_major(value))
+  if (length(space$shape) == 0L) elements else json_nested(elements, space$shape)
+}
+
+number_text_json <- function(dtype, flat) {
+  if (is.integer(flat) || !(dtype %in% integer_dtypes)) json_number(flat) else whole_text(flat)
+}
+
+# Drawing ---------------------------------------------------------------------------
+
+#' @exportS3Method
+space_sample.gym_space_array <- function(space) {
+  bounds <- space_bounds(space)
+  shape_values(draw_numbers(space$dtype, bounds$low, bounds$high), space$shape)
+}
+
+draw_numbers <- function(dtype, low, high) {
+  if (dtype == "bool") {
+    return(stats::runif(length(low)) < (low + high) / 2)
+  }
+  if (dtype %in% integer_dtypes) {
+    return(draw_whole(low, high))
+  }
+  round_to_dtype(draw_between(low, high), dtype)
+}
+
+draw_whole <- function(low, high) {
+  # The nearest doubles inside of what bit64 can hold.
+  low <- pmax(low, -2^63 + 1024)
+  high <- pmin(high, 2^63 - 1024)
+  width <- high - low
+  narrow <- width < 2^53
+  numbers <- floor(draw_between(low, high + narrow))
+  numbers <- pmin(pmax(numbers, low), high)
+  if (all(abs(numbers) <= 2^53)) narrow_whole(numbers) else whole_from_digits(whole_text(numbers))
+}
+
+draw_between <- function(low, high) {
+  n <- length(low)
+  values <- numeric(n)
+  below <- is.finite(low)
+  above <- is.finite(high)
+  both <- below & above
+  share <- stats::runif(sum(both))
+  # Two products, as high - low may be beyond the largest number.
+  values[both] <- low[both] * (1 - share) + high[both] * share
+  values[below & !above] <- low[below & !above] + stats::rexp(sum(below & !above))
+  values[above & !below] <- high[above & !below] - stats::rexp(sum(above & !below))
+  values[!below & !above] <- stats::rnorm(sum(!below & !above))
+  pmin(pmax(values, low), high)
+}

@@ -1,0 +1,214 @@
+# Spaces whose values hold any number of elements of another space: Sequence and
+# Graph. Elements that are numbers are stacked into one array, with the elements
+# along its first dimension; others are a list.
+
+is_stackable <- function(space) {
+  inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")
+}
+
+# The space of n stacked elements, for checks.
+stacked_space <- function(space, n) {
+  bounds <- space_bounds(space)
+  structure(
+    list(
+      name = space$name, dtype = space$dtype, shape = c(as.integer(n), space$shape),
+      low = rep(bounds$low, n), high = rep(bounds$high, n)
+    ),
+    class = c("gym_space_box", "gym_space_array", "gym_space")
+  )
+}
+
+decode_stack <- function(space, json) {
+  if (is_stackable(space)) {
+    shape_values(decode_numbers(space$dtype, json), c(length(json), space$shape))
+  } else {
+    lapply(json, decode_value, space = space)
+  }
+}
+
+check_stack <- function(space, value, path, call, bounds) {
+  if (is_stackable(space)) {
+    check_value(stacked_space(space, stack_length(value)), value, path, call, bounds)
+  } else {
+    check_elements(space, value, path, call, bounds)
+  }
+}
+
+check_elements <- function(space, value, path, call, bounds) {
+  if (!is.list(value)) {
+    abort_space(space, value, "Several values of this space are a list", call, path)
+  }
+  for (i in seq_along(value)) {
+    check_value(space, value[[i]], path_index(path, i - 1L), call, bounds)
+  }
+}
+
+stack_length <- function(value) {
+  axes <- dim(value)
+  if (is.null(axes)) length(value) else axes[[1L]]
+}
+
+write_stack <- function(space, value) {
+  if (is_stackable(space)) {
+    write_value(stacked_space(space, stack_length(value)), value)
+  } else {
+    write_elements(space, value)
+  }
+}
+
+write_elements <- function(space, value) {
+  json_array(vapply(unname(value), write_value, "", space = space))
+}
+
+sample_stack <- function(space, n) {
+  values <- lapply(seq_len(n), function(i) space_sample(space))
+  if (is_stackable(space)) stack_values(space, values) else values
+}
+
+stack_values <- function(space, values) {
+  flat <- lapply(values, row_major)
+  wide <- vapply(flat, inherits, NA, "integer64")
+  numbers <- if (any(wide)) {
+    whole_from_digits(unlist(lapply(flat, whole_text)))
+  } else if (length(flat)) {
+    unlist(flat)
+  } else {
+    decode_numbers(space$dtype, list())
+  }
+  shape_values(numbers, c(length(values), space$shape))
+}
+
+# Sequence --------------------------------------------------------------------------
+
+#' @exportS3Method
+init_space.gym_space_sequence <- function(space) {
+  space$space <- new_space(space$space)
+  space$stack <- isTRUE(space$stack)
+  space
+}
+
+#' @exportS3Method
+space_text.gym_space_sequence <- function(space) {
+  paste0("Sequence of ", space_text(space$space), if (space$stack) ", stacked")
+}
+
+#' @exportS3Method
+decode_value.gym_space_sequence <- function(space, json) {
+  if (space$stack) {
+    decode_stack(space$space, json)
+  } else {
+    lapply(json, decode_value, space = space$space)
+  }
+}
+
+#' @exportS3Method
+check_value.gym_space_sequence <- function(space, value, path, call, bounds = FALSE) {
+  check <- if (space$stack) check_stack else check_elements
+  check(space$space, value, path, call, bounds)
+}
+
+#' @exportS3Method
+write_value.gym_space_sequence <- function(space, value) {
+  if (space$stack) write_stack(space$space, value) else write_elements(space$space, value)
+}
+
+#' @exportS3Method
+space_sample.gym_space_sequence <- function(space) {
+  n <- 1L + stats::rgeom(1L, 0.25)
+  if (space$stack) {
+    sample_stack(space$space, n)
+  } else {
+    lapply(seq_len(n), function(i) space_sample(space$space))
+  }
+}
+
+# Graph -----------------------------------------------------------------------------
+
+#' @exportS3Method
+init_space.gym_space_graph <- function(space) {
+  space$node_space <- new_space(space$node_space)
+  if (!is.null(space$edge_space)) {
+    space$edge_space <- new_space(space$edge_space)
+  }
+  space
+}
+
+#' @exportS3Method
+space_text.gym_space_graph <- function(space) {
+  edges <- if (!is.null(space$edge_space)) paste(", edges", space_text(space$edge_space))
+  paste0("Graph of nodes ", space_text(space$node_space), edges)
+}
+
+#' @exportS3Method
+decode_value.gym_space_graph <- function(space, json) {
+  list(
+    nodes = decode_stack(space$node_space, json$nodes),
+    edges = if (!is.null(json$edges)) decode_stack(space$edge_space, json$edges),
+    edge_links = if (!is.null(json$edge_links)) decode_links(json$edge_links)
+  )
+}
+
+decode_links <- function(json) matrix(whole_from_json(json), ncol = 2L, byrow = TRUE)
+
+#' @exportS3Method
+check_value.gym_space_graph <- function(space, value, path, call, bounds = FALSE) {
+  parts <- c("nodes", "edges", "edge_links")
+  if (!is.list(value) || is.null(value$nodes) || !all(names(value) %in% parts)) {
+    problem <- "A value of Graph is a list of nodes, edges and edge_links"
+    abort_space(space, value, problem, call, path)
+  }
+  check_stack(space$node_space, value$nodes, path_key(path, "nodes"), call, bounds)
+  if (is.null(value$edges) != is.null(value$edge_links) ||
+        is.null(space$edge_space) && !is.null(value$edges)) {
+    problem <- "Edges need edge_links, edge_links need edges, and both a space that has edges"
+    abort_space(space, value, problem, call, path)
+  }
+  if (!is.null(value$edges)) {
+    check_stack(space$edge_space, value$edges, path_key(path, "edges"), call, bounds)
+    check_links(space, value, path, call)
+  }
+}
+
+check_links <- function(space, value, path, call) {
+  links <- stacked_links(stack_length(value$edges), stack_length(value$nodes))
+  check_value(links, value$edge_links, path_key(path, "edge_links"), call, bounds = TRUE)
+}
+
+# The space of edge_links: two nodes an edge.
+stacked_links <- function(edges, nodes) {
+  stacked_space(
+    structure(
+      list(name = "Box", dtype = "int64", shape = 2L, low = c(0, 0), high = rep(nodes - 1, 2L)),
+      class = c("gym_space_box", "gym_space_array", "gym_space")
+    ),
+    edges
+  )
+}
+
+#' @exportS3Method
+write_value.gym_space_graph <- function(space, value) {
+  with_edges <- !is.null(value$edges)
+  n <- if (with_edges) stack_length(value$edges) else 0L
+  json_object(c(
+    nodes = write_stack(space$node_space, value$nodes),
+    edges = if (with_edges) write_stack(space$edge_space, value$edges) else "null",
+    edge_links = if (with_edges) {
+      write_value(stacked_links(n, 1), value$edge_links)
+    } else {
+      "null"
+    }
+  ))
+}
+
+#' @exportS3Method
+space_sample.gym_space_graph <- function(space) {
+  nodes <- sample.int(10L, 1L)
+  edges <- if (is.null(space$edge_space)) 0L else sample.int(nodes * (nodes - 1L) + 1L, 1L) - 1L
+  list(
+    nodes = sample_stack(space$node_space, nodes),
+    edges = if (edges > 0L) sample_stack(space$edge_space, edges),
+    edge_links = if (edges > 0L) {
+      matrix(sample.int(nodes, 2L * edges, replace = TRUE) - 1L, ncol = 2L)
+    }
+  )
+}

@@ -1,0 +1,146 @@
+# Spaces made of other spaces, each value of which has a fixed form: Tuple, Dict,
+# and OneOf, which is one of several.
+
+#' @exportS3Method
+init_space.gym_space_tuple <- function(space) {
+  space$spaces <- lapply(space$spaces, new_space)
+  space
+}
+
+#' @exportS3Method
+init_space.gym_space_dict <- function(space) {
+  keys <- vapply(space$spaces, function(entry) entry$key, "")
+  space$spaces <- lapply(space$spaces, function(entry) new_space(entry$space))
+  names(space$spaces) <- keys
+  space
+}
+
+#' @exportS3Method
+init_space.gym_space_oneof <- init_space.gym_space_tuple
+
+#' @exportS3Method
+space_text.gym_space_tuple <- function(space) {
+  parts <- vapply(space$spaces, space_text, "")
+  paste0(space$name, " (", paste(parts, collapse = ", "), ")")
+}
+
+#' @exportS3Method
+space_text.gym_space_dict <- function(space) {
+  parts <- vapply(space$spaces, space_text, "")
+  paste0("Dict (", paste0(names(space$spaces), ": ", parts, recycle0 = TRUE, collapse = ", "), ")")
+}
+
+#' @exportS3Method
+space_text.gym_space_oneof <- space_text.gym_space_tuple
+
+# Tuple -----------------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_tuple <- function(space, json) Map(decode_value, space$spaces, json)
+
+#' @exportS3Method
+check_value.gym_space_tuple <- function(space, value, path, call, bounds = FALSE) {
+  n <- length(space$spaces)
+  if (!is.list(value) || length(value) != n) {
+    abort_space(space, value, paste("A value of this Tuple is a list of length", n), call, path)
+  }
+  for (i in seq_len(n)) {
+    check_value(space$spaces[[i]], value[[i]], path_index(path, i - 1L), call, bounds)
+  }
+}
+
+#' @exportS3Method
+write_value.gym_space_tuple <- function(space, value) {
+  json_array(mapply(write_value, space$spaces, unname(value)))
+}
+
+#' @exportS3Method
+space_sample.gym_space_tuple <- function(space) lapply(space$spaces, space_sample)
+
+# Dict ------------------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_dict <- function(space, json) {
+  values <- Map(decode_value, unname(space$spaces), json[match(names(space$spaces), names(json))])
+  names(values) <- names(space$spaces)
+  values
+}
+
+#' @exportS3Method
+check_value.gym_space_dict <- function(space, value, path, call, bounds = FALSE) {
+  keys <- names(space$spaces)
+  if (!is.list(value) || length(value) && is.null(names(value))) {
+    abort_space(space, value, "A value of Dict is a list with names", call, path)
+  }
+  given <- enc2utf8(as.character(names(value)))
+  problem <- key_problem(keys, given)
+  if (!is.null(problem)) {
+    abort_space(space, value, problem, call, path)
+  }
+  at <- match(keys, given)
+  for (i in seq_along(keys)) {
+    check_value(space$spaces[[i]], value[[at[[i]]]], path_key(path, keys[[i]]), call, bounds)
+  }
+}
+
+key_problem <- function(keys, given) {
+  missing <- setdiff(keys, given)
+  strange <- setdiff(given, keys)
+  if (length(missing)) {
+    paste0("The value has no element named \"", missing[[1L]], "\"")
+  } else if (length(strange)) {
+    paste0("The value has an element named \"", strange[[1L]], "\", which the space has not")
+  } else if (anyDuplicated(given)) {
+    paste0("The value has two elements named \"", given[anyDuplicated(given)], "\"")
+  }
+}
+
+#' @exportS3Method
+write_value.gym_space_dict <- function(space, value) {
+  keys <- names(space$spaces)
+  if (!length(keys)) {
+    return("{}")
+  }
+  ordered <- unname(value)[match(keys, enc2utf8(names(value)))]
+  paste0(
+    "{", paste0(json_string(keys), ":", mapply(write_value, space$spaces, ordered),
+                collapse = ","), "}"
+  )
+}
+
+#' @exportS3Method
+space_sample.gym_space_dict <- function(space) lapply(space$spaces, space_sample)
+
+# OneOf -----------------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_oneof <- function(space, json) {
+  index <- json[[1L]]
+  list(index, decode_value(space$spaces[[index + 1L]], json[[2L]]))
+}
+
+#' @exportS3Method
+check_value.gym_space_oneof <- function(space, value, path, call, bounds = FALSE) {
+  n <- length(space$spaces)
+  if (!is.list(value) || length(value) != 2L) {
+    abort_space(space, value, "A value of OneOf is a list of an index and a value", call, path)
+  }
+  index <- value[[1L]]
+  if (!is_number(index) || index != trunc(index) || index < 0 || index >= n) {
+    problem <- paste("The index must be a whole number from 0 to", n - 1L)
+    abort_space(space, value, problem, call, path_index(path, 0L))
+  }
+  check_value(space$spaces[[index + 1]], value[[2L]], path_index(path, 1L), call, bounds)
+}
+
+#' @exportS3Method
+write_value.gym_space_oneof <- function(space, value) {
+  index <- value[[1L]]
+  json_array(c(whole_text(index), write_value(space$spaces[[index + 1]], value[[2L]])))
+}
+
+#' @exportS3Method
+space_sample.gym_space_oneof <- function(space) {
+  index <- sample.int(length(space$spaces), 1L) - 1L
+  list(index, space_sample(space$spaces[[index + 1L]]))
+}

@@ -1,0 +1,64 @@
+# Discrete: one whole number of n that follow each other.
+
+#' @exportS3Method
+init_space.gym_space_discrete <- function(space) {
+  space$n <- whole_from_json(space$n)
+  space$start <- if (is.null(space$start)) 0L else whole_from_json(space$start)
+  space$dtype <- space$dtype %||% "int64"
+  space
+}
+
+#' @exportS3Method
+space_text.gym_space_discrete <- function(space) {
+  from <- if (space$start != 0) paste(" from", whole_text(space$start))
+  paste0("Discrete ", whole_text(space$n), from)
+}
+
+#' @exportS3Method
+space_bounds.gym_space_discrete <- function(space) {
+  start <- as_double(space$start)
+  list(low = start, high = start + (as_double(space$n) - 1))
+}
+
+#' @exportS3Method
+decode_value.gym_space_discrete <- function(space, json) whole_from_json(json)
+
+#' @exportS3Method
+check_value.gym_space_discrete <- function(space, value, path, call, bounds = FALSE) {
+  if (is.logical(value)) {
+    # As R counts, and Python.
+    value <- as.integer(value)
+  }
+  if (!is_whole(space, value)) {
+    abort_space(space, value, "A value of Discrete is one whole number", call, path)
+  }
+  if (bounds && !is.null(out_of_bounds(space, value))) {
+    abort_space(space, value, "The number is outside of the bounds", call, path)
+  }
+}
+
+# The first question is what nearly every step asks, and quick.
+is_whole <- function(space, value) {
+  if (length(value) != 1L || !is.numeric(value)) {
+    FALSE
+  } else if (is.object(value)) {
+    is.null(wrong_number(space, value))
+  } else {
+    is.finite(value) && value == trunc(value)
+  }
+}
+
+#' @exportS3Method
+write_value.gym_space_discrete <- function(space, value) {
+  if (is.object(value)) whole_text(value) else sprintf("%.0f", value)
+}
+
+#' @exportS3Method
+space_sample.gym_space_discrete <- function(space) {
+  if (is.integer(space$n) && is.integer(space$start)) {
+    space$start + sample.int(space$n, 1L) - 1L
+  } else {
+    bounds <- space_bounds(space)
+    draw_whole(bounds$low, bounds$high)
+  }
+}

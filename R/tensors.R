@@ -1,0 +1,236 @@
+# safetensors files: the length of a header (8 bytes), the header (JSON: name to
+# dtype, shape and place), then the bytes of the tensors, little-endian and row
+# by row. https://huggingface.co/docs/safetensors
+
+# Reading -----------------------------------------------------------------------
+
+#' Read a safetensors file
+#'
+#' @param bytes A raw vector.
+#' @param layouts An environment that remembers the headers read last, `NULL` for
+#'   none: a header seen before is not parsed again. Metadata at its end, where
+#'   our server puts it, differs from answer to answer and does not count.
+#' @return A list of `tensors`, a named list of vectors and arrays, and
+#'   `metadata`, a named list of strings.
+#' @noRd
+read_tensors <- function(bytes, layouts = NULL) {
+  size <- header_size(bytes)
+  header <- split_header(rawToChar(bytes[8L + seq_len(size)]))
+  layout <- known_layout(header$table, length(bytes) - 8L - size, layouts)
+  data <- 8L + size
+  tensors <- lapply(layout$entries, function(entry) {
+    entry$read(bytes[data + entry$begin + seq_len(entry$size)], entry$n, entry$shape)
+  })
+  last <- if (!is.null(header$metadata)) from_json(header$metadata)[["__metadata__"]]
+  list(tensors = tensors, metadata = last %||% layout$metadata)
+}
+
+# Quotes inside of names and texts are escaped, so nothing else looks like this.
+split_header <- function(header) {
+  at <- regexpr(",\"__metadata__\":", header, fixed = TRUE, useBytes = TRUE)
+  if (at < 0L) {
+    return(list(table = header))
+  }
+  bytes <- charToRaw(header)
+  list(
+    table = paste0(rawToChar(bytes[seq_len(at - 1L)]), "}"),
+    metadata = paste0("{", rawToChar(bytes[-seq_len(at)]))
+  )
+}
+
+header_size <- function(bytes) {
+  if (length(bytes) < 8L) {
+    abort_tensors("the file has fewer than 8 bytes")
+  }
+  size <- readBin(bytes, "integer", 2L, size = 4L, endian = "little")
+  if (anyNA(size) || size[[2L]] != 0L || size[[1L]] < 2L || size[[1L]] > length(bytes) - 8L) {
+    abort_tensors("the header is longer than the file")
+  }
+  size[[1L]]
+}
+
+known_layout <- function(table, total, layouts) {
+  for (known in layouts$seen) {
+    if (identical(known$table, table)) {
+      return(known$layout)
+    }
+  }
+  layout <- read_layout(table, total)
+  if (!is.null(layouts)) {
+    seen <- c(list(list(table = table, layout = layout)), layouts$seen)
+    layouts$seen <- utils::head(seen, max_layouts)
+  }
+  layout
+}
+
+# As many as there are kinds of answer of a few environments.
+max_layouts <- 8L
+
+read_layout <- function(table, total) {
+  entries <- tryCatch(
+    from_json(table),
+    error = function(cnd) abort_tensors("the header is no JSON")
+  )
+  list(
+    entries = lapply(entries[names(entries) != "__metadata__"], read_entry, total = total),
+    metadata = entries[["__metadata__"]]
+  )
+}
+
+read_entry <- function(entry, total) {
+  type <- tensor_types[[entry$dtype, exact = TRUE]]
+  if (is.null(type)) {
+    abort_tensors(paste("the dtype", entry$dtype, "is not known"))
+  }
+  shape <- as.integer(unlist(entry$shape))
+  n <- prod(shape)
+  begin <- entry$data_offsets[[1L]]
+  size <- entry$data_offsets[[2L]] - begin
+  if (size != n * type$size || begin + size > total) {
+    abort_tensors("an offset lies outside of the file")
+  }
+  list(read = type$read, n = n, shape = shape, begin = begin, size = size)
+}
+
+abort_tensors <- function(problem) {
+  gym_abort(
+    paste0("The tensors that came cannot be read: ", problem, "."),
+    class = "gym_error_connection",
+    call = NULL
+  )
+}
+
+# The types -----------------------------------------------------------------------
+
+read_double <- function(size) {
+  function(bytes, n, shape) {
+    shape_values(readBin(bytes, "double", n, size = size, endian = "little"), shape)
+  }
+}
+
+read_integer <- function(size, signed = TRUE) {
+  function(bytes, n, shape) {
+    values <- readBin(bytes, "integer", n, size = size, signed = signed, endian = "little")
+    shape_values(values, shape)
+  }
+}
+
+# Turned over while it is still small.
+read_byte <- function(bytes, n, shape) {
+  if (length(shape) > 1L) {
+    bytes <- shape_values(bytes, shape)
+    array(as.integer(bytes), shape)
+  } else {
+    as.integer(bytes)
+  }
+}
+
+# For R the bits of the least int32 are those of NA.
+read_int32 <- function(bytes, n, shape) {
+  values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
+  shape_values(if (anyNA(values)) signed_half(values) else values, shape)
+}
+
+read_uint32 <- function(bytes, n, shape) {
+  values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
+  wide <- anyNA(values) || any(values < 0L)
+  shape_values(if (wide) unsigned_half(values) else values, shape)
+}
+
+read_int64 <- function(signed) {
+  function(bytes, n, shape) shape_values(whole_from_halves(bytes, n, signed), shape)
+}
+
+read_half <- function(bytes, n, shape) {
+  bits <- readBin(bytes, "integer", n, size = 2L, signed = FALSE, endian = "little")
+  shape_values(double_from_half(bits), shape)
+}
+
+read_bool <- function(bytes, n, shape) shape_values(bytes != as.raw(0L), shape)
+
+write_double <- function(size) {
+  function(x) writeBin(as.double(x), raw(), size = size, endian = "little")
+}
+
+write_integer <- function(size) {
+  function(x) writeBin(as.integer(x), raw(), size = size, endian = "little")
+}
+
+write_int32 <- function(x) {
+  writeBin(int32_bits(as_double(x) %% 2^32), raw(), size = 4L, endian = "little")
+}
+
+write_half <- function(x) writeBin(half_from_double(x), raw(), size = 2L, endian = "little")
+
+write_byte <- function(x) as.raw(as.integer(x) %% 256L)
+
+write_int64 <- function(x) bytes_of_whole(x)
+
+# By the name in a header: the bytes of a number, how to read and write it.
+tensor_types <- list(
+  F64 = list(size = 8L, read = read_double(8L), write = write_double(8L)),
+  F32 = list(size = 4L, read = read_double(4L), write = write_double(4L)),
+  F16 = list(size = 2L, read = read_half, write = write_half),
+  I8 = list(size = 1L, read = read_integer(1L), write = write_byte),
+  I16 = list(size = 2L, read = read_integer(2L), write = write_integer(2L)),
+  I32 = list(size = 4L, read = read_int32, write = write_int32),
+  I64 = list(size = 8L, read = read_int64(TRUE), write = write_int64),
+  U8 = list(size = 1L, read = read_byte, write = write_byte),
+  U16 = list(size = 2L, read = read_integer(2L, signed = FALSE), write = write_integer(2L)),
+  U32 = list(size = 4L, read = read_uint32, write = write_int32),
+  U64 = list(size = 8L, read = read_int64(FALSE), write = write_int64),
+  BOOL = list(size = 1L, read = read_bool, write = write_byte)
+)
+
+# Halves: 1 bit of sign, 5 of exponent, 10 of fraction.
+double_from_half <- function(bits) {
+  exponent <- bits %/% 1024L %% 32L
+  fraction <- bits %% 1024L
+  values <- (1024 * (exponent > 0L) + fraction) * 2^(pmax(exponent, 1L) - 25)
+  values[exponent == 31L] <- ifelse(fraction[exponent == 31L] == 0L, Inf, NaN)
+  values * (1 - 2 * (bits >= 32768L))
+}
+
+half_from_double <- function(x) {
+  x <- as.double(x)
+  size <- abs(x)
+  exponent <- pmax(floor(log2(size)), -14)
+  # log2() may be a whole number too large just below a power of two.
+  exponent <- exponent - (size < 2^exponent & exponent > -14)
+  # round() takes the even neighbour, as floating-point numbers want it.
+  bits <- round(size / 2^(exponent - 10)) + (exponent + 14) * 1024
+  bits[bits > 31744 | is.infinite(x)] <- 31744
+  bits[is.nan(x)] <- 32256
+  negative <- x < 0 | x == 0 & 1 / x < 0
+  as.integer(bits + 32768 * (negative & !is.nan(x)))
+}
+
+# Writing -------------------------------------------------------------------------
+
+#' Write a safetensors file
+#'
+#' @param tensors A named list of tensors, each a list of `dtype` (as in
+#'   `tensor_types`), `shape` and `bytes`.
+#' @param metadata A named character vector.
+#' @return A raw vector. The header is filled up with blanks, so that bodies of
+#'   one layout have one length as a rule.
+#' @noRd
+write_tensors <- function(tensors, metadata) {
+  sizes <- vapply(tensors, function(tensor) as.double(length(tensor$bytes)), 0)
+  ends <- cumsum(sizes)
+  entries <- vapply(seq_along(tensors), function(i) {
+    tensor <- tensors[[i]]
+    sprintf(
+      "%s:{\"dtype\":\"%s\",\"shape\":[%s],\"data_offsets\":[%.0f,%.0f]}",
+      json_string(names(tensors)[[i]]), tensor$dtype, paste(tensor$shape, collapse = ","),
+      ends[[i]] - sizes[[i]], ends[[i]]
+    )
+  }, "")
+  about <- paste0(json_string(names(metadata)), ":", json_string(metadata), collapse = ",")
+  header <- paste0("{", paste0(c(paste0("\"__metadata__\":{", about, "}"), entries),
+                               collapse = ","), "}")
+  header <- charToRaw(header)
+  header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
+  length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
+  unlist(c(list(length_bytes, header), lapply(unname(tensors), function(tensor) tensor$bytes)))
+}

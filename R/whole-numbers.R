@@ -1,0 +1,164 @@
+# Whole numbers of up to 64 bits in R: integer where they all fit, double up to
+# 2^53, beyond it bit64's integer64. Never a rounded number, so what none of them
+# can hold is an error.
+
+integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
+
+# From JSON, where integers beyond 2^53 are text.
+whole_from_json <- function(json) {
+  numbers <- unlist(json, use.names = FALSE)
+  if (is.character(numbers)) {
+    return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
+  }
+  if (is.double(numbers)) {
+    check_exact(numbers)
+  }
+  if (is.null(numbers)) integer() else numbers
+}
+
+# The parser gives up on what int64 cannot hold and rounds it, as it does with
+# the least int64. Every other integer beyond 2^53 has come as text.
+check_exact <- function(numbers) {
+  lost <- abs(numbers) > 2^53
+  if (any(lost)) {
+    abort_whole(sprintf("%.0f", numbers[lost][[1L]]))
+  }
+}
+
+# From decimal digits.
+whole_from_digits <- function(digits) {
+  numbers <- as.numeric(digits)
+  if (all(abs(numbers) < 2^53 | digits %in% c("9007199254740992", "-9007199254740992"))) {
+    return(narrow_whole(numbers))
+  }
+  lost <- numbers == -2^63 & digits == "-9223372036854775808" |
+    numbers >= 2^63 & !(nchar(digits) == 19L & digits <= "9223372036854775807")
+  if (any(lost)) {
+    abort_whole(digits[lost][[1L]])
+  }
+  integers_beyond_double(digits)
+}
+
+narrow_whole <- function(numbers) {
+  if (all(abs(numbers) <= .Machine$integer.max)) as.integer(numbers) else numbers
+}
+
+integers_beyond_double <- function(digits,
+                                   has_bit64 = requireNamespace("bit64", quietly = TRUE)) {
+  if (!has_bit64) {
+    abort_without_bit64(digits[which.max(nchar(digits))])
+  }
+  bit64::as.integer64(digits)
+}
+
+abort_without_bit64 <- function(digits) {
+  gym_abort(
+    c(
+      paste0("The integer ", digits, " is beyond 2^53, where R's numbers have gaps."),
+      i = "With the package bit64 installed it arrives exactly: install.packages(\"bit64\")."
+    ),
+    class = "gym_error_space",
+    call = NULL
+  )
+}
+
+abort_whole <- function(digits) {
+  reason <- if (startsWith(digits, "-")) {
+    "is the smallest int64, which is bit64's NA: no number in R can hold it."
+  } else {
+    "is a uint64 beyond 2^63 - 1, the largest that R and bit64 can hold."
+  }
+  gym_abort(paste("The integer", digits, reason), class = "gym_error_space", call = NULL)
+}
+
+# Decimal digits of whole numbers, whatever holds them; text passes.
+whole_text <- function(x) {
+  if (is.character(x)) {
+    x
+  } else if (inherits(x, "integer64")) {
+    requireNamespace("bit64")
+    as.character(x)
+  } else {
+    sprintf("%.0f", x)
+  }
+}
+
+as_double <- function(x) {
+  if (inherits(x, "integer64")) as.numeric(whole_text(x)) else as.double(x)
+}
+
+# As two halves of 32 bits ---------------------------------------------------------
+
+# The halves are R integers that hold the bits of int32, so that NA is -2^31.
+whole_from_halves <- function(bytes, n, signed) {
+  halves <- readBin(bytes, "integer", 2L * n, size = 4L, endian = "little")
+  lower <- halves[2L * seq_len(n) - 1L]
+  upper <- halves[2L * seq_len(n)]
+  if (halves_are_narrow(lower, upper, signed)) {
+    return(lower)
+  }
+  numbers <- (if (signed) signed_half(upper) else unsigned_half(upper)) * 2^32 +
+    unsigned_half(lower)
+  # At 2^53 the sum is exact only if nothing was rounded away.
+  if (all(abs(numbers) < 2^53 | abs(numbers) == 2^53 & unsigned_half(lower) == 0)) {
+    return(numbers)
+  }
+  if (!requireNamespace("bit64", quietly = TRUE)) {
+    abort_without_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
+  }
+  lost <- if (signed) is.na(upper) & lower %in% 0L else is.na(upper) | upper < 0L
+  if (any(lost)) {
+    first <- which(lost)[[1L]]
+    abort_whole(digits_of_halves(signed_half(upper[first]), unsigned_half(lower[first]), signed))
+  }
+  structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
+}
+
+# Are the numbers those that fit an R integer?
+halves_are_narrow <- function(lower, upper, signed) {
+  !anyNA(lower) && !anyNA(upper) && all(upper == (lower < 0L) * -1L) &&
+    (signed || all(upper == 0L))
+}
+
+signed_half <- function(half) {
+  least <- is.na(half)
+  half <- as.double(half)
+  half[least] <- -2^31
+  half
+}
+
+unsigned_half <- function(half) {
+  half <- signed_half(half)
+  half + (half < 0) * 2^32
+}
+
+# Division by 10^9, by hand: no number of R's has these digits.
+digits_of_halves <- function(upper, lower, signed) {
+  if (signed) {
+    return("-9223372036854775808")
+  }
+  upper <- upper + (upper < 0) * 2^32
+  high <- upper %/% 1e9
+  rest <- (upper %% 1e9) * 2^32
+  # rest < 2^62: take it apart further before lower is added.
+  billions <- (rest %/% 2^16) %/% 1e9
+  rest <- ((rest %/% 2^16) %% 1e9) * 2^16
+  total <- high * 2^32 + billions * 2^16 + (rest + lower) %/% 1e9
+  paste0(sprintf("%.0f", total), sprintf("%09.0f", (rest + lower) %% 1e9))
+}
+
+bytes_of_whole <- function(x) {
+  if (inherits(x, "integer64")) {
+    return(writeBin(as.vector(unclass(x)), raw(), size = 8L, endian = "little"))
+  }
+  upper <- floor(x / 2^32)
+  halves <- rbind(int32_bits(x - upper * 2^32), int32_bits(upper %% 2^32))
+  writeBin(as.vector(halves), raw(), size = 4L, endian = "little")
+}
+
+# The R integer that has the bits of an unsigned number below 2^32: NA is 2^31.
+int32_bits <- function(x) {
+  x <- x - (x >= 2^31) * 2^32
+  x[x == -2^31] <- NA
+  as.integer(x)
+}

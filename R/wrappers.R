@@ -1,0 +1,82 @@
+#' Wrap an environment before it is made
+#'
+#' Notes a wrapper of Gymnasium's that the environment is to get when
+#' [gym_make()], [env_create()], [rollout()] or [search_random()] make it on the
+#' server: a limit of steps, a scale for its actions, a smaller picture. With the
+#' pipe several are written in the order in which they are applied. Nothing is
+#' made yet. The spaces that R sees are the wrapped environment's.
+#'
+#' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
+#'   `gym_wrap()` returned for one.
+#' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. Which there
+#'   are is the server's choice; the error for one that it does not know lists
+#'   them. Their arguments are in
+#'   [Gymnasium's documentation](https://gymnasium.farama.org/api/wrappers/).
+#' @param ... The wrapper's arguments, by name. A vector of length one travels as
+#'   a single value, wrapped in `I()` as a list of one.
+#' @return An object of class `gym_wrapped`, which prints in one line: a list of
+#'   `env_id` and `wrappers`.
+#' @section Errors: `gym_error_argument`; the server's come when the environment
+#'   is made, see [env_create()].
+#' @export
+#' @examples
+#' wrapped <- "CartPole-v1" |>
+#'   gym_wrap("TimeLimit", max_episode_steps = 50) |>
+#'   gym_wrap("NormalizeReward")
+#' wrapped
+#'
+#' @examplesIf gym:::can_start_server()
+#' env <- wrapped |> gym_make(seed = 1)
+#' env$reset()
+#' env$close()
+gym_wrap <- function(env_id, wrapper, ...) {
+  if (!inherits(env_id, "gym_wrapped")) {
+    check_string(env_id)
+    env_id <- structure(list(env_id = env_id, wrappers = list()), class = "gym_wrapped")
+  }
+  check_string(wrapper)
+  kwargs <- list(...)
+  check_dots_named(kwargs, "max_episode_steps = 50")
+  env_id$wrappers <- c(env_id$wrappers, list(c(list(wrapper), kwargs)))
+  env_id
+}
+
+#' @export
+format.gym_wrapped <- function(x, ...) {
+  paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")
+}
+
+#' @export
+print.gym_wrapped <- function(x, ...) {
+  cat("<", format(x), ">\n", sep = "")
+  invisible(x)
+}
+
+wrapper_text <- function(wrapper) {
+  values <- vapply(wrapper[-1L], describe_value, "")
+  arguments <- paste(names(wrapper)[-1L], values, sep = " = ", recycle0 = TRUE, collapse = ", ")
+  paste0(wrapper[[1L]], "(", arguments, ")")
+}
+
+check_wrappers <- function(wrappers, call = rlang::caller_env()) {
+  if (!is.list(wrappers) || !all(vapply(wrappers, is_wrapper, NA))) {
+    must <- "a list of lists such as list(\"TimeLimit\", max_episode_steps = 50)"
+    abort_argument(wrappers, must, "wrappers", call)
+  }
+}
+
+# A name first, then arguments with names.
+is_wrapper <- function(x) {
+  is.list(x) && length(x) > 0L && rlang::is_string(x[[1L]]) &&
+    (length(x) == 1L || rlang::is_named(x[-1L]))
+}
+
+wrappers_json <- function(wrappers) {
+  json_array(vapply(wrappers, function(wrapper) {
+    kwargs <- wrapper[-1L]
+    json_object(c(
+      name = json_string(wrapper[[1L]]),
+      kwargs = if (length(kwargs)) to_json(kwargs)
+    ))
+  }, ""))
+}

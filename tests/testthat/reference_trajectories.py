@@ -1,0 +1,89 @@
+"""Plays environments in process and writes down what came of it, for test-parity.R.
+
+Usage: reference_trajectories.py DIRECTORY < LINES, each with the name of a file to write, an
+environment's id and a number of steps. A file holds for the first reset and for each step, one
+after the other: the observation (its parts in order, row by row, bytes where the space has
+uint8, else doubles), for a step also reward, terminated and truncated as doubles; after every
+tenth step and the first reset a frame as bytes, where there are frames. All little-endian. It
+gets its name when it is complete; with ".failed" behind it holds the reason why there is none.
+"""
+
+import os
+import sys
+
+os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("SDL_AUDIODRIVER", "dummy")
+
+import gymnasium as gym
+import numpy as np
+from gym_server import mujoco_setup
+
+try:
+    import ale_py
+
+    gym.register_envs(ale_py)
+except ImportError:
+    pass
+
+SEED = 7
+
+
+def leaves(space, value):
+    """Yield the parts of a member as bytes."""
+    if isinstance(space, gym.spaces.Dict):
+        for key, part in space.spaces.items():
+            yield from leaves(part, value[key])
+    elif isinstance(space, gym.spaces.Tuple):
+        for part, item in zip(space.spaces, value, strict=True):
+            yield from leaves(part, item)
+    else:
+        yield np.asarray(value).astype("u1" if space.dtype == np.uint8 else "<f8").tobytes()
+
+
+def play(env, steps, out):
+    """Play with actions of the seeded action space; an episode that ends is followed by another."""
+    space = env.observation_space
+    env.action_space.seed(SEED)
+    draws = env.render_mode == "rgb_array"
+
+    def write(observation, *numbers, frame):
+        out.writelines(leaves(space, observation))
+        out.write(np.array(numbers, "<f8").tobytes())
+        if frame and draws:
+            out.write(np.asarray(env.render(), "u1").tobytes())
+
+    observation, _ = env.reset(seed=SEED)
+    write(observation, frame=True)
+    for step in range(1, steps + 1):
+        observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+        write(observation, reward, terminated, truncated, frame=step % 10 == 0)
+        if terminated or truncated:
+            env.reset()
+
+
+def make(env_id):
+    """Make an environment as the server does when nothing is said about pictures."""
+    env_class = gym.envs.registration.load_env_creator(gym.spec(env_id).entry_point)
+    draws = "rgb_array" in env_class.metadata.get("render_modes", ())
+    return gym.make(env_id, render_mode="rgb_array" if draws else None)
+
+
+def main(directory):
+    mujoco_setup.choose_gl()
+    for line in sys.stdin:
+        name, env_id, steps = line.split()
+        path = os.path.join(directory, name)
+        try:
+            env = make(env_id)
+            with open(path + ".part", "wb") as out:
+                play(env, int(steps), out)
+            env.close()
+        except Exception as error:
+            with open(path + ".part", "w") as out:
+                out.write(repr(error))
+            path += ".failed"
+        os.rename(os.path.join(directory, name + ".part"), path)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

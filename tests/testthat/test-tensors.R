@@ -1,0 +1,108 @@
+all_bytes <- function(path) readBin(path, "raw", file.size(path))
+
+test_that("files that PyPI's safetensors writes are read right, in every dtype", {
+  skip_if_not_installed("bit64")
+  client <- test_client()
+  python <- the_session$servers[[client$remote_base]]$python
+  path <- withr::local_tempfile(fileext = ".safetensors")
+  processx::run(python, c(test_path("write_safetensors.py"), path))
+  file <- read_tensors(all_bytes(path))
+  read <- file$tensors
+  expect_identical(file$metadata[c("format", "said")], list(format = "np", said = "a \"quote\"}"))
+  expect_identical(read$F64, c(NaN, Inf, -Inf, 0, 5e-324, 1 / 3))
+  expect_identical(1 / read$F64[4], -Inf)
+  expect_identical(read$F32[1, 1:2], c(3.4028234663852886e38, 1.401298464324817e-45))
+  expect_identical(read$F32[2, ], c(-1, 2, 3))
+  expect_identical(read$F16, c(65504, 5.9604644775390625e-08, -0.0999755859375, Inf, -Inf, 0))
+  expect_identical(1 / read$F16[6], -Inf)
+  expect_identical(read$I8, c(-128L, 127L))
+  expect_identical(read$I16, c(-32768L, 32767L))
+  expect_identical(read$I32, c(-2147483648, 2147483647))
+  expect_identical(
+    as.character(read$I64),
+    c("-9223372036854775807", "-1", "9007199254740993", "9223372036854775807")
+  )
+  expect_identical(read[["I64 small"]], c(-2147483647L, -1L, 0L, 2147483647L))
+  expect_identical(read[["I64 middle"]], c(-2^53, -2^31, 2^32 - 1, 2^53))
+  expect_identical(read$U8, aperm(array(0:23, c(4, 3, 2))))
+  expect_identical(read$U16, c(0L, 65535L))
+  expect_identical(read$U32, c(0, 2^31, 2^32 - 1))
+  expect_identical(as.character(read$U64), c("4294967296", "9223372036854775807"))
+  expect_identical(read$BOOL, matrix(c(TRUE, FALSE)))
+  expect_identical(read$scalar, 7L)
+  expect_identical(read[["empty/\u00e9"]], matrix(numeric(), 0, 3))
+})
+
+tensor <- function(dtype, shape, x) {
+  list(dtype = dtype, shape = shape, bytes = tensor_types[[dtype]]$write(x))
+}
+
+test_that("a header seen before is not parsed again, whatever its metadata", {
+  layouts <- new.env()
+  # As our server writes it: metadata last, of a length of its own.
+  file <- function(info) {
+    header <- paste0(
+      '{"x":{"dtype":"U8","shape":[2],"data_offsets":[0,2]},"__metadata__":{"info":"', info, '"}}'
+    )
+    c(writeBin(c(nchar(header), 0L), raw(), endian = "little"), charToRaw(header), as.raw(3:4))
+  }
+  first <- read_tensors(file("one"), layouts)
+  expect_identical(first, list(tensors = list(x = 3:4), metadata = list(info = "one")))
+  expect_length(layouts$seen, 1)
+  expect_identical(read_tensors(file("another"), layouts)$metadata$info, "another")
+  expect_length(layouts$seen, 1)
+  for (i in 1:20) {
+    read_tensors(write_tensors(list(x = tensor("U8", i, seq_len(i))), c(a = "")), layouts)
+  }
+  expect_length(layouts$seen, max_layouts)
+})
+
+test_that("halves round to the nearest, ties to the even, as NumPy's do", {
+  x <- c(1, 1 + 2^-11, 1 + 3 * 2^-11, 65519, 65520, 2^-24, 2^-25, 2^-14 - 2^-26, -2^-24, NaN)
+  back <- double_from_half(half_from_double(x))
+  expect_identical(
+    back, c(1, 1, 1 + 2^-9, 65504, Inf, 2^-24, 0, 2^-14, -2^-24, NaN)
+  )
+  bits <- setdiff(0:65535, c(31745:32767, 64513:65535))
+  expect_identical(half_from_double(double_from_half(bits)), bits)
+})
+
+test_that("a file that is no file is an error", {
+  good <- write_tensors(list(x = tensor("F32", 2L, 1:2)), c(request = "{}"))
+  words <- charToRaw("{\"message\": \"no\"}")
+  for (bad in list(raw(), good[1:7], good[1:20], head(good, -1), words)) {
+    expect_error(read_tensors(bad), "cannot be read", class = "gym_error_connection")
+  }
+})
+
+test_that("integers beyond what R can hold are errors with all of their digits", {
+  digits <- function(hex) {
+    bytes <- as.raw(strtoi(substring(hex, seq(15, 1, -2), seq(16, 2, -2)), 16))
+    tryCatch(whole_from_halves(bytes, 1L, FALSE), gym_error_space = conditionMessage)
+  }
+  skip_if_not_installed("bit64")
+  expect_match(digits("ffffffffffffffff"), "18446744073709551615")
+  expect_match(digits("8000000000000000"), "9223372036854775808")
+  expect_match(digits("e4a2b3c4d5e6f708"), "16474928044858341128")
+})
+
+test_that("a number that the dtype does not hold is no action, and names its place", {
+  space <- new_space(describe_dict(a = describe_box(c(0, 0), c(9, 9), dtype = "uint8")))
+  expect_error(to_tensors(space$spaces$a, c(3, 300), "action", NULL), "\\$\\[1\\]",
+               class = "gym_error_space")
+  narrow <- new_space(describe_box(-1e100, 1e100, dtype = "float32"))
+  expect_error(to_tensors(narrow, 1e300, "action", NULL), class = "gym_error_space")
+  expect_identical(length(to_tensors(narrow, Inf, "action", NULL)), 1L)
+})
+
+test_that("large observations and all frames travel as tensors, small ones do not", {
+  client <- test_client()
+  asks <- function(env) known_instance(client, env$instance_id)$takes_tensors
+  expect_false(asks(local_env("CartPole-v1")))
+  skip_if_not(env_registry(client, "CarRacing-v3")$available[1], "the extra box2d")
+  env <- local_env("CarRacing-v3", seed = 1)
+  expect_true(asks(env))
+  observation <- env$reset()
+  expect_type(observation, "integer")
+  expect_identical(dim(observation), c(96L, 96L, 3L))
+})
