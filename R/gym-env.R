@@ -6,13 +6,13 @@
 #' Gymnasium's documentation writes it with a dot. Without a `client` it lives
 #' on the session's own server, which is started when there is none.
 #'
+#' The environment is closed by `$close()`, or some time after the object itself
+#' has been thrown away: keep the object for as long as the environment is played.
+#'
 #' @inheritParams env_create
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole.
 #' @param client A client, by default that of [gym_client()].
-#' The environment is closed by `$close()`, or some time after the object itself
-#' has been thrown away: keep the object for as long as the environment is played.
-#'
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE)`: starts an episode
 #'     and returns the first observation, as [env_reset()],

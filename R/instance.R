@@ -163,6 +163,19 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   if (!is.list(x) || (length(x) && !rlang::is_named(x))) {
     abort_argument(x, "a list with names", arg, call)
   }
+  check_unique_names(x, arg, call)
+}
+
+# In JSON the last of them would win, and the others be gone without a word.
+check_unique_names <- function(x, arg, call) {
+  twice <- anyDuplicated(names(x))
+  if (twice) {
+    gym_abort(
+      paste0("`", arg, "` has `", names(x)[[twice]], "` more than once."),
+      class = "gym_error_argument",
+      call = call
+    )
+  }
 }
 
 check_dots_named <- function(dots, example, call = rlang::caller_env()) {
@@ -173,6 +186,7 @@ check_dots_named <- function(dots, example, call = rlang::caller_env()) {
       call = call
     )
   }
+  check_unique_names(dots, "...", call)
 }
 
 # Environments whose objects were thrown away are closed when the next is made:

@@ -56,6 +56,15 @@ part_names <- function(space, name) {
   paste0(name, "/", keys, recycle0 = TRUE)
 }
 
+part_paths <- function(space, path) {
+  keys <- names(space$spaces)
+  if (is.null(keys)) {
+    lapply(seq_along(space$spaces) - 1L, function(i) path_index(path, i))
+  } else {
+    lapply(keys, function(key) path_key(path, key))
+  }
+}
+
 #' Take a value out of an answer's tensors
 #' @param answer A list of `tensors` and `texts`, named lists.
 #' @noRd
@@ -86,36 +95,39 @@ from_tensors.gym_space_dict <- from_tensors.gym_space_tuple
 #' Put a value that was checked into tensors
 #' @return A named list of tensors for [write_tensors()], and strings for texts.
 #' @noRd
-to_tensors <- function(space, value, name, call) UseMethod("to_tensors")
+to_tensors <- function(space, value, name, call, path = "") UseMethod("to_tensors")
 
 #' @exportS3Method
-to_tensors.default <- function(space, value, name, call) {
+to_tensors.default <- function(space, value, name, call, path = "") {
   type <- tensor_dtypes[[space$dtype]]
   flat <- row_major(value)
-  check_dtype(space, flat, value, call)
+  check_dtype(space, flat, value, call, path)
   tensor <- list(dtype = type, shape = space$shape, bytes = tensor_types[[type]]$write(flat))
   stats::setNames(list(tensor), name)
 }
 
 # Whatever its dtype, Discrete takes the widest.
 #' @exportS3Method
-to_tensors.gym_space_discrete <- function(space, value, name, call) {
+to_tensors.gym_space_discrete <- function(space, value, name, call, path = "") {
   space$shape <- integer()
   space$dtype <- if (space$dtype == "uint64") "uint64" else "int64"
-  to_tensors.default(space, value, name, call)
+  to_tensors.default(space, value, name, call, path)
 }
 
 #' @exportS3Method
-to_tensors.gym_space_text <- function(space, value, name, call) {
+to_tensors.gym_space_text <- function(space, value, name, call, path = "") {
   stats::setNames(list(enc2utf8(value)), name)
 }
 
 #' @exportS3Method
-to_tensors.gym_space_tuple <- function(space, value, name, call) {
+to_tensors.gym_space_tuple <- function(space, value, name, call, path = "") {
   if (!is.null(names(space$spaces))) {
     value <- value[match(names(space$spaces), enc2utf8(names(value)))]
   }
-  parts <- Map(to_tensors, unname(space$spaces), unname(value), part_names(space, name), list(call))
+  parts <- Map(
+    to_tensors, unname(space$spaces), unname(value), part_names(space, name), list(call),
+    part_paths(space, path)
+  )
   as.list(do.call(c, unname(parts)))
 }
 
@@ -130,7 +142,7 @@ tensor_dtypes <- c(
 
 # Bytes cannot say what they could not hold: a number that wraps around or
 # overflows must not leave.
-check_dtype <- function(space, flat, value, call) {
+check_dtype <- function(space, flat, value, call, path = "") {
   numbers <- as_double(flat)
   lost <- if (space$dtype %in% names(dtype_ranges)) {
     range <- dtype_ranges[[space$dtype]]
@@ -139,7 +151,7 @@ check_dtype <- function(space, flat, value, call) {
     is.finite(numbers) & !is.finite(round_to_dtype(numbers, space$dtype))
   }
   if (any(lost)) {
-    at <- path_index("", unravel(which(lost)[[1L]], space$shape))
+    at <- path_index(path, unravel(which(lost)[[1L]], space$shape))
     abort_space(space, value, paste("There is a number that no", space$dtype, "holds"), call, at)
   }
 }

@@ -15,7 +15,11 @@
 #' @noRd
 read_tensors <- function(bytes, layouts = NULL) {
   size <- header_size(bytes)
-  header <- split_header(rawToChar(bytes[8L + seq_len(size)]))
+  text <- bytes[8L + seq_len(size)]
+  if (any(text == as.raw(0L))) {
+    abort_tensors("the header is no JSON")
+  }
+  header <- split_header(rawToChar(text))
   layout <- known_layout(header$table, length(bytes) - 8L - size, layouts)
   data <- 8L + size
   tensors <- lapply(layout$entries, function(entry) {
@@ -52,10 +56,12 @@ header_size <- function(bytes) {
 known_layout <- function(table, total, layouts) {
   for (known in layouts$seen) {
     if (identical(known$table, table)) {
+      check_end(known$layout, total)
       return(known$layout)
     }
   }
-  layout <- read_layout(table, total)
+  layout <- read_layout(table)
+  check_end(layout, total)
   if (!is.null(layouts)) {
     seen <- c(list(list(table = table, layout = layout)), layouts$seen)
     layouts$seen <- utils::head(seen, max_layouts)
@@ -66,18 +72,25 @@ known_layout <- function(table, total, layouts) {
 # As many as there are kinds of answer of a few environments.
 max_layouts <- 8L
 
-read_layout <- function(table, total) {
+read_layout <- function(table) {
   entries <- tryCatch(
     from_json(table),
     error = function(cnd) abort_tensors("the header is no JSON")
   )
+  if (!is.list(entries) || is.null(names(entries)) && length(entries)) {
+    abort_tensors("the header is no JSON object")
+  }
   list(
-    entries = lapply(entries[names(entries) != "__metadata__"], read_entry, total = total),
+    entries = lapply(entries[names(entries) != "__metadata__"], read_entry),
     metadata = entries[["__metadata__"]]
   )
 }
 
-read_entry <- function(entry, total) {
+read_entry <- function(entry) {
+  if (!is.list(entry) || !all(c("dtype", "shape", "data_offsets") %in% names(entry)) ||
+        length(entry$data_offsets) != 2L) {
+    abort_tensors("the header lacks the place of a tensor")
+  }
   type <- tensor_types[[entry$dtype, exact = TRUE]]
   if (is.null(type)) {
     abort_tensors(paste("the dtype", entry$dtype, "is not known"))
@@ -86,10 +99,17 @@ read_entry <- function(entry, total) {
   n <- prod(shape)
   begin <- entry$data_offsets[[1L]]
   size <- entry$data_offsets[[2L]] - begin
-  if (size != n * type$size || begin + size > total) {
-    abort_tensors("an offset lies outside of the file")
+  if (begin < 0 || size != n * type$size) {
+    abort_tensors("an offset does not fit its tensor")
   }
   list(read = type$read, n = n, shape = shape, begin = begin, size = size)
+}
+
+check_end <- function(layout, total) {
+  ends <- vapply(layout$entries, function(entry) entry$begin + entry$size, 0)
+  if (any(ends > total)) {
+    abort_tensors("an offset lies outside of the file")
+  }
 }
 
 abort_tensors <- function(problem) {

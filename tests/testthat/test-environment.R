@@ -155,6 +155,8 @@ test_that("arguments by name go to the environment", {
   expect_equal(env$step(1)$reward, 0)
   expect_error(local_env("CartPole-v1", wind = 3), "wind", class = "gym_error_http_400")
   expect_error(gym_make("CartPole-v1", 3), class = "gym_error_argument")
+  expect_error(gym_make("CartPole-v1", gravity = 1, gravity = 2), "more than once",
+               class = "gym_error_argument")
 })
 
 test_that("an environment that was thrown away is closed by the next that is made", {

@@ -106,3 +106,33 @@ test_that("large observations and all frames travel as tensors, small ones do no
   expect_type(observation, "integer")
   expect_identical(dim(observation), c(96L, 96L, 3L))
 })
+
+test_that("a file that is cut short is an error also when its header was seen before", {
+  tensors <- list(x = list(dtype = "I32", shape = 4L, bytes = tensor_types$I32$write(1:4)))
+  bytes <- write_tensors(tensors, c(info = "{}"))
+  layouts <- new.env()
+  expect_identical(read_tensors(bytes, layouts)$tensors$x, 1:4)
+  expect_error(read_tensors(utils::head(bytes, -8), layouts), class = "gym_error_connection")
+})
+
+test_that("a header that makes no sense is an error", {
+  file_of <- function(header) {
+    c(writeBin(c(nchar(header), 0L), raw(), endian = "little"), charToRaw(header), raw(16))
+  }
+  for (header in c(
+    "[1]", "{\"x\":1}", "{\"x\":{\"dtype\":\"I32\"}}", "not JSON",
+    "{\"x\":{\"dtype\":\"I32\",\"shape\":[1],\"data_offsets\":[-4,0]}}"
+  )) {
+    expect_error(read_tensors(file_of(header)), class = "gym_error_connection")
+  }
+})
+
+test_that("the error for a number that a dtype cannot hold names the whole path", {
+  space <- new_space(from_json(
+    '{"name":"Dict","dtype":null,"spaces":[{"key":"a","space":{"name":"Box","dtype":"float32",
+      "shape":[2],"low":[-1e100,-1e100],"high":[1e100,1e100]}}]}'
+  ))
+  error <- expect_error(to_tensors(space, list(a = c(0, 1e300)), "action", NULL),
+                        class = "gym_error_space")
+  expect_match(error$path, "a[1]", fixed = TRUE)
+})

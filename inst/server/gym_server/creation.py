@@ -12,7 +12,7 @@ from gymnasium.envs import registration
 from gym_server import mujoco_setup
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra
-from gym_server.plain import brief
+from gym_server.plain import brief, from_words
 from gym_server.registry import importing, look_up, near
 
 
@@ -42,7 +42,7 @@ def make(
     spec = find_spec(env_id, allowed_modules)
     try:
         chosen = _choose_render_mode(ask(_load_creator, spec), spec, render_mode)
-        return ask(_make, spec, chosen, kwargs)
+        return ask(_make, spec, chosen, from_words(kwargs))
     except GymServerError as refusal:
         extra = extra_of(spec)
         if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):

@@ -76,3 +76,14 @@ def _repr(value: object) -> str:
         return repr(value)
     except Exception:
         return f"<{type(value).__name__}>"
+
+
+def from_words(value: object):
+    """Return JSON values with the words for non-finite numbers as these numbers."""
+    if isinstance(value, str):
+        return NONFINITE.get(value, value)
+    if isinstance(value, list):
+        return [from_words(item) for item in value]
+    if isinstance(value, dict):
+        return {key: from_words(item) for key, item in value.items()}
+    return value

@@ -13,6 +13,7 @@ from gymnasium import error
 from gym_server.errors import GymServerError
 from gym_server.extras import missing_extra
 from gym_server.frames import RenderThread
+from gym_server.plain import brief, from_words
 
 # Those that take numbers, texts and lists, keep one environment one environment, and write no
 # files.  (Not: Autoreset, whose resets nobody would see; what takes functions or devices; what
@@ -52,6 +53,16 @@ _ARRAYS = {
     "max_action": "action_space",
     "min_obs": "observation_space",
     "max_obs": "observation_space",
+}
+
+# What takes room by the number that it is given: one client must not use up the machine.
+_AT_MOST = {
+    "AtariPreprocessing": {"screen_size": 4_096},
+    "DelayObservation": {"delay": 1_000},
+    "DiscretizeAction": {"bins": 10_000},
+    "DiscretizeObservation": {"bins": 10_000},
+    "FrameStackObservation": {"stack_size": 1_000},
+    "ResizeObservation": {"shape": 4_096},
 }
 
 # They draw when they are made and in each step.
@@ -115,6 +126,7 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
         inspect.signature(kind).bind(env, **wrapper.kwargs)
     except TypeError as failure:
         raise GymServerError("invalid_kwargs", f"{wrapper.name}: {failure}") from failure
+    _check_sizes(wrapper)
     try:
         return kind(
             env, **{name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}
@@ -130,7 +142,19 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
         ) from failure
 
 
+def _check_sizes(wrapper: Wrapper) -> None:
+    for name, most in _AT_MOST.get(wrapper.name, {}).items():
+        value = from_words(wrapper.kwargs.get(name))
+        for number in value if isinstance(value, list) else [value]:
+            if isinstance(number, (int, float)) and not number <= most:
+                raise GymServerError(
+                    "invalid_kwargs",
+                    f"{wrapper.name}: {name} must be at most {most}, not {brief(number)}",
+                )
+
+
 def _argument(env: gymnasium.Env, name: str, value: object) -> object:
+    value = from_words(value)
     if isinstance(value, list):
         items = [_argument(env, name, item) for item in value]
         return _array(getattr(env, _ARRAYS[name]), items) if name in _ARRAYS else tuple(items)

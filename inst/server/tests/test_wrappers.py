@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gym_server import wrappers
+from gym_server.errors import GymServerError
 from gym_server.tensors import TENSORS, read
 
 
@@ -229,3 +230,30 @@ def test_a_wrapper_whose_library_is_missing_names_the_extra(client, monkeypatch)
     assert refused["code"] == "missing_dependency"
     assert refused["message"] == "ResizeObservation needs the server's extra 'atari'"
     assert "opencv-python-headless" in refused["hint"]
+
+
+@pytest.mark.parametrize(
+    ("name", "kwargs"),
+    [
+        ("FrameStackObservation", {"stack_size": 10**9}),
+        ("FrameStackObservation", {"stack_size": "Infinity"}),
+        ("DelayObservation", {"delay": 10**9}),
+        ("ResizeObservation", {"shape": [10**6, 10**6]}),
+        ("DiscretizeObservation", {"bins": 10**9}),
+    ],
+)
+def test_no_wrapper_may_use_up_the_machine(name, kwargs):
+    # The check alone: were it missing, the real thing would take all memory.
+    with pytest.raises(GymServerError) as refusal:
+        wrappers._check_sizes(wrappers.Wrapper(name, kwargs))
+    assert refusal.value.code == "invalid_kwargs"
+    assert "at most" in str(refusal.value)
+
+
+def test_a_non_finite_argument_is_a_number(client):
+    chosen = wrapped("ClipReward", min_reward="-Infinity", max_reward=0.5)
+    answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1", "wrappers": [chosen]})
+    assert answer.status_code == 200, answer.json
+    instance = f"/v1/envs/{answer.json['instance_id']}"
+    client.post(f"{instance}/reset/")
+    assert client.post(f"{instance}/step/", json={"action": 1}).json["reward"] == 0.5
