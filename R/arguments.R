@@ -56,6 +56,36 @@ check_choice <- function(x, choices, arg = rlang::caller_arg(x), call = rlang::c
   invisible(x)
 }
 
+check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!is.list(x) || (length(x) && !rlang::is_named(x))) {
+    abort_argument(x, "a list with names", arg, call)
+  }
+  check_unique_names(x, arg, call)
+}
+
+# In JSON the last of them would win, and the others be gone without a word.
+check_unique_names <- function(x, arg, call) {
+  twice <- anyDuplicated(names(x))
+  if (twice) {
+    gym_abort(
+      paste0("`", arg, "` has `", names(x)[[twice]], "` more than once."),
+      class = "gym_error_argument",
+      call = call
+    )
+  }
+}
+
+check_dots_named <- function(dots, example, call = rlang::caller_env()) {
+  if (length(dots) && !rlang::is_named(dots)) {
+    gym_abort(
+      paste0("Further arguments need names, such as `", example, "`."),
+      class = "gym_error_argument",
+      call = call
+    )
+  }
+  check_unique_names(dots, "...", call)
+}
+
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
     paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),

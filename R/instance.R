@@ -148,7 +148,7 @@ warn_step_after_done <- function(instance, call) {
 encode_seed <- function(seed, call = rlang::caller_env()) {
   if (!is.null(seed)) {
     check_count(seed, min = 0, max = 2^53, call = call)
-    if (inherits(seed, "integer64")) as.character(seed) else sprintf("%.0f", seed)
+    whole_text(seed)
   }
 }
 
@@ -157,36 +157,6 @@ encode_options <- function(options, call) {
     check_named_list(options, call = call)
     to_json(options)
   }
-}
-
-check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (!is.list(x) || (length(x) && !rlang::is_named(x))) {
-    abort_argument(x, "a list with names", arg, call)
-  }
-  check_unique_names(x, arg, call)
-}
-
-# In JSON the last of them would win, and the others be gone without a word.
-check_unique_names <- function(x, arg, call) {
-  twice <- anyDuplicated(names(x))
-  if (twice) {
-    gym_abort(
-      paste0("`", arg, "` has `", names(x)[[twice]], "` more than once."),
-      class = "gym_error_argument",
-      call = call
-    )
-  }
-}
-
-check_dots_named <- function(dots, example, call = rlang::caller_env()) {
-  if (length(dots) && !rlang::is_named(dots)) {
-    gym_abort(
-      paste0("Further arguments need names, such as `", example, "`."),
-      class = "gym_error_argument",
-      call = call
-    )
-  }
-  check_unique_names(dots, "...", call)
 }
 
 # Environments whose objects were thrown away are closed when the next is made:

@@ -21,6 +21,7 @@ test_that("a frame follows the environment", {
 })
 
 test_that("a frame knows plot() and as.raster()", {
+  skip_if_not_installed("png")
   env <- local_env(seed = 1)
   env$reset()
   frame <- env$render()
