@@ -160,8 +160,8 @@ new_key <- function() {
 #' @param tensors Tensors for a body that is not JSON, see [write_tensors()].
 #' @param take_tensors Whether the answer should come as tensors.
 #' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the
-#'   `request` that was sent (its `key` and `number`) and the `layouts` of tensors
-#'   that the client has seen.
+#'   `request` that was sent (its `key` and `number`) and the parsed `answer`, `NULL`
+#'   for none or one that cannot be read.
 #' @noRd
 send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FALSE,
                  once = FALSE, call = rlang::caller_env()) {
@@ -182,15 +182,17 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
   }
   response <- fetch(client, line, channel, route, repeatable = once || is.null(fields), call)
   response$request <- request
-  response$layouts <- client$state$layouts
   response
 }
 
 channel_kind <- function(fields, tensors, take_tensors) {
   if (!is.null(tensors)) {
-    return("send_tensors")
+    "send_tensors"
+  } else if (is.null(fields)) {
+    if (take_tensors) "get_tensors" else "get"
+  } else {
+    if (take_tensors) "post_tensors" else "post"
   }
-  paste0(if (is.null(fields)) "get" else "post", if (take_tensors) "_tensors")
 }
 
 next_request <- function(line) {
@@ -224,11 +226,21 @@ fetch <- function(client, line, channel, route, repeatable, call) {
   attempt <- 1L
   repeat {
     line$sent <- 0L
-    response <- tryCatch(line$fetch(url, handle), error = identity)
-    if (!inherits(response, "error")) {
+    response <- NULL
+    problem <- tryCatch(
+      {
+        response <- line$fetch(url, handle)
+        response$answer <- parsed_body(response, client$state$layouts)
+        NULL
+      },
+      error = identity
+    )
+    if (!is.null(response)) {
+      # What cannot be read keeps its reason where we know it.
+      if (inherits(problem, "gym_error")) rlang::cnd_signal(problem)
       return(response)
     }
-    reason <- conditionMessage(response)
+    reason <- conditionMessage(problem)
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
@@ -282,7 +294,7 @@ post_answer <- function(client, route, fields = character(), call = rlang::calle
 #' @return The parsed answer, `NULL` for an empty one.
 #' @noRd
 read_answer <- function(response, method, call = rlang::caller_env()) {
-  answer <- if (response$status_code != 204L) parsed_body(response)
+  answer <- response$answer
   check_echo(response, answer, call)
   if (response$status_code >= 400L) {
     abort_http(response$status_code, answer, paste(method, response$url), call)
@@ -293,13 +305,16 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer
 }
 
-# An answer as a list; NULL for whatever else somebody else may have sent.
-parsed_body <- function(response) {
-  if (identical(response$type, tensors_type)) {
-    return(tensors_answer(response$content, response$layouts))
+# An answer as a list; NULL for an empty one, an error for what is none.
+parsed_body <- function(response, layouts = NULL) {
+  if (response$status_code == 204L) {
+    NULL
+  } else if (identical(response$type, tensors_type)) {
+    tensors_answer(response$content, layouts)
+  } else {
+    answer <- from_json(rawToChar(response$content))
+    if (is.list(answer)) answer
   }
-  answer <- tryCatch(from_json(rawToChar(response$content)), error = function(cnd) NULL)
-  if (is.list(answer)) answer
 }
 
 # An answer to another call would be worse than none.

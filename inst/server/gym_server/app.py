@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import re
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from hashlib import blake2b
+from http import HTTPStatus
 from pathlib import Path
+from typing import NamedTuple
 
 from flask import Flask, Response, request
+from werkzeug.datastructures import MIMEAccept
 from werkzeug.exceptions import MethodNotAllowed
+from werkzeug.http import parse_accept_header
 
 from gym_server import wire
 from gym_server.errors import answer_to
@@ -16,9 +21,12 @@ from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
 from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
-from gym_server.routes import ROUTES, Call, Route, Services
+from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
 from gym_server.tensors import TENSORS
 from gym_server.wire import Answer
+
+# The routes of each step; the id is one that an instance can have.
+_HOT = re.compile("/v1/envs/([0-9a-f]+)/(reset|step)/?")
 
 
 @dataclass(frozen=True)
@@ -56,16 +64,49 @@ class GymApp(Flask):
             config.stop,
         )
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
+        self._hot_handlers: dict[str, _Handler] = {}
         for route in ROUTES:
+            handler = _Handler(route, services, exactly_once)
             self.add_url_rule(
                 route.path,
                 endpoint=route.handler.__name__,
-                view_func=_view(route, services, exactly_once),
+                view_func=_view(handler),
                 methods=[route.method],
                 provide_automatic_options=False,
                 strict_slashes=False,
             )
+            if route.handler in (env_reset, env_step):
+                self._hot_handlers[route.path.split("/")[-2]] = handler
         self.register_error_handler(Exception, lambda error: _response(_failure(error, None)))
+
+    def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
+        """Answer by WSGI, resets and steps without Flask's dispatch: it takes longer than they."""
+        hot = _HOT.fullmatch(environ["PATH_INFO"])
+        length = environ.get("CONTENT_LENGTH", "")
+        if not (
+            hot
+            and environ["REQUEST_METHOD"] == "POST"
+            and length.isdecimal()
+            and int(length) <= self.config["MAX_CONTENT_LENGTH"]
+        ):
+            return super().wsgi_app(environ, start_response)
+        request = _Request(
+            "POST",
+            hot[0],
+            {"instance_id": hot[1]},
+            {},
+            environ["wsgi.input"].read(int(length)),
+            environ.get("CONTENT_TYPE", ""),
+            environ.get("HTTP_ACCEPT", ""),
+        )
+        answer = self._hot_handlers[hot[2]].answer(request)
+        headers = [
+            ("Content-Type", answer.content_type),
+            ("Content-Length", str(len(answer.body))),
+            *answer.headers,
+        ]
+        start_response(f"{answer.status} {HTTPStatus(answer.status).phrase}", headers)
+        return (answer.body,)
 
     def close(self) -> None:
         """Close every environment and monitor."""
@@ -79,44 +120,88 @@ def create_app(config: Config | None = None) -> GymApp:
     return GymApp(config or Config())
 
 
-def _view(
-    route: Route, services: Services, exactly_once: ExactlyOnce[Answer]
-) -> Callable[..., Response]:
-    def view(**path: str) -> Response:
-        sends_tensors = route.tensor_body and TENSORS in request.environ.get("CONTENT_TYPE", "")
+class _Request(NamedTuple):
+    """What the protocol needs to know of an HTTP request."""
+
+    method: str
+    path: str
+    variables: dict[str, str]
+    query: dict[str, str]
+    body: bytes
+    content_type: str
+    accept: str
+
+
+class _Handler:
+    """Answers the requests to one route, however they came here."""
+
+    def __init__(self, route: Route, services: Services, exactly_once: ExactlyOnce[Answer]) -> None:
+        self.route = route
+        self._services = services
+        self._exactly_once = exactly_once
+
+    def answer(self, request: _Request) -> Answer:
+        """Answer a request; whatever goes wrong is an answer, too."""
+        try:
+            return self._answer(request)
+        except Exception as error:
+            return _failure(error, None)
+
+    def _answer(self, request: _Request) -> Answer:
+        route = self.route
+        sends_tensors = route.tensor_body and TENSORS in request.content_type
         if route.method == "GET":
-            raw, body = b"", request.args.to_dict()
+            body = request.query
         else:
-            raw = request.get_data(cache=False)
-            body = wire.loads_tensors(raw) if sends_tensors else wire.loads(raw)
-        wants_tensors = route.tensors and _accepts_tensors(route)
+            body = wire.loads_tensors(request.body) if sends_tensors else wire.loads(request.body)
+        wants_tensors = route.tensors and _prefers_tensors(request.accept, route.content_type)
         request_id = wire.read(body, (wire.REQUEST,))["request"] if route.once else None
 
         def perform() -> Answer:
             try:
-                call = Call(services, path, body, wire.read(body, route.fields), wants_tensors)
+                fields = wire.read(body, route.fields)
+                call = Call(self._services, request.variables, body, fields, wants_tensors)
                 return wire.answer(route.handler(call), request_id)
             except Exception as error:
                 return _failure(error, request_id)
 
         if request_id is None:
-            return _response(perform())
-        digest = blake2b(raw, digest_size=16).digest()
+            return perform()
+        digest = blake2b(request.body, digest_size=16).digest()
         content = (request.method, request.path, digest, sends_tensors, wants_tensors)
         try:
-            answer = exactly_once.answer(request_id, content, perform)
+            return self._exactly_once.answer(request_id, content, perform)
         except Exception as error:
-            answer = _failure(error, request_id)
+            return _failure(error, request_id)
+
+
+def _prefers_tensors(accept: str, content_type: str) -> bool:
+    # Reading the header properly takes time in each step, and few clients write more than a name.
+    if TENSORS not in accept:
+        return False
+    if accept == TENSORS:
+        return True
+    return parse_accept_header(accept, MIMEAccept).best_match([TENSORS, content_type]) == TENSORS
+
+
+def _view(handler: _Handler) -> Callable[..., Response]:
+    """Return Flask's view of a route."""
+
+    def view(**variables: str) -> Response:
+        answer = handler.answer(
+            _Request(
+                request.method,
+                request.path,
+                variables,
+                request.args.to_dict(),
+                request.get_data(cache=False),
+                request.environ.get("CONTENT_TYPE", ""),
+                request.environ.get("HTTP_ACCEPT", ""),
+            )
+        )
         return _response(answer)
 
     return view
-
-
-def _accepts_tensors(route: Route) -> bool:
-    # Reading the header properly takes time in each step, and few clients name tensors in it.
-    if TENSORS not in request.environ.get("HTTP_ACCEPT", ""):
-        return False
-    return request.accept_mimetypes.best_match([TENSORS, route.content_type]) == TENSORS
 
 
 def _failure(error: Exception, request_id: RequestId | None) -> Answer:

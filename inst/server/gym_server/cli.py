@@ -131,8 +131,6 @@ def _set_up_logging(level: str) -> None:
     logging.captureWarnings(True)
     # RecordVideo says so of any folder that exists; what is in ours is the monitor's affair.
     warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
-    # It warns whenever two requests arrive at once.
-    logging.getLogger("waitress.queue").setLevel(logging.ERROR)
 
 
 def _is_loopback(host: str) -> bool:

@@ -1,6 +1,7 @@
 """The server as its clients' sockets see it."""
 
 import json
+import re
 import socket
 import struct
 import threading
@@ -137,6 +138,82 @@ def test_what_is_no_http_is_400_in_json(server):
         status, headers, body, _ = answered(connection, b"GET / HTTP/1.1\r\nbad header\r\n\r\n")
     assert (status, headers["content-type"]) == (400, "application/json")
     assert json.loads(body)["message"]
+
+
+def test_requests_sent_at_once_are_answered_in_order(server):
+    paths = ["/v1/envs/", "/v1/health/", "/nowhere", "/v1/envs/"]
+    with server.socket() as connection:
+        connection.sendall(b"".join(request("GET", path) for path in paths))
+        connection.shutdown(socket.SHUT_WR)
+        with connection.makefile("rb") as answers:
+            text = answers.read().decode()
+    assert re.findall(r"HTTP/1.1 (\d+)", text) == ["200", "200", "404", "200"]
+    assert text.index("all_envs") < text.index("versions") < text.index("not_found")
+
+
+def test_a_request_that_comes_byte_by_byte_is_read(server):
+    with server.socket() as connection:
+        for byte in request("POST", "/v1/envs/", b'{"env_id":"CartPole-v1"}'):
+            connection.sendall(bytes([byte]))
+        assert read_answer(connection)[0] == 200
+
+
+def test_an_upgrade_is_declined_and_the_request_answered(server):
+    headers = ("Connection: Upgrade, HTTP2-Settings", "Upgrade: h2c", "HTTP2-Settings: AAMAAABk")
+    with server.socket() as connection:
+        for sent in (
+            request("GET", "/v1/health/", b"", *headers),
+            request("POST", "/v1/envs/", b'{"env_id":"CartPole-v1"}', *headers),
+            request("GET", "/v1/health/"),
+        ):
+            assert answered(connection, sent)[0] == 200
+
+
+def test_http_1_0_is_answered_and_closed(server):
+    with server.socket() as connection:
+        assert answered(connection, b"GET /v1/health/ HTTP/1.0\r\n\r\n")[0] == 200
+        assert connection.recv(1) == b""
+
+
+def test_a_head_request_gets_no_body(server):
+    with server.socket() as connection:
+        connection.sendall(request("HEAD", "/v1/health/") + request("GET", "/v1/envs/"))
+        data = b""
+        while b"all_envs" not in data:
+            data += connection.recv(65536)
+    assert b"versions" not in data
+
+
+def test_a_url_with_its_host_is_that_of_its_path(server):
+    with server.socket() as connection:
+        sent = request("GET", f"http://127.0.0.1:{server.port}/v1/registry/?search=MountainCar-v0")
+        assert len(json.loads(answered(connection, sent)[2])["environments"]) == 1
+
+
+@pytest.mark.parametrize("endless", [b"GET /", b"GET / HTTP/1.1\r\nA: ", b"GET / HTTP/1.1\r\n"])
+def test_a_head_without_an_end_is_400_in_json(server, endless):
+    more = b"B: c\r\n" if endless.endswith(b"\n") else b"x"
+    with server.socket() as connection:
+        connection.sendall(endless + more * (70_000 // len(more)))
+        status, headers, body, _ = read_answer(connection)
+        assert (status, headers["content-type"]) == (400, "application/json")
+        assert "head" in json.loads(body)["message"]
+
+
+def test_trailers_without_an_end_are_400(server):
+    with server.socket() as connection:
+        connection.sendall(request("POST", "/v1/envs/", b"0\r\nA: ", "Transfer-Encoding: chunked"))
+        connection.sendall(b"x" * 140_000)
+        assert read_answer(connection)[0] == 400
+
+
+def test_a_header_with_an_underscore_is_no_other_header(server):
+    sent = request("POST", "/v1/upload/", b"{", "Transfer_Encoding: chunked", "Expect_: a")
+    with server.socket() as connection:
+        assert json.loads(answered(connection, sent)[2])["code"] == "malformed_json"
+    step = request("POST", "/v1/envs/0/step/", b"{}", "Content_Type: application/x-safetensors")
+    with server.socket() as connection:
+        assert json.loads(answered(connection, step)[2])["code"] == "missing_parameter"
 
 
 def test_a_request_repeated_after_the_connection_broke_is_done_once(server, counting):
