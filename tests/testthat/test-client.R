@@ -230,22 +230,29 @@ test_that("an answer to another call is an error, in a body and in a header", {
   header <- function(number) {
     sprintf("HTTP/1.1 204 No Content\r\nGym-Request: k %d\r\n\r\n", number)
   }
-  expect_equal(read_answer(answer(200, echo(4)), "POST")$request$number, 4)
-  expect_null(read_answer(answer(204, "", header(4)), "POST"))
+  read <- function(response) {
+    response["answer"] <- list(parsed_body(response))
+    read_answer(response, "POST")
+  }
+  expect_equal(read(answer(200, echo(4)))$request$number, 4)
+  expect_null(read(answer(204, "", header(4))))
   for (wrong in list(answer(200, echo(3)), answer(400, echo(5)), answer(204, "", header(3)))) {
-    expect_error(read_answer(wrong, "POST"), "another call", class = "gym_error_connection")
+    expect_error(read(wrong), "another call", class = "gym_error_connection")
   }
 })
 
 test_that("what is no answer of a Gym server is an error with a class", {
-  answer <- function(status, body) {
-    list(status_code = status, content = charToRaw(body), url = "http://127.0.0.1:1/",
-         type = "text/html")
+  read <- function(status, body) {
+    parse_server_error_or_raise_for_status(structure(
+      list(status_code = status, content = charToRaw(body), url = "http://127.0.0.1:1/",
+           type = "text/html", request = list(method = "GET")),
+      class = "response"
+    ))
   }
-  expect_error(read_answer(answer(200, "<html>"), "GET"), class = "gym_error_connection")
-  expect_error(read_answer(answer(200, "\"oops\""), "GET"), class = "gym_error_connection")
-  expect_error(read_answer(answer(302, ""), "GET"), class = "gym_error_connection")
-  expect_error(read_answer(answer(520, "\"oops\""), "GET"), class = "gym_error_http_520")
+  expect_error(read(200, "<html>"), class = "gym_error_connection")
+  expect_error(read(200, "\"oops\""), class = "gym_error_connection")
+  expect_error(read(302, ""), class = "gym_error_connection")
+  expect_error(read(520, "\"oops\""), class = "gym_error_http_520")
 })
 
 test_that("a large body arrives, one that is too large is told", {
