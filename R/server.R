@@ -163,8 +163,28 @@ server_environment <- function() {
     PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
     PYTHONUNBUFFERED = "1",
     # R's library may be another user's; nothing is written there.
-    PYTHONDONTWRITEBYTECODE = "1"
+    PYTHONDONTWRITEBYTECODE = "1",
+    own_library_path()
   )
+}
+
+# What LD_LIBRARY_PATH was before R's start put its own folders in front, where Python
+# would find the libraries of another Python.
+own_library_path <- function() {
+  path <- Sys.getenv("LD_LIBRARY_PATH")
+  script <- file.path(R.home("etc"), "ldpaths")
+  if (!nzchar(path) || !file.exists(script)) {
+    return(NULL)
+  }
+  added <- processx::run(
+    "sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
+    env = c("current", LD_LIBRARY_PATH = ""), error_on_status = FALSE
+  )$stdout
+  # More than once where R has started R.
+  while (nzchar(added) && startsWith(path, added)) {
+    path <- sub("^:", "", substring(path, nchar(added) + 1L))
+  }
+  c(LD_LIBRARY_PATH = path)
 }
 
 # Wait for the line by which the server says that it takes connections. Returns

@@ -199,3 +199,18 @@ test_that("the server ends with the R session, also when R is killed", {
     expect_false(pid_runs(pid))
   }
 })
+
+test_that("the server does not get the library path that R made for itself", {
+  skip_if_not(file.exists(file.path(R.home("etc"), "ldpaths")), "R that sets LD_LIBRARY_PATH")
+  path_in_r <- function(path) {
+    processx::run(
+      file.path(R.home("bin"), "Rscript"),
+      c("-e", "cat(gym:::own_library_path(), Sys.getenv('LD_LIBRARY_PATH'), sep = '\\n')"),
+      env = c("current", LD_LIBRARY_PATH = path, R_LIBS = paste(.libPaths(), collapse = ":"))
+    )$stdout
+  }
+  lines <- strsplit(path_in_r("/opt/a:/opt/b"), "\n")[[1]]
+  expect_identical(lines[[1]], "/opt/a:/opt/b")
+  expect_match(lines[[2]], ".+:/opt/a:/opt/b$")
+  expect_identical(strsplit(path_in_r(""), "\n")[[1]][[1]], "")
+})
