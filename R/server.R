@@ -177,7 +177,7 @@ own_library_path <- function() {
     return(NULL)
   }
   added <- processx::run(
-    "sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
+    "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
     env = c("current", LD_LIBRARY_PATH = ""), error_on_status = FALSE
   )$stdout
   # More than once where R has started R.
