@@ -29,6 +29,10 @@ from gym_server.wire import Answer
 _HOT = re.compile("/v1/envs/([0-9a-f]+)/(reset|step)/?")
 
 
+# As much as the answers that are kept beside it; a digest of it takes 40 us.
+_KEPT_BYTES = 2**16
+
+
 @dataclass(frozen=True)
 class Config:
     """How a server is set up.
@@ -38,6 +42,7 @@ class Config:
         temporary_monitors: whether they may also write below the system's temporary directory.
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
+        max_num_envs: how many lanes an environment may have.
         stop: asks the server to stop once the requests under way are answered.
     """
 
@@ -45,6 +50,7 @@ class Config:
     temporary_monitors: bool = True
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
+    max_num_envs: int = 16384
     stop: Callable[[], None] = lambda: None
 
 
@@ -57,7 +63,7 @@ class GymApp(Flask):
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(config.allowed_modules, self._renderer)
+        self._instances = Instances(config.allowed_modules, self._renderer, config.max_num_envs)
         services = Services(
             self._instances,
             self._monitor_root,
@@ -167,12 +173,16 @@ class _Handler:
 
         if request_id is None:
             return perform()
-        digest = blake2b(request.body, digest_size=16).digest()
-        content = (request.method, request.path, digest, sends_tensors, wants_tensors)
+        content = (request.path, _fingerprint(request.body), sends_tensors, wants_tensors)
         try:
             return self._exactly_once.answer(request_id, content, perform)
         except Exception as error:
             return _failure(error, request_id)
+
+
+def _fingerprint(body: bytes) -> bytes:
+    """Return what a repetition is known by: a digest where the body is too long to keep."""
+    return body if len(body) <= _KEPT_BYTES else blake2b(body).digest()
 
 
 def _prefers_tensors(accept: str, content_type: str) -> bool:

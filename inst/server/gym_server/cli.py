@@ -55,6 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             temporary_monitors=_is_loopback(options.host),
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
+            max_num_envs=options.max_num_envs,
             stop=stop,
         )
     )
@@ -105,6 +106,12 @@ def _parser() -> argparse.ArgumentParser:
         type=_number(1, 1024),
         default=16,
         help="size of the largest request (%(default)s)",
+    )
+    parser.add_argument(
+        "--max-num-envs",
+        type=_number(1, 1_000_000),
+        default=16384,
+        help="lanes of the largest vector environment (%(default)s)",
     )
     parser.add_argument(
         "--no-auth", action="store_true", help="serve a --host that others can reach"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 
 import gymnasium
 from gymnasium import error
@@ -33,16 +34,28 @@ def make(
             ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
             ``invalid_kwargs``, ``environment_error``.
     """
+    check_kwargs(kwargs)
+    spec = find_spec(env_id, allowed_modules)
+    with naming_extra(spec):
+        chosen = choose_render_mode(load_creator(spec), spec, render_mode)
+        return make_from_spec(spec, chosen, from_words(kwargs))
+
+
+def check_kwargs(kwargs: dict) -> None:
+    """Raise ``invalid_kwargs`` for an argument that is a parameter of its own."""
     if "render_mode" in kwargs:
         raise GymServerError(
             "invalid_kwargs",
             "kwargs must not carry 'render_mode'",
             "render_mode is a parameter of its own",
         )
-    spec = find_spec(env_id, allowed_modules)
+
+
+@contextlib.contextmanager
+def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
+    """Name the server's extra in a refusal for want of what it would bring."""
     try:
-        chosen = _choose_render_mode(ask(_load_creator, spec), spec, render_mode)
-        return ask(_make, spec, chosen, from_words(kwargs))
+        yield
     except GymServerError as refusal:
         extra = extra_of(spec)
         if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):
@@ -118,6 +131,15 @@ def _did_you_mean(name: str) -> str | None:
     return f"did you mean {' or '.join(ids)}?" if ids else None
 
 
+def load_creator(spec: registration.EnvSpec) -> Callable:
+    """Import what makes an environment.
+
+    Raises:
+        GymServerError: ``missing_dependency``, ``environment_error``.
+    """
+    return ask(_load_creator, spec)
+
+
 def _load_creator(spec: registration.EnvSpec) -> Callable:
     with importing:
         importlib.import_module("gymnasium.wrappers")
@@ -131,9 +153,19 @@ def _load_creator(spec: registration.EnvSpec) -> Callable:
         return creator
 
 
-def _choose_render_mode(
+def choose_render_mode(
     creator: Callable, spec: registration.EnvSpec, wanted: str | None
 ) -> str | None:
+    """Return the render_mode to make an environment with.
+
+    Args:
+        creator: what makes it; its metadata say what it can.
+        spec: names it.
+        wanted: see ``make()``.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
+    """
     metadata = getattr(creator, "metadata", None)
     # A function says nothing of what it makes; then Gymnasium gets to see what was asked.
     modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
@@ -146,13 +178,48 @@ def _choose_render_mode(
     return "rgb_array"
 
 
-def _make(spec: registration.EnvSpec, render_mode: str | None, kwargs: dict) -> gymnasium.Env:
+def make_from_spec(
+    spec: registration.EnvSpec, render_mode: str | None, kwargs: dict
+) -> gymnasium.Env:
+    """Make an environment of what the registry knows.
+
+    Raises:
+        GymServerError: ``missing_dependency``, ``invalid_kwargs``, ``environment_error``.
+    """
     # The checker would repeat itself in a log that nobody reads, and takes time in each step.
     ours = {"disable_env_checker": True}
     if render_mode is not None:
         ours["render_mode"] = render_mode
+    return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **kwargs}), kwargs)
+
+
+def make_vector_entry_point(
+    spec: registration.EnvSpec, num_envs: int, render_mode: str | None, kwargs: dict
+) -> gymnasium.vector.VectorEnv:
+    """Make an environment's own vector implementation.
+
+    Raises:
+        GymServerError: as for ``make_from_spec()``.
+    """
+
+    def make() -> gymnasium.vector.VectorEnv:
+        ours = {} if render_mode is None else {"render_mode": render_mode}
+        return gymnasium.make_vec(
+            spec,
+            num_envs=num_envs,
+            vectorization_mode="vector_entry_point",
+            vector_kwargs={},
+            wrappers=(),
+            **ours,
+            **kwargs,
+        )
+
+    return ask(_refusing_kwargs, make, kwargs)
+
+
+def _refusing_kwargs(make: Callable, kwargs: dict):
     try:
-        return gymnasium.make(spec, **{**ours, **kwargs})
+        return make()
     except TypeError as failure:
         if kwargs and any(words in str(failure) for words in _ABOUT_ARGUMENTS):
             raise GymServerError("invalid_kwargs", str(failure)) from failure

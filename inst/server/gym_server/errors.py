@@ -64,6 +64,14 @@ def invalid_parameter(name: str, value: object, wanted: str) -> GymServerError:
     )
 
 
+def wrong_length(name: str, found: int, lanes: int, what: str) -> GymServerError:
+    """A list has not one entry for each lane."""
+    return GymServerError(
+        "invalid_parameter",
+        f"The parameter '{name}' must hold one {what} for each of the {lanes} lanes, not {found}",
+    )
+
+
 def environment_error(error: BaseException) -> GymServerError:
     """Wrap what an environment's own code raised."""
     last_line = traceback.format_exception_only(type(error), error)[-1].strip()

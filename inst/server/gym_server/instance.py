@@ -4,32 +4,20 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import gymnasium
 import numpy as np
 
 from gym_server import spaces
+from gym_server.choices import Choices
 from gym_server.creation import ask
-from gym_server.errors import GymServerError, unknown_instance
+from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.frames import RenderThread, picture
 from gym_server.monitor import Monitor
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.plain import plain
-from gym_server.wrappers import Wrapper, draws_when_stepped
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What a client chose at creation."""
-
-    env_id: object
-    seed: int | None = None
-    render_mode: str | None = None
-    kwargs: dict | None = None
-    wrappers: tuple[Wrapper, ...] = ()
+from gym_server.wrappers import draws_when_stepped
 
 
 class Instance:
@@ -41,6 +29,7 @@ class Instance:
 
     # Given when the instance is listed.
     instance_id = ""
+    _lanes = 1
 
     def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
         """Take over an environment.
@@ -48,19 +37,19 @@ class Instance:
         Raises:
             GymServerError: ``unsupported_space``.
         """
-        self.action_space = env.action_space
-        self.observation_space = env.observation_space
-        self.action_space_info = spaces.describe(self.action_space)
-        self.observation_space_info = spaces.describe(self.observation_space)
-        self._observes_tensors = spaces.travels_as_tensors(self.observation_space)
+        self._env = env
+        self._learn_spaces()
+        self._lane_action_space_info = spaces.describe(self._lane_action_space)
+        self._lane_observation_space_info = spaces.describe(self._lane_observation_space)
+        self._observes_tensors = spaces.travels_as_tensors(self._lane_observation_space)
         # Whoever reads it can create another: with the module, and with the version found.
         module, colon, name = str(choices.env_id).rpartition(":")
         self.env_id = f"{module}{colon}{env.spec.id if env.spec else name}"
-        self._env = env
         self._choices = choices
         self._renderer = renderer
-        self._draws_when_stepped = draws_when_stepped(env)
+        self._draws_when_stepped = self._find_out_whether_it_draws()
         self._lock = threading.Lock()
+        self._held = _Held(self)
         self._closed = False
         self._monitor: Monitor | None = None
         self._seed_for_reset = choices.seed
@@ -70,9 +59,39 @@ class Instance:
         self._episode_steps = 0
         self._made = self._used = time.monotonic()
         if choices.seed is not None:
-            self.action_space.seed(choices.seed)
+            self._seed_actions(choices.seed)
 
-    def reset(self, seed: int | None, options: dict | None, tensors: bool = False) -> dict:
+    def _learn_spaces(self) -> None:
+        self.action_space = self._lane_action_space = self._env.action_space
+        self.observation_space = self._lane_observation_space = self._env.observation_space
+
+    def _find_out_whether_it_draws(self) -> bool:
+        return draws_when_stepped(self._env)
+
+    def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
+        # One generator serves all lanes.
+        seeds = seed if isinstance(seed, tuple) else (seed,)
+        first = next((one for one in seeds if one is not None), None)
+        if first is not None:
+            self.action_space.seed(first)
+
+    @property
+    def action_space_info(self) -> dict:
+        """The description of the action space."""
+        return self._lane_action_space_info
+
+    @property
+    def observation_space_info(self) -> dict:
+        """The description of the observation space."""
+        return self._lane_observation_space_info
+
+    def reset(
+        self,
+        seed: int | tuple[int | None, ...] | None,
+        options: dict | None,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+    ) -> dict:
         """Start an episode.
 
         Args:
@@ -80,12 +99,19 @@ class Instance:
                 takes the seed given at creation the first time.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
+            mask: for environments with lanes only.
 
         Returns:
             ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
             are wanted and its space can travel so.
+
+        Raises:
+            GymServerError: ``invalid_parameter``, ``not_supported``; ``environment_error``.
         """
-        with self._held():
+        _refuse_mask("reset_mask", mask)
+        if isinstance(seed, tuple):
+            raise invalid_parameter("seed", seed, "an integer, 0 or greater")
+        with self._held:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed
             self._was_reset = False
@@ -102,24 +128,26 @@ class Instance:
                 "info": ask(plain, info) if info else {},
             }
 
-    def step(self, action: object, tensors: bool = False) -> dict:
+    def step(self, action: object, tensors: bool = False, mask: np.ndarray | None = None) -> dict:
         """Take one step.
 
         Args:
             action: the JSON value of a member of the action space, or the member as ``Parts``.
             tensors: whether the observation is wanted as tensors.
+            mask: for environments with lanes only.
 
         Returns:
             ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
             values; the observation as for ``reset()``.
 
         Raises:
-            GymServerError: ``reset_needed`` or ``action_not_in_space``, both before the
-                environment moves; ``environment_error``.
+            GymServerError: ``reset_needed``, ``action_not_in_space`` or ``not_supported``, each
+                before the environment moves; ``environment_error``.
         """
-        with self._held():
+        _refuse_mask("step_mask", mask)
+        with self._held:
             if not self._was_reset:
-                raise _reset_needed("step()")
+                raise reset_needed("step()")
             try:
                 decoded = self._decode(action)
             except spaces.NotInSpace as refusal:
@@ -160,7 +188,7 @@ class Instance:
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
-        with self._held():
+        with self._held:
             return spaces.encode(self.action_space, self.action_space.sample())
 
     def action_contains(self, claim: dict) -> bool:
@@ -171,20 +199,23 @@ class Instance:
         """Answer a client's "contains"; see ``spaces.contains()``."""
         return spaces.contains(self.observation_space, self.observation_space_info, claim)
 
-    def render(self) -> np.ndarray:
-        """Draw the current state; see ``frames.picture()`` for the array.
+    def render(self, lane: int = 0) -> np.ndarray:
+        """Draw the current state of a lane; see ``frames.picture()`` for the array.
 
         Raises:
-            GymServerError: ``cannot_render`` or ``reset_needed``.
+            GymServerError: ``cannot_render``, ``reset_needed``, ``invalid_parameter``.
         """
-        with self._held():
+        if lane >= self._lanes:
+            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
+            raise invalid_parameter("lane", lane, f"{last} for this environment")
+        with self._held:
             if self._env.render_mode != "rgb_array":
                 raise GymServerError(
                     "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
                 )
             if not self._was_reset:
-                raise _reset_needed("render()")
-            frame = ask(self._renderer.run, self._env.render)
+                raise reset_needed("render()")
+            frame = ask(self._draw, lane)
         try:
             return picture(frame)
         except ValueError as error:
@@ -192,11 +223,14 @@ class Instance:
                 "cannot_render", f"What {self.env_id} draws is no picture: {error}"
             ) from error
 
+    def _draw(self, lane: int) -> object:
+        return self._renderer.run(self._env.render)
+
     def start_monitor(
         self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
-        with self._held():
+        with self._held:
             if self._monitor is not None:
                 raise GymServerError(
                     "monitor_active",
@@ -213,7 +247,7 @@ class Instance:
         Raises:
             GymServerError: ``monitor_not_active``.
         """
-        with self._held():
+        with self._held:
             if self._monitor is None:
                 raise GymServerError(
                     "monitor_not_active", f"Instance {self.instance_id} is not monitored"
@@ -222,13 +256,16 @@ class Instance:
 
     def close(self) -> None:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""
-        with self._held():
+        with self._held:
             self._closed = True
             try:
                 if self._monitor is not None:
                     self._finish_monitor()
             finally:
-                ask(self._renderer.run, self._env.close)
+                ask(self._close_env)
+
+    def _close_env(self) -> None:
+        self._renderer.run(self._env.close)
 
     def _finish_monitor(self) -> None:
         monitor, self._monitor = self._monitor, None
@@ -242,11 +279,14 @@ class Instance:
         return {
             "instance_id": self.instance_id,
             "env_id": self.env_id,
-            "observation_space": self.observation_space_info,
-            "action_space": self.action_space_info,
+            "observation_space": self._lane_observation_space_info,
+            "action_space": self._lane_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,
             "max_episode_steps": spec.max_episode_steps if spec else None,
-            "lanes": 1,
+            "lanes": self._lanes,
+            "num_envs": None,
+            "vectorization_mode": None,
+            "autoreset_mode": None,
             "render_mode": self._choices.render_mode or self._env.render_mode,
             "kwargs": self._choices.kwargs or {},
             "wrappers": [wrapper._asdict() for wrapper in self._choices.wrappers],
@@ -259,19 +299,35 @@ class Instance:
             "monitor": monitor.about() if monitor else None,
         }
 
-    @contextmanager
-    def _held(self) -> Iterator[None]:
-        with self._lock:
-            if self._closed:
-                raise unknown_instance(self.instance_id)
-            self._used = time.monotonic()
-            try:
-                yield
-            finally:
-                self._used = time.monotonic()
+
+class _Held:
+    """The right to move an environment; a context, in which nobody else has it."""
+
+    def __init__(self, instance: Instance) -> None:
+        self._instance = instance
+        self._lock = instance._lock
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if self._instance._closed:
+            self._lock.release()
+            raise unknown_instance(self._instance.instance_id)
+        self._instance._used = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        self._instance._used = time.monotonic()
+        self._lock.release()
 
 
-def _reset_needed(call: str) -> GymServerError:
+def _refuse_mask(name: str, mask: np.ndarray | None) -> None:
+    if mask is not None:
+        raise GymServerError(
+            "not_supported", f"'{name}' is for environments with lanes", "create it with num_envs"
+        )
+
+
+def reset_needed(call: str) -> GymServerError:
+    """A call needs an episode, and none runs."""
     return GymServerError(
         "reset_needed", f"{call} needs a running episode", "reset the environment first"
     )

@@ -8,10 +8,15 @@ import secrets
 import threading
 from collections.abc import Collection
 
-from gym_server import creation, registry, wrappers
+import gymnasium
+from gymnasium.vector import VectorEnv
+
+from gym_server import creation, registry, vectorization, wrappers
+from gym_server.choices import Choices
 from gym_server.errors import GymServerError, unknown_instance
 from gym_server.frames import RenderThread
-from gym_server.instance import Choices, Instance
+from gym_server.instance import Instance
+from gym_server.vector_instance import VectorInstance
 
 log = logging.getLogger(__name__)
 
@@ -19,13 +24,17 @@ log = logging.getLogger(__name__)
 class Instances:
     """All instances of a server."""
 
-    def __init__(self, allowed_modules: Collection[str], renderer: RenderThread) -> None:
+    def __init__(
+        self, allowed_modules: Collection[str], renderer: RenderThread, max_num_envs: int = 16384
+    ) -> None:
         """Start with none.
 
         Args:
             allowed_modules: names of the modules that an env_id may import.
             renderer: the process's render thread.
+            max_num_envs: how many lanes one of them may have.
         """
+        self._max_num_envs = max_num_envs
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
@@ -41,24 +50,39 @@ class Instances:
         """
         # Before an environment is made for nothing.
         wrappers.check_names(choices.wrappers)
-        env = creation.make(
-            choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
-        )
-        try:
-            env = wrappers.wrap(env, choices.wrappers, self._renderer)
-            instance = Instance(env, choices, self._renderer)
+        if choices.num_envs is None:
+            vectorization.check_single(choices)
+        make = self._make_single if choices.num_envs is None else self._make_vector
+        with contextlib.ExitStack() as undo:
+            instance = make(choices, undo)
             with self._lock:
                 if self._stopping:
                     raise GymServerError("shutting_down", "The server is stopping")
                 instance.instance_id = self._new_id()
                 self._instances[instance.instance_id] = instance
-            log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
-            return instance.instance_id
-        except Exception:
-            # What the client must hear of is why it gets no instance.
-            with contextlib.suppress(Exception):
-                self._renderer.run(env.close)
-            raise
+            undo.pop_all()
+        log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
+        return instance.instance_id
+
+    def _make_single(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
+        env = creation.make(
+            choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
+        )
+        undo.callback(self._close_quietly, env)
+        env = wrappers.wrap(env, choices.wrappers, self._renderer)
+        return Instance(env, choices, self._renderer)
+
+    def _make_vector(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
+        env, mode = vectorization.make(
+            choices, self._allowed_modules, self._max_num_envs, self._renderer
+        )
+        undo.callback(self._close_quietly, env)
+        return VectorInstance(env, mode, choices, self._renderer)
+
+    def _close_quietly(self, env: gymnasium.Env | VectorEnv) -> None:
+        # What the client must hear of is why it gets no instance.
+        with contextlib.suppress(Exception):
+            self._renderer.run(env.close)
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""

@@ -11,10 +11,11 @@ from typing import Any
 import gymnasium
 import numpy
 
-from gym_server import __version__, openapi, wire
+from gym_server import __version__, lane_fields, openapi, wire
+from gym_server.choices import Choices
 from gym_server.errors import GymServerError
 from gym_server.frames import png
-from gym_server.instance import Choices, Instance
+from gym_server.instance import Instance
 from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.tensors import TENSORS, Tensor
@@ -116,24 +117,33 @@ def _route(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Hand
     "POST",
     "/v1/envs/",
     Field("env_id", wire.ANY_ID, "What to create, such as CartPole-v1.", required=True),
-    Field("seed", wire.INTEGER, "Seeds the action space, and the first reset without a seed."),
+    Field(
+        "seed",
+        lane_fields.SEED,
+        "Seeds the action space, and the first reset without a seed; with num_envs also a list "
+        "of one a lane.",
+    ),
     Field("render_mode", wire.TEXT, "rgb_array (the default where it is supported) or human."),
     Field("kwargs", wire.OBJECT, "Handed to the environment."),
     Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
-    *map(wire.not_yet, ("num_envs", "vectorization_mode", "autoreset_mode")),
+    Field("num_envs", lane_fields.NUM_ENVS, "How many lanes; absent for a single environment."),
+    Field(
+        "vectorization_mode",
+        lane_fields.VECTORIZATION_MODE,
+        "What runs the lanes; absent for the fastest that can do what is asked.",
+    ),
+    Field(
+        "autoreset_mode",
+        lane_fields.AUTORESET_MODE,
+        "What becomes of a lane whose episode ended, in Gymnasium's words; absent for NextStep.",
+    ),
     answer="instance_id",
     once=True,
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
-    fields = call.fields
-    choices = Choices(
-        fields["env_id"],
-        fields["seed"],
-        fields["render_mode"],
-        fields["kwargs"],
-        fields["wrappers"] or (),
-    )
+    fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
+    choices = Choices(**fields)
     return {"instance_id": call.services.instances.create(choices)}
 
 
@@ -152,31 +162,46 @@ def env_about(call: Call) -> dict:
 @_route(
     "POST",
     _INSTANCE + "reset/",
-    Field("seed", wire.INTEGER, "Seeds the environment and its action space."),
+    Field(
+        "seed",
+        lane_fields.SEED,
+        "Seeds the environment and its action space; with lanes also a list of one a lane.",
+    ),
     Field("options", wire.OBJECT, "The environment's own."),
-    wire.not_yet("reset_mask"),
-    answer="observation, info",
+    Field("reset_mask", lane_fields.MASK, "Which lanes are reset; absent for all of them."),
+    answer="observation, info; with lanes one row a lane",
     once=True,
     tensors=True,
 )
 def env_reset(call: Call) -> dict:
     """Start an episode."""
-    return call.instance.reset(call.fields["seed"], call.fields["options"], call.tensors)
+    fields = call.fields
+    return call.instance.reset(
+        fields["seed"], fields["options"], call.tensors, fields["reset_mask"]
+    )
 
 
 @_route(
     "POST",
     _INSTANCE + "step/",
-    Field("action", wire.ANYTHING, "A member of the action space.", required=True),
+    Field(
+        "action",
+        wire.ANYTHING,
+        "A member of the action space; with lanes a list of one for each lane that steps.",
+        required=True,
+    ),
     Field("render", wire.BOOLEAN, "Classic; a frame is drawn when somebody asks for it."),
-    answer="observation, reward, done, terminated, truncated, info",
+    Field("step_mask", lane_fields.MASK, "Which lanes step; absent for all of them."),
+    answer="observation, reward, done, terminated, truncated, info; with lanes one row for each "
+    "that stepped, and final_obs and final_lanes where lanes ended and were reset at once",
     once=True,
     tensors=True,
     tensor_body=True,
 )
 def env_step(call: Call) -> dict:
     """Take one step."""
-    return call.instance.step(call.fields["action"], call.tensors)
+    fields = call.fields
+    return call.instance.step(fields["action"], call.tensors, fields["step_mask"])
 
 
 @_route("GET", _INSTANCE + "action_space/", answer="info: the space")
@@ -222,13 +247,14 @@ def env_observation_space_contains(call: Call) -> dict:
 @_route(
     "GET",
     _INSTANCE + "render/",
+    Field("lane", lane_fields.LANE, "Which lane, from 0; absent for the first."),
     answer="the current frame",
     content_type="image/png",
     tensors=True,
 )
 def env_render(call: Call) -> Content:
     """Draw the current state."""
-    frame = call.instance.render()
+    frame = call.instance.render(call.fields["lane"] or 0)
     if call.tensors:
         return Content(write_tensors({"frame": Tensor.of(frame)}, {}), TENSORS)
     return Content(png(frame), "image/png")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,14 @@ JSON = "application/json"
 # JSON ---------------------------------------------------------------------------------------
 
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
+
+
+def _refuse_constant(name: str) -> object:
+    raise ValueError(f'{name} is not JSON (as a string, "{name}", it is)')
+
+
+# json.loads() would make one each time.
+_decode = json.JSONDecoder(parse_constant=_refuse_constant).decode
 
 
 def dumps(value: object) -> bytes:
@@ -48,7 +58,7 @@ def loads(raw: bytes) -> dict:
     if not raw.strip():
         return {}
     try:
-        body = json.loads(raw, parse_constant=_refuse_constant)
+        body = _decode(raw.decode(json.detect_encoding(raw), "surrogatepass"))
     except (ValueError, RecursionError) as error:
         raise GymServerError(
             "malformed_json", f"The request's body is not valid JSON: {error}"
@@ -89,13 +99,13 @@ def _json_metadata(name: str, text: str) -> object:
     if name not in _JSON_METADATA:
         return None
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return _decode(text)
     except (ValueError, RecursionError) as error:
         raise malformed_tensors(f"the metadata {name!r} is not valid JSON: {error}") from None
 
 
 # Writers such as safetensors' own add texts of theirs ("format": "pt").
-_JSON_METADATA = ("render", "request", "texts")
+_JSON_METADATA = ("render", "request", "step_mask", "texts")
 
 _KIND_NAMES = {
     bool: "a boolean",
@@ -104,10 +114,6 @@ _KIND_NAMES = {
     str: "a string",
     list: "a list",
 }
-
-
-def _refuse_constant(name: str) -> object:
-    raise ValueError(f'{name} is not JSON (as a string, "{name}", it is)')
 
 
 # Fields -------------------------------------------------------------------------------------
@@ -178,7 +184,8 @@ def _boolean(value: object) -> bool:
     raise ValueError
 
 
-def _text(value: object) -> str:
+def text(value: object) -> str:
+    """Return a string, else raise ValueError."""
     if not isinstance(value, str):
         raise ValueError
     return value
@@ -194,7 +201,7 @@ def _wrappers(value: object) -> tuple[Wrapper, ...]:
     if not isinstance(value, list):
         raise ValueError
     wrappers = [
-        Wrapper(_text(item.get("name")), _object(item.get("kwargs") or {}))
+        Wrapper(text(item.get("name")), _object(item.get("kwargs") or {}))
         for item in map(_object, value)
     ]
     return tuple(wrappers)
@@ -207,27 +214,23 @@ def _video_callable(value: object) -> int:
     return integer(value)
 
 
+_KEY = re.compile("[!-~]{1,64}")
+
+
 def _request_id(value: object) -> RequestId:
     value = _object(value)
-    key, number = _text(value.get("key")), integer(value.get("number"))
+    key, number = text(value.get("key")), integer(value.get("number"))
     # It is echoed in a header, where nothing else may stand.
-    if not (1 <= len(key) <= 64 and all("!" <= character <= "~" for character in key)):
+    if _KEY.fullmatch(key) is None:
         raise ValueError
     return RequestId(key, number)
-
-
-def _not_yet(name: str) -> Kind:
-    def refuse(value: object) -> object:
-        raise GymServerError("not_supported", f"This server does not support '{name}'")
-
-    return Kind({"not": {}}, "absent", refuse)
 
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
 ANY_ID = Kind({"type": "string"}, "a string", lambda value: value)
 BOOLEAN = Kind({"type": "boolean"}, "true or false", _boolean)
 INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
-TEXT = Kind({"type": "string"}, "a string", _text)
+TEXT = Kind({"type": "string"}, "a string", text)
 OBJECT = Kind({"type": "object"}, "an object", _object)
 WRAPPERS = Kind(
     {
@@ -268,11 +271,6 @@ REQUEST = Field(
 )
 
 
-def not_yet(name: str) -> Field:
-    """Declare a field that is refused rather than ignored."""
-    return Field(name, _not_yet(name), "Not supported.")
-
-
 # Answers ------------------------------------------------------------------------------------
 
 
@@ -298,7 +296,7 @@ def answer(
     """Put a route's result into an answer.
 
     Args:
-        result: a JSON object, whose observation may be tensors, a content of its own, or None
+        result: a JSON object, whose observations may be tensors, a content of its own, or None
             for an answer without content (204).
         request_id: what the client called its request, echoed when given.
         status: the HTTP status of a JSON answer.
@@ -316,27 +314,43 @@ def answer(
     return Answer(status, dumps(result))
 
 
-def _dumps_tensors(observation: Parts, **others: object) -> bytes:
+def _dumps_tensors(observation: Parts, final_obs: Parts | None = None, **others: Any) -> bytes:
     """Return a reset's or a step's result as a safetensors file."""
-    tensors = dict(observation.tensors)
-    for name, dtype in _SCALARS.items():
-        if name in others:
-            tensors[name] = Tensor.of(np.array(others[name], dtype))
-    metadata = {name: others[name] for name in ("info", "request") if name in others}
-    if observation.texts:
-        metadata["texts"] = observation.texts
+    tensors, texts = dict(observation.tensors), dict(observation.texts)
+    if final_obs is not None:
+        tensors.update(final_obs.tensors)
+        texts.update(final_obs.texts)
+    for name, of_scalar in _SCALARS.items():
+        value = others.get(name)
+        if value is not None:
+            is_array = isinstance(value, np.ndarray)
+            tensors[name] = Tensor.of(value) if is_array else of_scalar(value)
+    metadata = {name: others[name] for name in _METADATA if name in others}
+    if texts:
+        metadata["texts"] = texts
     return write_tensors(
         tensors, {name: dumps(value).decode("ascii") for name, value in metadata.items()}
     )
 
 
-# What an answer holds beside the observation; done is one of the two flags.
-_SCALARS = {"reward": np.float64, "terminated": np.bool_, "truncated": np.bool_}
+def _flag(value: bool) -> Tensor:
+    return Tensor("BOOL", (), b"\1" if value else b"\0")
+
+
+# What an answer holds beside the observation; done is one of the two flags. With lanes they are
+# arrays already.
+_SCALARS = {
+    "reward": lambda value: Tensor("F64", (), struct.pack("<d", value)),
+    "terminated": _flag,
+    "truncated": _flag,
+}
+
+_METADATA = ("info", "request", "final_lanes")
 
 
 def parse_path_value(text: str) -> object:
     """Return a value that stands in a URL: JSON where it is JSON, else the text itself."""
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return _decode(text)
     except (ValueError, RecursionError):
         return text

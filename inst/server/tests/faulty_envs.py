@@ -4,6 +4,8 @@ For tests: ``--allow-module faulty_envs`` lets a server make them, as in
 ``faulty_envs:Echo-v0``.  The module needs Gymnasium and nothing else.
 """
 
+import copy
+import os
 import sys
 import threading
 import time
@@ -181,6 +183,88 @@ class Letters(Counting):
         return action, 0.0, False, False, {}
 
 
+SPACES = {
+    "Box": spaces.Box(-np.inf, np.inf, (2, 3), np.float32),
+    "bytes": spaces.Box(0, 254, (4,), np.uint8),
+    "half": spaces.Box(-1, 1, (1,), np.float16),
+    "bare": spaces.Box(-1, 1, (), np.float64),
+    "Discrete": spaces.Discrete(5, start=-2),
+    "MultiDiscrete": spaces.MultiDiscrete([[3, 4], [5, 6]], start=[[0, 1], [2, 3]]),
+    "MultiBinary": spaces.MultiBinary([2, 2]),
+    "Text": spaces.Text(5, charset="abé"),
+    "Tuple": spaces.Tuple([spaces.Discrete(3), spaces.Text(3), spaces.Box(0, 1, (2,), float)]),
+    "Dict": Nested.action_space,
+    "Sequence": spaces.Sequence(spaces.Box(0, 1, (2,), np.float32)),
+    "stacked": spaces.Sequence(spaces.Discrete(4), stack=True),
+    "Graph": spaces.Graph(spaces.Box(0, 1, (2,), np.float32), spaces.Discrete(3)),
+    "OneOf": spaces.OneOf([spaces.Discrete(3), spaces.Box(0, 1, (2,), np.float32)]),
+    "nothing": spaces.Dict({"a": spaces.Tuple([]), "b": spaces.Discrete(2)}),
+    "mixed": spaces.Dict({"a": spaces.Sequence(spaces.Text(2)), "b": spaces.Discrete(3)}),
+}
+
+
+class Uneven(gymnasium.Env):
+    """Its seed decides how long each episode lasts; its infos come and go."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, space="Box", longest=4, render_mode=None):
+        self.observation_space, self.action_space = (copy.deepcopy(SPACES[space]) for _ in "oa")
+        self.longest, self.render_mode = longest, render_mode
+        self.left = 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.left = int(self.np_random.integers(1, self.longest + 1))
+        return self.observe(), {"left": self.left, "options": options}
+
+    def observe(self):
+        self.observation_space.seed(int(self.np_random.integers(2**31)))
+        return self.observation_space.sample()
+
+    def step(self, action):
+        self.left -= 1
+        info = {"left": self.left, "action": repr(action)}
+        if self.left % 2:
+            numbers = np.array([self.left, -self.left], dtype=np.int16)
+            info["odd"] = {"half": self.left / 2, "numbers": numbers, "yes": True}
+        ended = self.left == 0
+        by_chance = bool(self.np_random.integers(2))
+        reward = float(self.np_random.normal())
+        return self.observe(), reward, ended and by_chance, ended and not by_chance, info
+
+    def render(self):
+        return np.full((2, 2, 3), self.left, dtype=np.uint8)
+
+
+class KillsItself(Uneven):
+    """Its process is gone in the second step."""
+
+    def step(self, action):
+        if self.left == 1:
+            os._exit(3)
+        self.left = 2
+        return super().step(action)
+
+
+class CannotSaySo(Uneven):
+    """What it raises cannot be sent to another process."""
+
+    def step(self, action):
+        failure = RuntimeError("here")
+        failure.lock = threading.Lock()
+        raise failure
+
+
+class SpoilsOneLane(Uneven):
+    """Fails in the lane whose episodes are longest."""
+
+    def step(self, action):
+        if self.left == self.longest:
+            raise ValueError("too long")
+        return super().step(action)
+
+
 class OwnSpace(spaces.Space):
     def __repr__(self):
         return "OwnSpace()"
@@ -204,11 +288,13 @@ _NAMED = ("inf", "-inf")
 
 for _kind in (
     Counting,
+    CannotSaySo,
     CustomSpace,
     Drawing,
     Echo,
     ExitsInStep,
     Hanging,
+    KillsItself,
     Letters,
     LongDouble,
     Nested,
@@ -219,5 +305,7 @@ for _kind in (
     RaisesInReset,
     RaisesInStep,
     Shifted,
+    SpoilsOneLane,
+    Uneven,
 ):
     gymnasium.register(id=f"{_kind.__name__}-v0", entry_point=_kind)

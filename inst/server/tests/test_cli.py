@@ -99,7 +99,10 @@ def test_a_monitor_directory_that_cannot_be_made_is_one_line_and_status_1(tmp_pa
     assert str(tmp_path / "file") in errors
 
 
-@pytest.mark.parametrize("options", [["--port", "65536"], ["--port", "x"], ["--max-body-mb", "0"]])
+@pytest.mark.parametrize(
+    "options",
+    [["--port", "65536"], ["--port", "x"], ["--max-body-mb", "0"], ["--max-num-envs", "0"]],
+)
 def test_options_out_of_range_are_refused(options, capsys):
     with pytest.raises(SystemExit):
         cli.main(options)
@@ -128,6 +131,13 @@ def test_its_own_monitor_directory_is_there_only_for_what_was_written(serve, tmp
 def test_the_size_of_a_request_is_limited_as_asked(serve):
     server = serve("--max-body-mb", "1")
     assert server.post("/v1/envs/", {"env_id": "x" * 2**20})[1]["code"] == "body_too_large"
+
+
+def test_the_number_of_lanes_is_limited_as_asked(serve):
+    server = serve("--max-num-envs", "3")
+    assert server.create("CartPole-v1", num_envs=3)
+    status, answer = server.post("/v1/envs/", {"env_id": "CartPole-v1", "num_envs": 4})
+    assert (status, answer["code"]) == (400, "too_many_lanes")
 
 
 def test_modules_are_allowed_by_the_operator_alone(serve):

@@ -23,7 +23,7 @@ def test_the_document_is_made_of_the_fields_that_are_parsed():
     body = document(ROUTES)["paths"]["/v1/envs/{instance_id}/step/"]["post"]["requestBody"]
     schema = body["content"]["application/json"]["schema"]
     assert schema["required"] == ["action"]
-    assert set(schema["properties"]) == {"action", "render", "request"}
+    assert set(schema["properties"]) == {"action", "render", "request", "step_mask"}
     json.dumps(schema, allow_nan=False)
 
 
@@ -73,3 +73,19 @@ def test_every_kind_of_answer_is_named(route):
     content = operation["responses"][str(route.status)].get("content", {})
     assert (route.content_type in content) is (route.status == 200)
     assert operation["responses"]["default"]["content"]["application/json"]
+
+
+def test_lanes_are_described():
+    paths = document(ROUTES)["paths"]
+
+    def fields(path):
+        body = paths[path]["post"]["requestBody"]["content"]["application/json"]
+        return body["schema"]["properties"]
+
+    created = fields("/v1/envs/")
+    assert created["num_envs"]["minimum"] == 1
+    assert created["vectorization_mode"]["enum"] == ["vector_entry_point", "sync", "async"]
+    assert created["autoreset_mode"]["enum"] == ["NextStep", "SameStep", "Disabled"]
+    assert "reset_mask" in fields("/v1/envs/{instance_id}/reset/")
+    drawn = paths["/v1/envs/{instance_id}/render/"]["get"]["parameters"]
+    assert [parameter["name"] for parameter in drawn] == ["instance_id", "lane"]

@@ -16,14 +16,6 @@ def test_a_seed_that_is_none_is_named(client, create, seed):
     assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
 
 
-@pytest.mark.parametrize("field", ["num_envs", "vectorization_mode", "autoreset_mode"])
-def test_what_is_not_supported_yet_is_never_ignored(client, field):
-    answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1", field: 2})
-    assert (answer.status_code, answer.json["code"]) == (400, "not_supported")
-    assert field in answer.json["message"]
-    assert client.get("/v1/envs/").json == {"all_envs": {}}
-
-
 @pytest.mark.parametrize(
     ("fields", "code"),
     [

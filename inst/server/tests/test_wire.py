@@ -106,11 +106,6 @@ def test_a_request_must_have_a_key_and_a_number(value):
     assert code_of(wire.read, {"request": value}, [wire.REQUEST]) == "invalid_parameter"
 
 
-def test_what_is_not_supported_yet_is_never_ignored():
-    assert code_of(wire.read, {"num_envs": 4}, [wire.not_yet("num_envs")]) == "not_supported"
-    assert wire.read({"num_envs": None}, [wire.not_yet("num_envs")]) == {"num_envs": None}
-
-
 def test_answers_echo_the_request():
     request = RequestId("k", 3)
     assert json.loads(wire.answer({"a": 1}, request).body)["request"] == {"key": "k", "number": 3}

@@ -17,8 +17,16 @@ from gym_server.spaces import (  # noqa: F401
     text,
     tuple_,
 )
+from gym_server.spaces.batches import (
+    decode_lanes,
+    decode_lanes_tensors,
+    encode_batch,
+    encode_batch_tensors,
+    encode_lanes,
+)
 from gym_server.spaces.kinds import NotInSpace, brief_space, decode, encode
-from gym_server.spaces.membership import contains
+from gym_server.spaces.membership import contains, describes
+from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe
 from gym_server.spaces.tensor_parts import (
     Parts,
@@ -33,9 +41,16 @@ __all__ = [
     "brief_space",
     "contains",
     "decode",
+    "decode_lanes",
+    "decode_lanes_tensors",
     "decode_tensors",
     "describe",
+    "describes",
     "encode",
+    "encode_batch",
+    "encode_batch_tensors",
+    "encode_lanes",
     "encode_tensors",
+    "stack",
     "travels_as_tensors",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import singledispatch
 
 import numpy as np
 from gymnasium.spaces import Space
@@ -58,8 +59,14 @@ def reader_of(dtype: np.dtype) -> Callable[[object], object]:
 class Bounds:
     """The smallest and the largest member, element by element."""
 
-    low: np.ndarray
-    high: np.ndarray
+    low: np.ndarray | int
+    high: np.ndarray | int
+
+
+@singledispatch
+def bounds_of(space: Space) -> Bounds:
+    """Return the smallest and the largest member of a space of arrays; batches have the same."""
+    raise TypeError(f"no bounds for {type(space).__name__}")
 
 
 def check_bounds(space: Space, bounds: Bounds, array: np.ndarray) -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from gymnasium.spaces import Box
 
-from gym_server.spaces.arrays import Bounds, read_array, reader_of
+from gym_server.spaces.arrays import Bounds, bounds_of, read_array, reader_of
 from gym_server.spaces.kinds import decode, description, encode
 
 # Classic clients cannot read infinities; they know this number instead.
@@ -34,6 +34,11 @@ def _(space: Box, value: object) -> object:
     return np.asarray(value).tolist()
 
 
+@bounds_of.register
+def _(space: Box) -> Bounds:
+    return Bounds(space.low, space.high)
+
+
 @decode.register
 def _(space: Box, value: object) -> object:
-    return read_array(space, Bounds(space.low, space.high), reader_of(space.dtype), value)
+    return read_array(space, bounds_of(space), reader_of(space.dtype), value)

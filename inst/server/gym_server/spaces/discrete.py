@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 from gymnasium.spaces import Discrete
 
-from gym_server.spaces.arrays import read_integer
+from gym_server.spaces.arrays import Bounds, bounds_of, read_integer
 from gym_server.spaces.kinds import NotInSpace, decode, description, encode
 
 
@@ -21,6 +22,17 @@ def _(space: Discrete) -> dict[str, object]:
 @encode.register
 def _(space: Discrete, value: object) -> object:
     return int(value)  # type: ignore[call-overload]
+
+
+@bounds_of.register
+def _(space: Discrete) -> Bounds:
+    # Python's own integers: an array is compared with them in its own dtype.
+    return Bounds(int(space.start), int(space.start) + int(space.n) - 1)
+
+
+def wide_dtype(space: Discrete) -> np.dtype:
+    """Return the dtype in which the members of a Discrete space travel as tensors."""
+    return np.dtype(np.uint64 if space.dtype == np.uint64 else np.int64)
 
 
 @decode.register

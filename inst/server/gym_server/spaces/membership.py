@@ -21,14 +21,19 @@ def contains(space: Space, space_info: dict, claim: dict) -> bool:
             whether all of it is so.
     """
     if "value" not in claim:
-        return all(
-            name in space_info and _same(value, space_info[name]) for name, value in claim.items()
-        )
+        return describes(claim, space_info)
     try:
         decode(space, claim["value"])
     except NotInSpace:
         return False
     return True
+
+
+def describes(claim: dict, space_info: dict) -> bool:
+    """Tell whether all of a classic client's description of a space is so."""
+    return all(
+        name in space_info and _same(value, space_info[name]) for name, value in claim.items()
+    )
 
 
 def _same(claimed: object, real: object) -> bool:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import MultiBinary
 
-from gym_server.spaces.arrays import Bounds, read_array, read_bit
+from gym_server.spaces.arrays import Bounds, bounds_of, read_array, read_bit
 from gym_server.spaces.kinds import decode, description, encode
 
-BITS = Bounds(np.int8(0), np.int8(1))
+_BITS = Bounds(np.int8(0), np.int8(1))
 
 
 @description.register
@@ -21,6 +21,11 @@ def _(space: MultiBinary, value: object) -> object:
     return np.asarray(value, dtype=space.dtype).tolist()
 
 
+@bounds_of.register
+def _(space: MultiBinary) -> Bounds:
+    return _BITS
+
+
 @decode.register
 def _(space: MultiBinary, value: object) -> object:
-    return read_array(space, BITS, read_bit, value)
+    return read_array(space, _BITS, read_bit, value)

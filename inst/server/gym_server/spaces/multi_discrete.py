@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import MultiDiscrete
 
-from gym_server.spaces.arrays import Bounds, read_array, reader_of
+from gym_server.spaces.arrays import Bounds, bounds_of, read_array, reader_of
 from gym_server.spaces.kinds import decode, description, encode
 
 
@@ -27,10 +27,10 @@ def _(space: MultiDiscrete, value: object) -> object:
 
 @decode.register
 def _(space: MultiDiscrete, value: object) -> object:
-    return read_array(space, multi_discrete_bounds(space), reader_of(space.dtype), value)
+    return read_array(space, bounds_of(space), reader_of(space.dtype), value)
 
 
-def multi_discrete_bounds(space: MultiDiscrete) -> Bounds:
-    """Return the smallest and the largest member."""
+@bounds_of.register
+def _(space: MultiDiscrete) -> Bounds:
     # The largest fits the dtype where start + nvec does not.
     return Bounds(space.start, space.start + (space.nvec - 1))

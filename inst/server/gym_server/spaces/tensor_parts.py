@@ -21,11 +21,10 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.spaces.arrays import Bounds, check_bounds
+from gym_server.spaces.arrays import bounds_of, check_bounds
+from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode
-from gym_server.spaces.multi_binary import BITS
-from gym_server.spaces.multi_discrete import multi_discrete_bounds
-from gym_server.tensors import Tensor, has_tensor
+from gym_server.tensors import Tensor, has_tensor, tensor_name
 
 
 @dataclass(frozen=True)
@@ -57,10 +56,15 @@ def decode_tensors(space: Space, name: str, sent: Parts) -> object:
     """
     left = Parts(dict(sent.tensors), dict(sent.texts))
     member = _put_together(space, name, left)
+    refuse_leftovers(space, name, left)
+    return member
+
+
+def refuse_leftovers(space: Space, name: str, left: Parts) -> None:
+    """Raise NotInSpace for a part that was sent and is none."""
     for unknown in (*left.tensors, *left.texts):
         if unknown == name or unknown.startswith(f"{name}/"):
             raise NotInSpace(space, unknown, "it has no such part")
-    return member
 
 
 @singledispatch
@@ -79,28 +83,33 @@ def _put_together(space: Space, name: str, parts: Parts) -> object:
     raise NotInSpace(space, name, "its members travel as JSON")
 
 
-def _part_name(name: str, key: object) -> str:
+def part_name(name: str, key: object) -> str:
+    """Return the name of a part of what has a name: a JSON pointer."""
     return f"{name}/{str(key).replace('~', '~0').replace('/', '~1')}"
 
 
-def _put_part_together(space: Space, name: str, key: object, parts: Parts, step: str | int):
+def put_part_together(space: Space, name: str, key: object, parts: Parts, step: str | int):
+    """Return a part of a member; a refusal names the step that leads to it."""
     try:
-        return _put_together(space, _part_name(name, key), parts)
+        return _put_together(space, part_name(name, key), parts)
     except NotInSpace as refusal:
         refusal.path.insert(0, step)
         raise
 
 
-def _take_array(space: Space, name: str, dtype: np.dtype, parts: Parts) -> np.ndarray:
+def take_array(
+    space: Space, name: str, dtype: np.dtype, shape: tuple[int, ...], parts: Parts
+) -> np.ndarray:
+    """Take the tensor of a name out of some parts; raise NotInSpace for another dtype or shape."""
     tensor = parts.tensors.pop(name, None)
     if tensor is None:
         raise NotInSpace(space, None, f"there is no tensor {name!r}")
-    wanted = Tensor.of(np.empty(0, dtype)).dtype
-    if (tensor.dtype, tensor.shape) != (wanted, space.shape):
+    wanted = tensor_name(dtype)
+    if (tensor.dtype, tensor.shape) != (wanted, shape):
         raise NotInSpace(
             space,
             f"{tensor.dtype} {list(tensor.shape)}",
-            f"{wanted} {list(space.shape or ())} is needed",
+            f"{wanted} {list(shape)} is needed",
         )
     return tensor.array()
 
@@ -127,25 +136,13 @@ def _(space: Space, name: str, value: object, parts: Parts) -> None:
     parts.tensors[name] = Tensor.of(array)
 
 
-@_put_together.register
-def _(space: Box, name: str, parts: Parts) -> object:
-    return _bounded(space, Bounds(space.low, space.high), name, parts)
-
-
-@_put_together.register
-def _(space: MultiDiscrete, name: str, parts: Parts) -> object:
-    return _bounded(space, multi_discrete_bounds(space), name, parts)
-
-
-@_put_together.register
-def _(space: MultiBinary, name: str, parts: Parts) -> object:
-    return _bounded(space, BITS, name, parts)
-
-
-def _bounded(space: Space, bounds: Bounds, name: str, parts: Parts) -> np.ndarray:
-    array = _take_array(space, name, space.dtype, parts)
-    check_bounds(space, bounds, array)
-    return array.astype(space.dtype, copy=False)
+@_put_together.register(Box)
+@_put_together.register(MultiBinary)
+@_put_together.register(MultiDiscrete)
+def _(space: Space, name: str, parts: Parts) -> object:
+    array = take_array(space, name, space.dtype, space.shape, parts)
+    check_bounds(space, bounds_of(space), array)
+    return array
 
 
 # Discrete -----------------------------------------------------------------------------------
@@ -153,16 +150,12 @@ def _bounded(space: Space, bounds: Bounds, name: str, parts: Parts) -> np.ndarra
 
 @_take_apart.register
 def _(space: Discrete, name: str, value: object, parts: Parts) -> None:
-    parts.tensors[name] = Tensor.of(np.array(int(value), _wide(space)))  # type: ignore[call-overload]
+    parts.tensors[name] = Tensor.of(np.array(int(value), wide_dtype(space)))  # type: ignore[call-overload]
 
 
 @_put_together.register
 def _(space: Discrete, name: str, parts: Parts) -> object:
-    return decode(space, _take_array(space, name, _wide(space), parts).item())
-
-
-def _wide(space: Discrete) -> np.dtype:
-    return np.dtype(np.uint64 if space.dtype == np.uint64 else np.int64)
+    return decode(space, take_array(space, name, wide_dtype(space), (), parts).item())
 
 
 # Text ---------------------------------------------------------------------------------------
@@ -194,13 +187,13 @@ def _(space: Tuple) -> bool:
 @_take_apart.register
 def _(space: Tuple, name: str, value: tuple, parts: Parts) -> None:
     for index, (part, item) in enumerate(zip(space.spaces, value, strict=True)):
-        _take_apart(part, _part_name(name, index), item, parts)
+        _take_apart(part, part_name(name, index), item, parts)
 
 
 @_put_together.register
 def _(space: Tuple, name: str, parts: Parts) -> object:
     return tuple(
-        _put_part_together(part, name, index, parts, index)
+        put_part_together(part, name, index, parts, index)
         for index, part in enumerate(space.spaces)
     )
 
@@ -216,12 +209,12 @@ def _(space: Dict) -> bool:
 @_take_apart.register
 def _(space: Dict, name: str, value: dict, parts: Parts) -> None:
     for key, part in space.spaces.items():
-        _take_apart(part, _part_name(name, key), value[key], parts)
+        _take_apart(part, part_name(name, key), value[key], parts)
 
 
 @_put_together.register
 def _(space: Dict, name: str, parts: Parts) -> object:
     return {
-        key: _put_part_together(part, name, key, parts, str(key))
+        key: put_part_together(part, name, key, parts, str(key))
         for key, part in space.spaces.items()
     }

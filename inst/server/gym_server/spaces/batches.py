@@ -1,0 +1,263 @@
+"""Batches of members of a space, one member a lane, as Gymnasium's vector environments have them.
+
+Arrays carry the lanes along their first axis, Tuples and Dicts are batched part by part, and
+Text, Sequence, Graph and OneOf have one entry a lane.  Nothing here loops over the lanes of
+an array.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text, Tuple
+
+from gym_server.spaces.arrays import bounds_of, check_bounds, read_array, read_bit, reader_of
+from gym_server.spaces.discrete import wide_dtype
+from gym_server.spaces.kinds import NotInSpace, decode_part, encode
+from gym_server.spaces.stacking import stack, unstack
+from gym_server.spaces.tensor_parts import (
+    Parts,
+    part_name,
+    put_part_together,
+    refuse_leftovers,
+    take_array,
+)
+from gym_server.tensors import Tensor, has_tensor
+
+_ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
+
+
+@singledispatch
+def encode_batch(space: Space, batch: object) -> object:
+    """Return a batch of members of a space as JSON values (floats may still be non-finite)."""
+    return [encode(space, member) for member in batch]  # type: ignore[attr-defined]
+
+
+@encode_batch.register
+def _(space: MultiBinary, batch: object) -> object:
+    return np.asarray(batch, dtype=space.dtype).tolist()
+
+
+@encode_batch.register(Box)
+@encode_batch.register(Discrete)
+@encode_batch.register(MultiDiscrete)
+def _(space: Space, batch: object) -> object:
+    return np.asarray(batch).tolist()
+
+
+@encode_batch.register
+def _(space: Tuple, batch: tuple) -> object:
+    return [encode_batch(part, items) for part, items in zip(space.spaces, batch, strict=True)]
+
+
+@encode_batch.register
+def _(space: Dict, batch: dict) -> object:
+    return {str(key): encode_batch(part, batch[key]) for key, part in space.spaces.items()}
+
+
+def encode_lanes(space: Space, batch: object) -> list:
+    """Return a batch as JSON values, one a lane: what ``decode_lanes()`` reads."""
+    return [encode(space, member) for member in unstack(space, batch)]  # type: ignore[arg-type]
+
+
+def decode_lanes(space: Space, value: object, lanes: int, whose: str) -> object:
+    """Return the batch that a list of JSON values stands for, each of them a lane's.
+
+    Args:
+        space: of one lane.
+        value: what came.
+        lanes: how many there are.
+        whose: names the lanes where the number is wrong, in words that follow "for each of".
+
+    Raises:
+        NotInSpace: for a wrong number of lanes; for a value that is no member, with the lane
+            (from 0) as the first step of its path.
+    """
+    if not isinstance(value, list) or len(value) != lanes:
+        found = f", not {len(value)}" if isinstance(value, list) else ", as a list"
+        raise NotInSpace(space, value, f"one action for each of {whose} is needed{found}")
+    if isinstance(space, _ARRAYS):
+        try:
+            return _all_at_once(space, value)
+        except (TypeError, ValueError, OverflowError, NotInSpace):
+            # Lanes may write their values in several ways, and a refusal names the lane.
+            pass
+    return stack(space, [decode_part(space, item, lane) for lane, item in enumerate(value)])
+
+
+class _Batched(NamedTuple):
+    """As much of a batched space as ``read_array()`` needs."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+
+
+def _all_at_once(space: Space, value: list) -> np.ndarray:
+    batched = _Batched((len(value), *space.shape), space.dtype)
+    if not isinstance(space, Discrete):
+        reader = read_bit if isinstance(space, MultiBinary) else reader_of(space.dtype)
+        return read_array(batched, bounds_of(space), reader, value)  # type: ignore[arg-type]
+    if set(map(type, value)) != {int}:
+        raise TypeError("not only integers")
+    array = np.array(value, dtype=wide_dtype(space))
+    check_bounds(space, bounds_of(space), array)
+    return array.astype(space.dtype)
+
+
+# Tensors ------------------------------------------------------------------------------------
+
+
+def encode_batch_tensors(space: Space, name: str, batch: object) -> Parts:
+    """Return a batch of members of a space as tensors; see ``travels_as_tensors()``."""
+    parts = Parts()
+    _take_apart(space, name, batch, parts)
+    return parts
+
+
+@singledispatch
+def _take_apart(space: Space, name: str, batch: object, parts: Parts) -> None:
+    raise TypeError(f"no tensors for {type(space).__name__}")
+
+
+@_take_apart.register(Box)
+@_take_apart.register(MultiBinary)
+@_take_apart.register(MultiDiscrete)
+def _(space: Space, name: str, batch: object, parts: Parts) -> None:
+    array = np.asarray(batch)
+    if not has_tensor(array.dtype):
+        array = array.astype(space.dtype)
+    parts.tensors[name] = Tensor.of(array)
+
+
+@_take_apart.register
+def _(space: Discrete, name: str, batch: object, parts: Parts) -> None:
+    parts.tensors[name] = Tensor.of(np.asarray(batch, wide_dtype(space)))
+
+
+@_take_apart.register
+def _(space: Text, name: str, batch: tuple, parts: Parts) -> None:
+    for lane, text in enumerate(batch):
+        parts.texts[part_name(name, lane)] = encode(space, text)  # type: ignore[assignment]
+
+
+@_take_apart.register
+def _(space: Tuple, name: str, batch: tuple, parts: Parts) -> None:
+    for index, (part, items) in enumerate(zip(space.spaces, batch, strict=True)):
+        _take_apart(part, part_name(name, index), items, parts)
+
+
+@_take_apart.register
+def _(space: Dict, name: str, batch: dict, parts: Parts) -> None:
+    for key, part in space.spaces.items():
+        _take_apart(part, part_name(name, key), batch[key], parts)
+
+
+def decode_lanes_tensors(space: Space, name: str, sent: Parts, lanes: int, whose: str) -> object:
+    """Return the batch that some tensors are, the lanes along their first axes.
+
+    Args:
+        space: of one lane.
+        name: of the tensors.
+        sent: what came.
+        lanes: how many there are.
+        whose: as for ``decode_lanes()``.
+
+    Raises:
+        NotInSpace: as for ``decode_lanes()``, and for a part too few or too many, or of another
+            dtype or shape.
+    """
+    left = Parts(dict(sent.tensors), dict(sent.texts))
+    batch = _put_together(space, name, left, _Lanes(lanes, whose))
+    refuse_leftovers(space, name, left)
+    return batch
+
+
+class _Lanes(NamedTuple):
+    """How many lanes there must be, what they are called, and where in their members we are."""
+
+    number: int
+    whose: str
+    path: tuple[str | int, ...] = ()
+
+    def inside(self, step: str | int) -> _Lanes:
+        return self._replace(path=(*self.path, step))
+
+
+@singledispatch
+def _put_together(space: Space, name: str, parts: Parts, lanes: _Lanes) -> object:
+    raise NotInSpace(space, name, "its members travel as JSON")
+
+
+@_put_together.register
+def _(space: Tuple, name: str, parts: Parts, lanes: _Lanes) -> object:
+    return tuple(
+        _put_together(part, part_name(name, index), parts, lanes.inside(index))
+        for index, part in enumerate(space.spaces)
+    )
+
+
+@_put_together.register
+def _(space: Dict, name: str, parts: Parts, lanes: _Lanes) -> object:
+    return {
+        key: _put_together(part, part_name(name, key), parts, lanes.inside(str(key)))
+        for key, part in space.spaces.items()
+    }
+
+
+@_put_together.register
+def _(space: Text, name: str, parts: Parts, lanes: _Lanes) -> object:
+    try:
+        return tuple(
+            put_part_together(space, name, lane, parts, lane) for lane in range(lanes.number)
+        )
+    except NotInSpace as refusal:
+        refusal.path[1:1] = lanes.path
+        raise
+
+
+@_put_together.register(Box)
+@_put_together.register(MultiBinary)
+@_put_together.register(MultiDiscrete)
+def _(space: Space, name: str, parts: Parts, lanes: _Lanes) -> object:
+    return _take_lanes(space, name, space.dtype, parts, lanes)
+
+
+@_put_together.register
+def _(space: Discrete, name: str, parts: Parts, lanes: _Lanes) -> object:
+    wide = wide_dtype(space)
+    sent = parts.tensors.get(name)
+    # R's integers are these.
+    is_short = sent is not None and sent.dtype == "I32" and wide == np.int64
+    array = _take_lanes(space, name, np.dtype(np.int32) if is_short else wide, parts, lanes)
+    return array.astype(space.dtype, copy=False)
+
+
+def _take_lanes(
+    space: Space, name: str, dtype: np.dtype, parts: Parts, lanes: _Lanes
+) -> np.ndarray:
+    try:
+        _check_number(space, parts.tensors.get(name), lanes)
+        array = take_array(space, name, dtype, (lanes.number, *(space.shape or ())), parts)
+    except NotInSpace as refusal:
+        refusal.path[:] = lanes.path
+        raise
+    try:
+        check_bounds(space, bounds_of(space), array)
+    except NotInSpace as refusal:
+        # Its path begins with the lane.
+        refusal.path[1:1] = lanes.path
+        raise
+    return array
+
+
+def _check_number(space: Space, sent: Tensor | None, lanes: _Lanes) -> None:
+    if not sent or not sent.shape or sent.shape[1:] != (space.shape or ()):
+        return
+    if sent.shape[0] != lanes.number:
+        raise NotInSpace(
+            space,
+            f"{sent.dtype} {list(sent.shape)}",
+            f"one action for each of {lanes.whose} is needed, not {sent.shape[0]}",
+        )

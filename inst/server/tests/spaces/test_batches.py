@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from gymnasium.spaces import Box, Discrete, MultiBinary
+from random_spaces import random_member, random_space, same
+
+from gym_server import spaces
+from gym_server.plain import plain
+from gym_server.spaces import NotInSpace, Parts
+from gym_server.spaces.stacking import stack
+from gym_server.tensors import Tensor
+
+
+def are_readable(space, members):
+    """Tell whether what was drawn is a member, which NaN in bounds is not."""
+    try:
+        for member in members:
+            spaces.decode(space, plain(spaces.encode(space, member)))
+    except NotInSpace:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_lanes_survive_json(seed):
+    rng = np.random.default_rng(seed)
+    space = random_space(rng)
+    members = [random_member(rng, space) for _ in range(3)]
+    if not are_readable(space, members):
+        return
+    sent = [plain(spaces.encode(space, member)) for member in members]
+    batch = spaces.decode_lanes(space, sent, 3, "the 3 lanes")
+    one_by_one = stack(space, [spaces.decode(space, value) for value in sent])
+    assert same(batch, one_by_one)
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_lanes_survive_tensors(seed):
+    rng = np.random.default_rng(seed)
+    space = random_space(rng, tensors=True)
+    members = [random_member(rng, space) for _ in range(3)]
+    if not are_readable(space, members):
+        return
+    batch = stack(space, members)
+    parts = spaces.encode_batch_tensors(space, "action", batch)
+    back = spaces.decode_lanes_tensors(space, "action", parts, 3, "the 3 lanes")
+    assert same(back, batch)
+
+
+def test_every_way_to_write_a_lane_is_read():
+    box = Box(-1, 1, (1,), np.float32)
+    assert spaces.decode_lanes(box, [[1], 0.5], 2, "").tolist() == [[1], [0.5]]
+    assert spaces.decode_lanes(box, [1, 0.5], 2, "").tolist() == [[1], [0.5]]
+    square = Box(0, 9, (2, 2), np.uint8)
+    assert spaces.decode_lanes(square, [[1, 2, 3, 4], [[5, 6], [7, 8]]], 2, "").tolist() == [
+        [[1, 2], [3, 4]],
+        [[5, 6], [7, 8]],
+    ]
+    assert spaces.decode_lanes(Discrete(3), [1, 2.0], 2, "").tolist() == [1, 2]
+    assert spaces.decode_lanes(MultiBinary(2), [[True, 0], [1, 1]], 2, "").tolist() == [
+        [1, 0],
+        [1, 1],
+    ]
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_discrete_lanes_may_be_32_or_64_bits_wide(dtype):
+    parts = Parts({"action": Tensor.of(np.array([0, 2], dtype))})
+    batch = spaces.decode_lanes_tensors(Discrete(3, dtype=np.int8), "action", parts, 2, "")
+    assert (batch.dtype, batch.tolist()) == (np.int8, [0, 2])
+
+
+def test_unsigned_discrete_lanes_are_unsigned():
+    space = Discrete(3, dtype=np.uint64)
+    parts = spaces.encode_batch_tensors(space, "action", np.array([0, 2], np.uint64))
+    assert parts.tensors["action"].dtype == "U64"
+    assert spaces.decode_lanes_tensors(space, "action", parts, 2, "").dtype == np.uint64
+    short = Parts({"action": Tensor.of(np.array([0, 2], np.int32))})
+    with pytest.raises(NotInSpace, match=r"U64 \[2\] is needed"):
+        spaces.decode_lanes_tensors(space, "action", short, 2, "")
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_arrays_travel_with_the_last_index_fastest_however_they_lie(order):
+    batch = np.arange(12, dtype=np.float32).reshape(3, 4).copy(order=order)
+    tensor = spaces.encode_batch_tensors(Box(0, 20, (4,)), "o", batch).tensors["o"]
+    assert np.frombuffer(tensor.data, np.float32).tolist() == list(range(12))
+
+
+def test_what_was_encoded_does_not_change_with_the_batch():
+    batch = np.zeros((2, 3), np.float32)
+    parts = spaces.encode_batch_tensors(Box(0, 1, (3,)), "o", batch)
+    batch[:] = 7
+    assert parts.tensors["o"].array().tolist() == np.zeros((2, 3)).tolist()
+
+
+def test_a_part_too_many_or_too_few_is_refused():
+    parts = Parts({"action": Tensor.of(np.zeros(2, np.int64)), "action/x": Tensor.of(np.zeros(2))})
+    with pytest.raises(NotInSpace, match="no such part"):
+        spaces.decode_lanes_tensors(Discrete(3), "action", parts, 2, "")
+    with pytest.raises(NotInSpace, match="there is no tensor 'action'"):
+        spaces.decode_lanes_tensors(Discrete(3), "action", Parts(), 2, "")

@@ -1,0 +1,20 @@
+import pytest
+from test_wire import code_of
+
+from gym_server import lane_fields, wire
+from gym_server.wire import Field
+
+
+@pytest.mark.parametrize("value", [[], [1], ["true"], [[True]], [None], True, "true", {}])
+def test_what_is_no_mask_is_refused(value):
+    assert (
+        code_of(wire.read, {"m": value}, [Field("m", lane_fields.MASK, "")]) == "invalid_parameter"
+    )
+
+
+def test_seeds_may_be_one_a_lane():
+    seed = [Field("seed", lane_fields.SEED, "")]
+    assert wire.read({"seed": [1, None, 3.0]}, seed) == {"seed": (1, None, 3)}
+    assert wire.read({"seed": 3.0}, seed) == {"seed": 3}
+    for value in (-1, "5", [1, -1], [True], [[1]]):
+        assert code_of(wire.read, {"seed": value}, seed) == "invalid_parameter"

@@ -1,0 +1,116 @@
+"""Play a vector environment over HTTP and in this process, and compare. For tests."""
+
+import json
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Dict, Discrete, Text, Tuple
+from gymnasium.vector.utils import concatenate, create_empty_array, iterate
+
+from gym_server import spaces, tensors
+from gym_server.plain import plain
+from gym_server.spaces.stacking import stack
+from gym_server.tensors import TENSORS
+
+MODES = ["NextStep", "SameStep", "Disabled"]
+ACCEPT = {"Accept": TENSORS}
+
+
+def in_process(env_id, num_envs, autoreset_mode="NextStep", **kwargs):
+    """Return Gymnasium's own, whose infos are those that our answers must hold."""
+    return gymnasium.make_vec(
+        env_id,
+        num_envs=num_envs,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": autoreset_mode},
+        disable_env_checker=True,
+        **kwargs,
+    )
+
+
+def actions_of(env, seed):
+    """Return actions for the lanes, one by one and as a batch."""
+    env.single_action_space.seed(seed)
+    actions = [env.single_action_space.sample() for _ in range(env.num_envs)]
+    return actions, stack(env.single_action_space, actions)
+
+
+def members(env, batch):
+    """Return a batch's members, one a lane, as JSON values."""
+    return [
+        plain(spaces.encode(env.single_observation_space, member))
+        for member in iterate(env.observation_space, batch)
+    ]
+
+
+def apart(space, batch):
+    """Return the lanes of a batch that came as JSON."""
+    match space:
+        case Dict():
+            parts = {key: apart(part, batch[str(key)]) for key, part in space.spaces.items()}
+            return [
+                dict(zip(map(str, parts), lane, strict=True))
+                for lane in zip(*parts.values(), strict=True)
+            ]
+        case Tuple():
+            parts = [apart(part, items) for part, items in zip(space.spaces, batch, strict=True)]
+            return [list(lane) for lane in zip(*parts, strict=True)]
+        case _:
+            return batch
+
+
+def split_final(env, info):
+    """Return an info without the last observations, these as JSON values, and their lanes."""
+    info = dict(info)
+    final, which = info.pop("final_obs", None), info.pop("_final_obs", None)
+    if final is None:
+        return plain(info), None, None
+    lanes = np.flatnonzero(which).tolist()
+    space = env.single_observation_space
+    batch = create_empty_array(space, n=len(lanes))
+    batch = concatenate(space, [final[lane] for lane in lanes], batch)
+    batched = gymnasium.vector.utils.batch_space(space, len(lanes))
+    encoded = [plain(spaces.encode(space, member)) for member in iterate(batched, batch)]
+    return plain(info), encoded, lanes
+
+
+def check_step(env, answer, expected):
+    """Hold a step's JSON answer equal to what Gymnasium returned."""
+    observation, reward, terminated, truncated, info = expected
+    info, final, lanes = split_final(env, info)
+    space = env.single_observation_space
+    assert apart(space, answer["observation"]) == members(env, observation)
+    assert answer["reward"] == reward.tolist()
+    assert answer["terminated"] == terminated.tolist()
+    assert answer["truncated"] == truncated.tolist()
+    assert answer["done"] == (terminated | truncated).tolist()
+    assert answer["info"] == info
+    assert ("final_obs" in answer, answer.get("final_lanes")) == (final is not None, lanes)
+    if final is not None:
+        assert apart(space, answer["final_obs"]) == final
+
+
+def check_tensors(space, name, file, batch):
+    """Hold the tensors of a batch equal to it, byte for byte."""
+    texts = json.loads(file.metadata.get("texts", "{}"))
+    match space:
+        case Dict():
+            for key, part in space.spaces.items():
+                pointer = key.replace("~", "~0").replace("/", "~1")
+                check_tensors(part, f"{name}/{pointer}", file, batch[key])
+        case Tuple():
+            for index, part in enumerate(space.spaces):
+                check_tensors(part, f"{name}/{index}", file, batch[index])
+        case Text():
+            assert [texts[f"{name}/{lane}"] for lane in range(len(batch))] == list(batch)
+        case _:
+            batch = np.asarray(batch, np.int64 if isinstance(space, Discrete) else None)
+            array = file.tensors[name].array()
+            assert (array.dtype, array.shape) == (batch.dtype, batch.shape)
+            assert array.tobytes() == batch.tobytes()
+
+
+def read_tensors(answer):
+    """Return the file in an answer."""
+    assert (answer.status_code, answer.content_type) == (200, TENSORS), answer.data
+    return tensors.read(answer.data)
