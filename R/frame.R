@@ -3,6 +3,9 @@
 #' Asks the server for a picture of the environment as it is now.
 #'
 #' @inheritParams env_reset
+#' @param lane Which lane to draw where the environment has lanes, a number from 1, the
+#'   default. An implementation of an environment's own (`"vector_entry_point"`) draws
+#'   all lanes at once, and the server lets it have 16 at most for that.
 #' @return An object of class `gym_frame`: an integer array of height x width x
 #'   3 (red, green, blue, each 0 to 255). [plot()] shows it, [as.raster()] makes
 #'   it a raster image.
@@ -16,10 +19,12 @@
 #' frame <- env_render(env$client, env$instance_id)
 #' plot(frame)
 #' env$close()
-env_render <- function(x, instance_id) {
+env_render <- function(x, instance_id, lane = 1) {
   check_client(x)
   check_string(instance_id)
-  route <- paste0(instance_route(instance_id), "render/")
+  check_count(lane)
+  query <- if (lane != 1) paste0("?lane=", whole_text(lane - 1))
+  route <- paste0(instance_route(instance_id), "render/", query)
   answer <- get_answer(x, route, take_tensors = TRUE)
   structure(answer$tensors$frame, class = "gym_frame")
 }

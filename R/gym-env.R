@@ -9,18 +9,28 @@
 #' The environment is closed by `$close()`, or some time after the object itself
 #' has been thrown away: keep the object for as long as the environment is played.
 #'
+#' With `num_envs` it has lanes: copies of the environment that are reset and stepped
+#' together, with one call for all of them. Observations then have a row a lane, and so
+#' have actions; [env_reset()] and [env_step()] tell the forms of all kinds. An
+#' environment's own implementation of lanes may be another game than the single one
+#' in details, such as the size of the Atari games' pictures.
+#'
 #' @inheritParams env_create
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
-#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE)`: starts an episode
-#'     and returns the first observation, as [env_reset()],
-#'   * `$step(action)`: takes a step and returns a list, as [env_step()],
-#'   * `$render()`: the current frame, as [env_render()],
+#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
+#'     episode and returns the first observation, as [env_reset()],
+#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()],
+#'   * `$render(lane = 1)`: the current frame, as [env_render()],
 #'   * `$close()`: takes it off the server,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
+#'   * `$single_action_space`, `$single_observation_space`: those of one lane; without
+#'     lanes the same,
+#'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many lanes there are
+#'     and what was chosen for them, see [env_create()]; `NULL` without lanes,
 #'   * `$spec`: a list of `id`, `reward_threshold` and `max_episode_steps`, the
 #'     latter two `NULL` where the environment has none,
 #'   * `$client`, `$instance_id`: for the classic calls.
@@ -36,12 +46,27 @@
 #' short <- gym_make("CartPole-v1", wrappers = list(list("TimeLimit", max_episode_steps = 5)))
 #' short$reset()
 #' short$close()
-gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, client = gym_client(),
-                     wrappers = list()) {
+#'
+#' # A hundred poles, each pushed to the side to which it leans.
+#' poles <- gym_make("CartPole-v1", num_envs = 100, seed = 1)
+#' poles
+#' observation <- poles$reset()
+#' for (step in 1:20) {
+#'   out <- poles$step(observation[, 3] > 0)
+#'   observation <- out$observation
+#' }
+#' summary(observation[, 3])
+#' poles$close()
+gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
+                     wrappers = list(), client = gym_client(), vectorization_mode = NULL,
+                     autoreset_mode = NULL) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1")
   check_client(client)
-  instance_id <- create_instance(client, env_id, seed, render_mode, kwargs, wrappers)
+  instance_id <- create_instance(
+    client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
+    autoreset_mode
+  )
   env <- NULL
   on.exit(if (is.null(env)) close_if_there(client, instance_id))
   env <- gym_env$new(client, instance_id)
@@ -55,30 +80,35 @@ gym_env <- R6Class(
   public = list(
     client = NULL,
     instance_id = NULL,
-    action_space = NULL,
-    observation_space = NULL,
+    single_action_space = NULL,
+    single_observation_space = NULL,
+    num_envs = NULL,
+    vectorization_mode = NULL,
+    autoreset_mode = NULL,
     spec = NULL,
     initialize = function(client, instance_id) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
       self$client <- client
       self$instance_id <- instance_id
-      self$action_space <- private$instance$action_space
-      self$observation_space <- private$instance$observation_space
+      for (name in c("single_action_space", "single_observation_space", "num_envs",
+                     "vectorization_mode", "autoreset_mode")) {
+        self[[name]] <- private$instance[[name]]
+      }
       self$spec <- private$instance$spec
     },
-    reset = function(seed = NULL, options = NULL, return_info = FALSE) {
+    reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()
       check_flag(return_info)
-      reset_instance(self$client, private$instance, seed, options, return_info)
+      reset_instance(self$client, private$instance, seed, options, return_info, mask)
     },
-    step = function(action) {
+    step = function(action, lanes = NULL) {
       private$check_open()
-      step_instance(self$client, private$instance, action, render = FALSE)
+      step_instance(self$client, private$instance, action, render = FALSE, lanes)
     },
-    render = function() {
+    render = function(lane = 1) {
       private$check_open()
-      env_render(self$client, self$instance_id)
+      env_render(self$client, self$instance_id, lane)
     },
     close = function() {
       if (!private$closed) {
@@ -88,11 +118,20 @@ gym_env <- R6Class(
       invisible(self)
     },
     print = function(...) {
-      cat("<gym_env: ", self$spec$id, if (private$closed) ", closed", ">\n", sep = "")
-      cat("  observations: ", format(self$observation_space), "\n", sep = "")
-      cat("  actions:      ", format(self$action_space), "\n", sep = "")
+      lanes <- if (!is.null(self$num_envs)) {
+        paste0(", ", count_of(self$num_envs, "lane"), " (", self$vectorization_mode, ", ",
+               self$autoreset_mode, ")")
+      }
+      closed <- if (private$closed) ", closed"
+      cat("<gym_env: ", self$spec$id, lanes, closed, ">\n", sep = "")
+      cat("  observations: ", format(private$instance$observations), "\n", sep = "")
+      cat("  actions:      ", format(private$instance$actions), "\n", sep = "")
       invisible(self)
     }
+  ),
+  active = list(
+    action_space = function() instance_space(private$instance, "action_space"),
+    observation_space = function() instance_space(private$instance, "observation_space")
   ),
   private = list(
     instance = NULL,

@@ -1,6 +1,7 @@
 # The environments on a server, as a client knows them.
 
-create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers,
+create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
+                            vectorization_mode = NULL, autoreset_mode = NULL,
                             call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
   if (inherits(env_id, "gym_wrapped")) {
@@ -9,9 +10,15 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers,
   }
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
+  check_count(num_envs, allow_null = TRUE, call = call)
+  check_lane_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
+  check_lane_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
   fields <- c(
     env_id = json_string(env_id),
-    seed = encode_seed(seed, call = call),
+    num_envs = if (!is.null(num_envs)) whole_text(num_envs),
+    vectorization_mode = if (!is.null(vectorization_mode)) json_string(vectorization_mode),
+    autoreset_mode = if (!is.null(autoreset_mode)) json_string(autoreset_mode),
+    seed = encode_seed(seed, num_envs, call),
     render_mode = if (!is.null(render_mode)) json_string(render_mode),
     kwargs = if (length(kwargs)) to_json(kwargs),
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
@@ -58,10 +65,15 @@ ask_instance <- function(x, instance_id, call) {
   instance$route <- route
   instance$reset_route <- paste0(route, "reset/")
   instance$step_route <- paste0(route, "step/")
-  instance$action_space <- new_space(answer$action_space)
-  instance$observation_space <- new_space(answer$observation_space)
-  instance$takes_tensors <- tensors_pay(instance$observation_space)
-  instance$sends_tensors <- tensors_pay(instance$action_space)
+  instance$num_envs <- answer$num_envs
+  instance$vectorization_mode <- answer$vectorization_mode
+  instance$autoreset_mode <- answer$autoreset_mode
+  instance$single_action_space <- new_space(answer$action_space)
+  instance$single_observation_space <- new_space(answer$observation_space)
+  instance$actions <- lanes_space(instance$single_action_space, answer$num_envs)
+  instance$observations <- lanes_space(instance$single_observation_space, answer$num_envs)
+  instance$takes_tensors <- travels_as_tensors(instance$single_observation_space, answer$num_envs)
+  instance$sends_tensors <- travels_as_tensors(instance$single_action_space, answer$num_envs)
   instance$spec <- list(
     id = answer$env_id,
     reward_threshold = answer$reward_threshold,
@@ -71,31 +83,62 @@ ask_instance <- function(x, instance_id, call) {
   instance
 }
 
-reset_instance <- function(x, instance, seed, options, return_info = FALSE,
+# Made only for those who ask: the bounds of thousands of pictures take their space.
+instance_space <- function(instance, which = c("action_space", "observation_space")) {
+  if (is.null(instance$num_envs)) {
+    return(instance[[paste0("single_", which)]])
+  }
+  instance[[which]] %||% (
+    instance[[which]] <- spread_bounds(
+      switch(which, action_space = instance$actions, observation_space = instance$observations)
+    )
+  )
+}
+
+reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask = NULL,
                            call = rlang::caller_env()) {
-  fields <- c(seed = encode_seed(seed, call = call), options = encode_options(options, call))
+  check_mask(mask, instance, call)
+  fields <- c(
+    seed = encode_seed(seed, instance$num_envs, call),
+    options = encode_options(options, call),
+    reset_mask = if (!is.null(mask)) to_json(I(mask))
+  )
   answer <- post_once(
     x, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
   )
   instance$done <- FALSE
-  observation <- observation_from(instance, answer)
+  observation <- decode_observation(instance$observations, answer)
   if (return_info) {
-    list(observation = observation, info = info_from_json(answer$info))
+    list(observation = observation, info = info_from(instance, answer))
   } else {
     observation
   }
 }
 
-observation_from <- function(instance, answer) {
+decode_observation <- function(space, answer, name = "observation") {
   if (is.null(answer$tensors)) {
-    decode_value(instance$observation_space, answer$observation)
+    decode_value(space, answer[[name]])
   } else {
-    from_tensors(instance$observation_space, "observation", answer)
+    from_tensors(space, name, answer)
   }
 }
 
-step_instance <- function(x, instance, action, render, call = rlang::caller_env()) {
-  answer <- send_action(x, instance, action, if (render) "true" else "false", call)
+info_from <- function(instance, answer) {
+  if (is.null(instance$num_envs)) {
+    info_from_json(answer$info)
+  } else {
+    info_by_lane(answer$info, instance$num_envs)
+  }
+}
+
+step_instance <- function(x, instance, action, render, lanes = NULL, call = rlang::caller_env()) {
+  fields <- c(render = if (render) "true" else "false")
+  if (!is.null(lanes) || !is.null(instance$num_envs)) {
+    return(step_lanes(x, instance, action, fields, lanes, call))
+  }
+  space <- instance$actions
+  check_value(space, action, "", call)
+  answer <- send_action(x, instance, space, action, write_value(space, action), fields, call)
   if (!is.null(answer$tensors)) {
     answer[c("reward", "terminated", "truncated")] <-
       answer$tensors[c("reward", "terminated", "truncated")]
@@ -107,7 +150,7 @@ step_instance <- function(x, instance, action, render, call = rlang::caller_env(
     instance$done <- answer$done
   }
   list(
-    observation = observation_from(instance, answer),
+    observation = decode_observation(instance$observations, answer),
     reward = number_from_json(answer$reward),
     done = answer$done,
     info = info_from_json(answer$info),
@@ -116,18 +159,19 @@ step_instance <- function(x, instance, action, render, call = rlang::caller_env(
   )
 }
 
-send_action <- function(x, instance, action, render, call) {
-  space <- instance$action_space
+# `json` is the action as JSON, written only if it travels so.
+send_action <- function(x, instance, space, action, json, fields, call) {
   route <- instance$step_route
   if (!instance$sends_tensors) {
-    fields <- c(action = encode_value(space, action, call), render = render)
+    fields <- c(action = json, fields)
     return(post_once(x, route, fields, take_tensors = instance$takes_tensors, call = call))
   }
-  check_value(space, action, "", call)
-  parts <- to_tensors(space, action, "action", call)
-  texts <- Filter(is.character, parts)
-  fields <- c(render = render, texts = if (length(texts)) to_json(texts))
-  tensors <- Filter(is.list, parts)
+  tensors <- to_tensors(space, action, "action", call)
+  texts <- vapply(tensors, is.character, NA)
+  if (any(texts)) {
+    fields <- c(fields, texts = to_json(tensors[texts]))
+    tensors <- tensors[!texts]
+  }
   post_once(x, route, fields, tensors = tensors, take_tensors = TRUE, call = call)
 }
 
@@ -145,11 +189,17 @@ warn_step_after_done <- function(instance, call) {
   )
 }
 
-encode_seed <- function(seed, call = rlang::caller_env()) {
-  if (!is.null(seed)) {
-    check_count(seed, min = 0, max = 2^53, call = call)
-    whole_text(seed)
+# One for all, or for a vector environment one for each lane, NA for a lane without.
+encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
+  if (is.null(seed)) {
+    return(NULL)
   }
+  if (is.null(num_envs) || length(seed) == 1L) {
+    check_count(seed, min = 0, max = 2^53, call = call)
+    return(whole_text(seed))
+  }
+  check_lane_seeds(seed, num_envs, call)
+  json_array(ifelse(is.na(seed), "null", whole_text(seed)))
 }
 
 encode_options <- function(options, call) {

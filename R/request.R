@@ -68,6 +68,10 @@ fetch_aside <- function(url, handle) {
 # (curl repeating a call by itself) there is nothing left and curl gives up: only
 # send() may repeat a call.
 read_body <- function(line, nbytes) {
+  if (line$sent == 0L && length(line$body) <= nbytes) {
+    line$sent <- length(line$body)
+    return(line$body)
+  }
   size <- min(nbytes, length(line$body) - line$sent)
   chunk <- line$body[line$sent + seq_len(size)]
   line$sent <- line$sent + size
@@ -112,7 +116,9 @@ open_handle <- function(client, sends, takes) {
     handle,
     connecttimeout_ms = min(10, client$timeout) * 1000,
     timeout_ms = client$timeout * 1000,
-    followlocation = FALSE
+    followlocation = FALSE,
+    # Thousands of lanes come in few pieces.
+    buffersize = 2^18
   )
   if (is_loopback(client$remote_base) && is.null(client$config$options$proxy)) {
     # A proxy that the system names would look for the server on its own machine.
@@ -180,7 +186,8 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
     body <- if (is.null(tensors)) charToRaw(json_object(fields)) else write_tensors(tensors, fields)
     load_body(line, channel, body)
   }
-  response <- fetch(client, line, channel, route, repeatable = once || is.null(fields), call)
+  repeatable <- once || is.null(fields)
+  response <- fetch(client, line, channel, route, request, repeatable, call)
   response$request <- request
   response
 }
@@ -210,7 +217,8 @@ request_json <- function(request) {
 # call: small bodies are padded with blanks to one length.
 load_body <- function(line, channel, bytes) {
   size <- max(length(bytes), channel$least_body)
-  line$body <- c(bytes, rep(as.raw(0x20), size - length(bytes)))
+  padding <- size - length(bytes)
+  line$body <- if (padding > 0L) c(bytes, rep(as.raw(0x20), padding)) else bytes
   if (size != channel$body_size) {
     suspendInterrupts({
       curl::handle_setopt(channel$handle, postfieldsize_large = size)
@@ -219,28 +227,17 @@ load_body <- function(line, channel, bytes) {
   }
 }
 
-fetch <- function(client, line, channel, route, repeatable, call) {
+fetch <- function(client, line, channel, route, request, repeatable, call) {
   handle <- channel$handle
   url <- paste0(client$remote_base, route)
   started <- proc.time()[["elapsed"]]
   attempt <- 1L
   repeat {
-    line$sent <- 0L
-    response <- NULL
-    problem <- tryCatch(
-      {
-        response <- line$fetch(url, handle)
-        response$answer <- parsed_body(response, client$state$layouts)
-        NULL
-      },
-      error = identity
-    )
-    if (!is.null(response)) {
-      # What cannot be read keeps its reason where we know it.
-      if (inherits(problem, "gym_error")) rlang::cnd_signal(problem)
+    response <- exchange(client, line, handle, url, request)
+    if (!inherits(response, "error")) {
       return(response)
     }
-    reason <- conditionMessage(problem)
+    reason <- conditionMessage(response)
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
@@ -254,6 +251,28 @@ fetch <- function(client, line, channel, route, repeatable, call) {
     on.exit(curl::handle_setopt(handle, timeout_ms = client$timeout * 1000))
     attempt <- attempt + 1L
   }
+}
+
+# One attempt: the response with its answer parsed, or the error of the connection.
+exchange <- function(client, line, handle, url, request) {
+  line$sent <- 0L
+  response <- NULL
+  problem <- tryCatch(
+    {
+      response <- line$fetch(url, handle)
+      response$answer <- parsed_body(response, client$state$layouts, request)
+      NULL
+    },
+    error = identity
+  )
+  if (is.null(response)) {
+    return(problem)
+  }
+  if (inherits(problem, "gym_error")) {
+    # It says why the answer cannot be read.
+    rlang::cnd_signal(problem)
+  }
+  response
 }
 
 max_attempts <- 4L
@@ -306,11 +325,11 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
 }
 
 # An answer as a list; NULL for an empty one, an error for what is none.
-parsed_body <- function(response, layouts = NULL) {
+parsed_body <- function(response, layouts = NULL, request = NULL) {
   if (response$status_code == 204L) {
     NULL
   } else if (identical(response$type, tensors_type)) {
-    tensors_answer(response$content, layouts)
+    tensors_answer(response$content, layouts, request)
   } else {
     answer <- from_json(rawToChar(response$content))
     if (is.list(answer)) answer
@@ -339,8 +358,11 @@ echo_in_header <- function(response) {
 
 # An answer of tensors has the fields of the JSON answer that it stands for, and
 # beside them the tensors and the texts by their names.
-tensors_answer <- function(bytes, layouts) {
-  file <- read_tensors(bytes, layouts)
+tensors_answer <- function(bytes, layouts, request = NULL) {
+  file <- read_tensors(bytes, layouts, if (!is.null(request)) bare_metadata(request))
+  if (is.null(file$metadata)) {
+    return(list(tensors = file$tensors, info = empty_object, request = request))
+  }
   field <- function(name) {
     text <- file$metadata[[name]]
     if (!is.null(text)) from_json(text)
@@ -349,7 +371,16 @@ tensors_answer <- function(bytes, layouts) {
     tensors = file$tensors,
     texts = field("texts"),
     info = if (identical(file$metadata$info, "{}")) empty_object else field("info"),
+    final_lanes = field("final_lanes"),
     request = field("request")
+  )
+}
+
+# The metadata of an answer that echoes the request and has an empty info.
+bare_metadata <- function(request) {
+  sprintf(
+    '{"info":"{}","request":"{\\"key\\":\\"%s\\",\\"number\\":%.0f}"}}',
+    request$key, request$number
   )
 }
 

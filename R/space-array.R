@@ -42,10 +42,12 @@ space_text.gym_space_box <- function(space) paste("Box", space$dtype, shape_text
 
 #' @exportS3Method
 space_text.gym_space_multidiscrete <- function(space) {
-  flat <- length(space$shape) == 1L && length(space$nvec) <= 10L
-  from <- if (any(space$start != 0)) paste(" from", shape_text(space$start))
+  n <- prod(space$shape)
+  flat <- length(space$shape) == 1L && n <= 10L
+  all_text <- function(bound) shape_text(rep(bound, length.out = n))
   if (flat) {
-    paste0("MultiDiscrete ", shape_text(space$nvec), from)
+    from <- if (any(space$start != 0)) paste(" from", all_text(space$start))
+    paste0("MultiDiscrete ", all_text(space$nvec), from)
   } else {
     paste("MultiDiscrete of shape", shape_text(space$shape))
   }
@@ -100,8 +102,13 @@ shape_values <- function(values, shape) {
   }
   wide <- inherits(values, "integer64")
   values <- unclass(values)
-  dim(values) <- rev(shape)
-  values <- aperm(values)
+  if (length(shape) == 2L) {
+    # A third of what aperm() takes.
+    values <- matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
+  } else {
+    dim(values) <- rev(shape)
+    values <- aperm(values)
+  }
   if (wide) structure(values, class = "integer64") else values
 }
 
@@ -114,7 +121,7 @@ check_value.gym_space_array <- function(space, value, path, call, bounds = FALSE
   if (!is.numeric(value) && !logical) {
     refuse(paste("A value of a", space$name, "is numeric"), path)
   }
-  if (!identical(value_shape(value, space$shape), space$shape)) {
+  if (!identical(value_shape(value, space), space$shape)) {
     refuse(paste("The value must be", wanted_shape(space$shape)), path)
   }
   flat <- row_major(value)
@@ -135,11 +142,14 @@ wanted_shape <- function(shape) {
   }
 }
 
-# A vector without dim is one-dimensional, or a scalar where the space is one.
-value_shape <- function(value, shape) {
+# A vector without dim is one-dimensional; where the space is one, a scalar or a column,
+# which is one number for each lane.
+value_shape <- function(value, space) {
   if (!is.null(dim(value))) {
     dim(value)
-  } else if (length(value) == 1L && length(shape) == 0L) {
+  } else if (isTRUE(space$column)) {
+    c(length(value), 1L)
+  } else if (length(value) == 1L && length(space$shape) == 0L) {
     integer()
   } else {
     length(value)

@@ -1,21 +1,8 @@
 # Spaces whose values hold any number of elements of another space: Sequence and
-# Graph. Elements that are numbers are stacked into one array, with the elements
-# along its first dimension; others are a list.
+# Graph. Elements that are numbers are stacked as those of lanes are, others are a list.
 
 is_stackable <- function(space) {
   inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")
-}
-
-# The space of n stacked elements, for checks.
-stacked_space <- function(space, n) {
-  bounds <- space_bounds(space)
-  structure(
-    list(
-      name = space$name, dtype = space$dtype, shape = c(as.integer(n), space$shape),
-      low = rep(bounds$low, n), high = rep(bounds$high, n)
-    ),
-    class = c("gym_space_box", "gym_space_array", "gym_space")
-  )
 }
 
 decode_stack <- function(space, json) {
@@ -28,7 +15,7 @@ decode_stack <- function(space, json) {
 
 check_stack <- function(space, value, path, call, bounds) {
   if (is_stackable(space)) {
-    check_value(stacked_space(space, stack_length(value)), value, path, call, bounds)
+    check_value(batch_space(space, stack_length(value)), value, path, call, bounds)
   } else {
     check_elements(space, value, path, call, bounds)
   }
@@ -50,7 +37,7 @@ stack_length <- function(value) {
 
 write_stack <- function(space, value) {
   if (is_stackable(space)) {
-    write_value(stacked_space(space, stack_length(value)), value)
+    write_value(batch_space(space, stack_length(value)), value)
   } else {
     write_elements(space, value)
   }
@@ -176,7 +163,7 @@ check_links <- function(space, value, path, call) {
 
 # The space of edge_links: two nodes an edge.
 stacked_links <- function(edges, nodes) {
-  stacked_space(
+  batch_space(
     structure(
       list(name = "Box", dtype = "int64", shape = 2L, low = c(0, 0), high = rep(nodes - 1, 2L)),
       class = c("gym_space_box", "gym_space_array", "gym_space")

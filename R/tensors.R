@@ -10,36 +10,60 @@
 #' @param layouts An environment that remembers the headers read last, `NULL` for
 #'   none: a header seen before is not parsed again. Metadata at its end, where
 #'   our server puts it, differs from answer to answer and does not count.
+#' @param expected JSON text of the metadata that the file has if nothing is to be
+#'   told: then they are not parsed either. `NULL` for none.
 #' @return A list of `tensors`, a named list of vectors and arrays, and
-#'   `metadata`, a named list of strings.
+#'   `metadata`, a named list of strings, `NULL` for the `expected` ones.
 #' @noRd
-read_tensors <- function(bytes, layouts = NULL) {
+read_tensors <- function(bytes, layouts = NULL, expected = NULL) {
   size <- header_size(bytes)
-  text <- bytes[8L + seq_len(size)]
-  if (any(text == as.raw(0L))) {
+  data <- 8L + size
+  header <- bytes[8L + seq_len(size)]
+  if (any(header == as.raw(0L))) {
     abort_tensors("the header is no JSON")
   }
-  header <- split_header(rawToChar(text))
-  layout <- known_layout(header$table, length(bytes) - 8L - size, layouts)
-  data <- 8L + size
-  tensors <- lapply(layout$entries, function(entry) {
-    entry$read(bytes[data + entry$begin + seq_len(entry$size)], entry$n, entry$shape)
-  })
-  last <- if (!is.null(header$metadata)) from_json(header$metadata)[["__metadata__"]]
-  list(tensors = tensors, metadata = last %||% layout$metadata)
+  layout <- known_layout(header, layouts)
+  if (layout$end > length(bytes) - data) {
+    abort_tensors("an offset lies outside of the file")
+  }
+  tensors <- read_entries(layout$entries, bytes, data)
+  if (layout$metadata_last && ends_as(header, length(layout$start), expected)) {
+    return(list(tensors = tensors))
+  }
+  list(tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata)
 }
 
-# Quotes inside of names and texts are escaped, so nothing else looks like this.
-split_header <- function(header) {
-  at <- regexpr(",\"__metadata__\":", header, fixed = TRUE, useBytes = TRUE)
-  if (at < 0L) {
-    return(list(table = header))
+# A connection copies a file once, an index lists the places of all of a tensor's bytes.
+index_up_to <- 65536L
+
+read_entries <- function(entries, bytes, data) {
+  large <- length(bytes) > index_up_to
+  if (large) {
+    file <- rawConnection(bytes)
+    on.exit(close(file))
   }
-  bytes <- charToRaw(header)
-  list(
-    table = paste0(rawToChar(bytes[seq_len(at - 1L)]), "}"),
-    metadata = paste0("{", rawToChar(bytes[-seq_len(at)]))
-  )
+  for (name in names(entries)) {
+    entry <- entries[[name]]
+    part <- if (large) {
+      seek(file, data + entry$begin)
+      readBin(file, "raw", entry$size)
+    } else {
+      bytes[data + entry$begin + seq_len(entry$size)]
+    }
+    entries[[name]] <- entry$read(part, entry$n, entry$shape)
+  }
+  entries
+}
+
+# Are these all of the header's bytes from a place on, but for the blanks at its end?
+ends_as <- function(header, after, text) {
+  if (is.null(text)) {
+    return(FALSE)
+  }
+  text <- charToRaw(text)
+  rest <- header[-seq_len(after)]
+  n <- length(text)
+  length(rest) >= n && identical(rest[seq_len(n)], text) && all(rest[-seq_len(n)] == as.raw(0x20))
 }
 
 header_size <- function(bytes) {
@@ -53,18 +77,16 @@ header_size <- function(bytes) {
   size[[1L]]
 }
 
-known_layout <- function(table, total, layouts) {
+known_layout <- function(header, layouts) {
   for (known in layouts$seen) {
-    if (identical(known$table, table)) {
-      check_end(known$layout, total)
-      return(known$layout)
+    start <- if (known$metadata_last) header[seq_along(known$start)] else header
+    if (identical(start, known$start)) {
+      return(known)
     }
   }
-  layout <- read_layout(table)
-  check_end(layout, total)
+  layout <- read_layout(header)
   if (!is.null(layouts)) {
-    seen <- c(list(list(table = table, layout = layout)), layouts$seen)
-    layouts$seen <- utils::head(seen, max_layouts)
+    layouts$seen <- utils::head(c(list(layout), layouts$seen), max_layouts)
   }
   layout
 }
@@ -72,7 +94,22 @@ known_layout <- function(table, total, layouts) {
 # As many as there are kinds of answer of a few environments.
 max_layouts <- 8L
 
-read_layout <- function(table) {
+# Quotes inside of names and texts are escaped, so nothing else looks like this.
+metadata_key <- ",\"__metadata__\":"
+
+#' Parse a header
+#' @return A list of `entries`, one for each tensor; `metadata` that stands before them;
+#'   `end`, where the last one ends; `start`, what all headers of this layout begin with:
+#'   the whole header, or all up to the metadata where it comes last.
+#' @noRd
+read_layout <- function(header) {
+  table <- rawToChar(header)
+  at <- regexpr(metadata_key, table, fixed = TRUE, useBytes = TRUE)
+  metadata_last <- at > 0L
+  if (metadata_last) {
+    table <- paste0(rawToChar(header[seq_len(at - 1L)]), "}")
+    header <- header[seq_len(at - 1L + nchar(metadata_key))]
+  }
   entries <- tryCatch(
     from_json(table),
     error = function(cnd) abort_tensors("the header is no JSON")
@@ -80,10 +117,21 @@ read_layout <- function(table) {
   if (!is.list(entries) || is.null(names(entries)) && length(entries)) {
     abort_tensors("the header is no JSON object")
   }
+  tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry)
   list(
-    entries = lapply(entries[names(entries) != "__metadata__"], read_entry),
-    metadata = entries[["__metadata__"]]
+    entries = tensors,
+    metadata = entries[["__metadata__"]],
+    end = max(0, vapply(tensors, function(entry) entry$begin + entry$size, 0)),
+    start = header,
+    metadata_last = metadata_last
   )
+}
+
+last_metadata <- function(header, layout) {
+  if (layout$metadata_last) {
+    metadata <- rawToChar(header[-seq_along(layout$start)])
+    from_json(paste0("{\"last\":", metadata))$last
+  }
 }
 
 read_entry <- function(entry) {
@@ -103,13 +151,6 @@ read_entry <- function(entry) {
     abort_tensors("an offset does not fit its tensor")
   }
   list(read = type$read, n = n, shape = shape, begin = begin, size = size)
-}
-
-check_end <- function(layout, total) {
-  ends <- vapply(layout$entries, function(entry) entry$begin + entry$size, 0)
-  if (any(ends > total)) {
-    abort_tensors("an offset lies outside of the file")
-  }
 }
 
 abort_tensors <- function(problem) {
@@ -231,26 +272,43 @@ half_from_double <- function(x) {
 #'
 #' @param tensors A named list of tensors, each a list of `dtype` (as in
 #'   `tensor_types`), `shape` and `bytes`.
-#' @param metadata A named character vector.
+#' @param metadata A named character vector of JSON texts.
 #' @return A raw vector. The header is filled up with blanks, so that bodies of
 #'   one layout have one length as a rule.
 #' @noRd
 write_tensors <- function(tensors, metadata) {
+  # In a JSON text no other characters need escaping.
+  quoted <- gsub("\\", "\\\\", enc2utf8(metadata), fixed = TRUE)
+  quoted <- gsub("\"", "\\\"", quoted, fixed = TRUE)
+  about <- paste0("\"", names(metadata), "\":\"", quoted, "\"", collapse = ",")
+  header <- charToRaw(paste0("{\"__metadata__\":{", about, "}", tensors_table(tensors), "}"))
+  header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
+  length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
+  do.call(c, c(list(length_bytes, header), lapply(unname(tensors), `[[`, "bytes")))
+}
+
+# The table of the tensors written last: from step to step it is the same.
+written <- new.env(parent = emptyenv())
+
+tensors_table <- function(tensors) {
+  forms <- lapply(tensors, function(tensor) tensor[c("dtype", "shape")])
+  if (!identical(forms, written$forms)) {
+    written$table <- write_table(tensors)
+    written$forms <- forms
+  }
+  written$table
+}
+
+write_table <- function(tensors) {
   sizes <- vapply(tensors, function(tensor) as.double(length(tensor$bytes)), 0)
   ends <- cumsum(sizes)
   entries <- vapply(seq_along(tensors), function(i) {
     tensor <- tensors[[i]]
     sprintf(
-      "%s:{\"dtype\":\"%s\",\"shape\":[%s],\"data_offsets\":[%.0f,%.0f]}",
+      ",%s:{\"dtype\":\"%s\",\"shape\":[%s],\"data_offsets\":[%.0f,%.0f]}",
       json_string(names(tensors)[[i]]), tensor$dtype, paste(tensor$shape, collapse = ","),
       ends[[i]] - sizes[[i]], ends[[i]]
     )
   }, "")
-  about <- paste0(json_string(names(metadata)), ":", json_string(metadata), collapse = ",")
-  header <- paste0("{", paste0(c(paste0("\"__metadata__\":{", about, "}"), entries),
-                               collapse = ","), "}")
-  header <- charToRaw(header)
-  header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
-  length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
-  unlist(c(list(length_bytes, header), lapply(unname(tensors), function(tensor) tensor$bytes)))
+  paste(entries, collapse = "")
 }

@@ -197,7 +197,7 @@ def unbind(space):
 
 
 class Mirror(gym.Env):
-    """Shows one value after the other and ends after the last."""
+    """Shows one value after the other, begins with that of its seed's number, and ends at last."""
 
     def __init__(self, number, values):
         rng = np.random.default_rng(number)
@@ -205,17 +205,20 @@ class Mirror(gym.Env):
         self.action_space.seed(number)
         self._values = [draw_value(rng, self.action_space) for _ in range(values)]
         unbind(self.action_space)
-        self._at = 0
+        self._first = self._at = 0
+
+    def _shown(self):
+        return self._values[(self._first + self._at) % len(self._values)]
 
     def reset(self, *, seed=None, options=None):
-        self._at = 0
-        return self._values[0], {}
+        self._first, self._at = seed or 0, 0
+        return self._shown(), {}
 
     def step(self, action):
-        problem = differs(self._values[self._at], action)
+        problem = differs(self._shown(), action)
         self._at += 1
         last = self._at == len(self._values)
-        observation = self._values[0 if last else self._at]
+        observation = self._shown()
         info = {"problem": problem} if problem else {}
         return observation, float(not problem), last, False, info
 

@@ -255,6 +255,23 @@ test_that("what is no answer of a Gym server is an error with a class", {
   expect_error(read(520, "\"oops\""), class = "gym_error_http_520")
 })
 
+test_that("another kind of server is told from a Gym server", {
+  python <- the_session$servers[[test_client()$remote_base]]$python
+  folder <- withr::local_tempdir()
+  dir.create(file.path(folder, "v1", "envs"), recursive = TRUE)
+  writeLines("<html>", file.path(folder, "v1", "envs", "index.html"))
+  log <- file.path(folder, "log")
+  process <- processx::process$new(
+    python, c("-u", "-m", "http.server", "0", "--bind", "127.0.0.1", "--directory", folder),
+    stdout = log, stderr = NULL
+  )
+  withr::defer(process$kill())
+  while (process$is_alive() && !length(readLines(log))) Sys.sleep(0.05)
+  client <- create_GymClient(sub(".*(http://[0-9.:]+).*", "\\1", readLines(log)[[1]]))
+  expect_error(env_list_all(client), "not what a Gym server sends", class = "gym_error_connection")
+  expect_error(env_create(client, "CartPole-v1"), class = "gym_error_http_501")
+})
+
 test_that("a large body arrives, one that is too large is told", {
   env <- local_env()
   # CartPole looks at two of its options and lets the others be.

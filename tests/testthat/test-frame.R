@@ -20,6 +20,25 @@ test_that("a frame follows the environment", {
   expect_false(identical(env$render(), before))
 })
 
+test_that("a frame is that of the lane asked for", {
+  for (mode in c("sync", "vector_entry_point")) {
+    env <- local_env(num_envs = 3, vectorization_mode = mode, seed = 1)
+    env$reset()
+    # The carts of the lanes go apart.
+    for (i in 1:8) env$step(c(0, 1, 1))
+    frames <- lapply(1:3, env$render)
+    expect_identical(env$render(), frames[[1]])
+    expect_false(identical(frames[[1]], frames[[2]]))
+    cart <- vapply(frames[1:2], function(frame) {
+      mean(col(frame[, , 1])[frame[, , 1] == 0 & row(frame[, , 1]) < 320])
+    }, 0)
+    expect_lt(cart[[1]], cart[[2]])
+    expect_error(env$render(4), class = "gym_error_http_400")
+    expect_error(env$render(0), class = "gym_error_argument")
+  }
+  expect_error(local_env()$render(2), class = "gym_error_http_400")
+})
+
 test_that("a frame knows plot() and as.raster()", {
   skip_if_not_installed("png")
   env <- local_env(seed = 1)

@@ -136,3 +136,46 @@ test_that("the error for a number that a dtype cannot hold names the whole path"
                         class = "gym_error_space")
   expect_match(error$path, "a[1]", fixed = TRUE)
 })
+
+test_that("metadata are left unread only where they are what was expected", {
+  # As the server writes a file: metadata last, blanks at the end of the header.
+  file_with <- function(metadata) {
+    table <- '{"x":{"dtype":"U8","shape":[2],"data_offsets":[0,2]}'
+    header <- charToRaw(paste0(table, ',"__metadata__":', metadata, "}"))
+    header <- c(header, rep(charToRaw(" "), -length(header) %% 8L))
+    size <- writeBin(c(length(header), 0L), raw(), endian = "little")
+    c(size, header, as.raw(c(3, 4)))
+  }
+  sent <- list(key = "k", number = 7)
+  echo <- '"request":"{\\"key\\":\\"k\\",\\"number\\":%d}"}'
+  bare <- file_with(paste0('{"info":"{}",', sprintf(echo, 7)))
+  expect_null(read_tensors(bare, expected = bare_metadata(sent))$metadata)
+  expect_identical(
+    tensors_answer(bare, NULL, sent),
+    list(tensors = list(x = 3:4), info = empty_object, request = sent)
+  )
+  others <- c(
+    paste0('{"info":"{}",', sprintf(echo, 8)),
+    paste0('{"info":"{\\"a\\":1}",', sprintf(echo, 7)),
+    paste0('{"info":"{}","final_lanes":"[0]",', sprintf(echo, 7))
+  )
+  for (metadata in others) {
+    expect_type(read_tensors(file_with(metadata), expected = bare_metadata(sent))$metadata, "list")
+  }
+  expect_equal(tensors_answer(file_with(others[[1]]), NULL, sent)$request$number, 8)
+  expect_equal(tensors_answer(file_with(others[[2]]), NULL, sent)$info, list(a = 1))
+  expect_equal(tensors_answer(file_with(others[[3]]), NULL, sent)$final_lanes, list(0))
+})
+
+test_that("the server's answer to a step of lanes is what is expected", {
+  env <- local_env(num_envs = 2)
+  env$reset()
+  line <- free_line(env$client)
+  fetch <- line$fetch
+  withr::defer(line$fetch <- fetch)
+  answer <- NULL
+  line$fetch <- function(url, handle) answer <<- fetch(url, handle)
+  env$step(c(0, 1))
+  sent <- list(key = line$key, number = line$number)
+  expect_null(read_tensors(answer$content, expected = bare_metadata(sent))$metadata)
+})

@@ -1,0 +1,32 @@
+# What a vector environment tells besides, by lane.
+
+#' Turn the info of several lanes into R values
+#'
+#' For each key Gymnasium has an array with an entry for each lane, and beside it, under
+#' the key with `_` before it, a mask of those that have said something. Here the entries
+#' of the others are `NA`, or `NULL` in a list, and there are no masks.
+#' @noRd
+info_by_lane <- function(json, n) {
+  if (!length(json)) {
+    return(json)
+  }
+  masks <- paste0("_", names(json))
+  keys <- names(json)[!names(json) %in% masks]
+  told <- Map(info_of_lanes, json[keys], json[paste0("_", keys)], n)
+  stats::setNames(told, keys)
+}
+
+info_of_lanes <- function(json, mask, n) {
+  if (!is.null(names(json))) {
+    return(info_by_lane(json, n))
+  }
+  mask <- unlist(mask)
+  if (length(mask) != n || length(json) != n) {
+    return(info_from_json(json))
+  }
+  # Only what was told decides the type: elsewhere stands a zero or nothing.
+  told <- info_from_json(json[mask])
+  entry <- rep(NA_integer_, n)
+  entry[mask] <- seq_len(sum(mask))
+  rows_of(told, entry)
+}

@@ -1,0 +1,228 @@
+# Several values of a space at once: one for each lane of a vector environment, or for
+# each element of a Sequence or Graph. Numbers are stacked into one array, with the
+# lanes along its first dimension; Tuple and Dict are stacked part by part, texts are a
+# character vector, what has no fixed form is a list.
+
+#' Make the space of several values of a space
+#'
+#' As Gymnasium's `batch_space()`, but a MultiDiscrete and a MultiBinary stay what they
+#' are, with a dimension more. Bounds are those of one value: in row-major order they
+#' recycle. [spread_bounds()] writes them out.
+#' @param n How many values.
+#' @noRd
+batch_space <- function(space, n) UseMethod("batch_space")
+
+#' @exportS3Method
+batch_space.default <- function(space, n) {
+  structure(
+    list(name = "Tuple", spaces = rep(list(space), n)),
+    class = c("gym_space_tuple", "gym_space")
+  )
+}
+
+#' @exportS3Method
+batch_space.gym_space_array <- function(space, n) {
+  space$column <- identical(space$shape, 1L)
+  space$shape <- c(as.integer(n), space$shape)
+  space
+}
+
+#' @exportS3Method
+batch_space.gym_space_discrete <- function(space, n) {
+  structure(
+    list(
+      name = "MultiDiscrete", shape = as.integer(n), dtype = space$dtype, nvec = space$n,
+      start = space$start
+    ),
+    class = c("gym_space_discretes", "gym_space_multidiscrete", "gym_space_array", "gym_space")
+  )
+}
+
+#' @exportS3Method
+batch_space.gym_space_text <- function(space, n) {
+  texts <- batch_space.default(space, n)
+  class(texts) <- c("gym_space_texts", class(texts))
+  texts
+}
+
+#' @exportS3Method
+batch_space.gym_space_tuple <- function(space, n) {
+  space$spaces <- lapply(space$spaces, batch_space, n = n)
+  space
+}
+
+#' @exportS3Method
+batch_space.gym_space_dict <- batch_space.gym_space_tuple
+
+#' Give a batch a bound for each of its numbers
+#' @noRd
+spread_bounds <- function(space) UseMethod("spread_bounds")
+
+#' @exportS3Method
+spread_bounds.default <- function(space) space
+
+#' @exportS3Method
+spread_bounds.gym_space_array <- function(space) {
+  space$column <- NULL
+  bounds <- intersect(c("low", "high", "nvec", "start"), names(space))
+  space[bounds] <- lapply(space[bounds], rep, length.out = prod(space$shape))
+  space
+}
+
+#' @exportS3Method
+spread_bounds.gym_space_tuple <- function(space) {
+  space$spaces <- lapply(space$spaces, spread_bounds)
+  space
+}
+
+#' @exportS3Method
+spread_bounds.gym_space_dict <- spread_bounds.gym_space_tuple
+
+# Several Discrete --------------------------------------------------------------------
+
+#' @exportS3Method
+check_value.gym_space_discretes <- function(space, value, path, call, bounds = FALSE) {
+  if (is.logical(value)) {
+    # As a single one; `observation[, 3] > 0` is a vector of actions.
+    storage.mode(value) <- "integer"
+  }
+  quick <- !bounds && length(value) == space$shape && is.null(dim(value)) && all_small(value)
+  if (!quick) {
+    check_value.gym_space_array(space, value, path, call, bounds)
+  }
+}
+
+# Whole numbers, without a missing one, that R's integers hold?
+all_small <- function(x) {
+  if (is.integer(x)) {
+    !is.object(x) && !anyNA(x)
+  } else {
+    is.double(x) && !is.object(x) && within_integer(x) && all(as.integer(x) == x)
+  }
+}
+
+within_integer <- function(x) {
+  isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
+}
+
+# As R's integers, where they are: writing them as int64 takes ten times as long.
+#' @exportS3Method
+to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") {
+  unsigned <- space$dtype == "uint64"
+  if (unsigned || inherits(value, "integer64") || !within_integer(value)) {
+    space$dtype <- if (unsigned) "uint64" else "int64"
+    return(to_tensors.default(space, value, name, call, path))
+  }
+  bytes <- writeBin(as.integer(value), raw(), endian = "little")
+  stats::setNames(list(list(dtype = "I32", shape = space$shape, bytes = bytes)), name)
+}
+
+# Several texts -----------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_texts <- function(space, json) as.character(unlist(json))
+
+#' @exportS3Method
+check_value.gym_space_texts <- function(space, value, path, call, bounds = FALSE) {
+  value <- if (is.character(value) && is.null(dim(value))) as.list(value) else value
+  check_value.gym_space_tuple(space, value, path, call, bounds)
+}
+
+#' @exportS3Method
+space_sample.gym_space_texts <- function(space) {
+  as.character(unlist(space_sample.gym_space_tuple(space)))
+}
+
+#' @exportS3Method
+from_tensors.gym_space_texts <- function(space, name, answer) {
+  as.character(unlist(answer$texts[part_names(space, name)]))
+}
+
+#' @exportS3Method
+to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
+  stats::setNames(as.list(enc2utf8(as.character(value))), part_names(space, name))
+}
+
+# Lanes -------------------------------------------------------------------------------
+
+#' Check a value for each lane
+#'
+#' All lanes at once, as nearly always they all fit; if not, one after the other, so that
+#' the error tells which lane it is and shows that lane's value.
+#' @param space The space of one lane, `batch` that of all `n`.
+#' @noRd
+check_lanes <- function(space, batch, values, n, call) {
+  if (fits_space(batch, values)) {
+    return(invisible())
+  }
+  given <- lanes_given(space, values)
+  if (!is.na(given) && given != n) {
+    problem <- paste0("One value for each of the lanes is needed: ", n, ", not ", given)
+    abort_space(batch, values, problem, call)
+  }
+  if (!is.na(given)) {
+    for (lane in seq_len(n)) {
+      check_lane(space, lane_value(space, values, lane), lane, call)
+    }
+  }
+  check_value(batch, values, "", call)
+}
+
+check_lane <- function(space, value, lane, call) {
+  tryCatch(
+    check_value(space, value, "", call),
+    gym_error_space = function(cnd) {
+      cnd$message <- paste0("Lane ", lane, ": ", cnd$message)
+      cnd$lane <- lane
+      rlang::cnd_signal(cnd)
+    }
+  )
+}
+
+#' Count the lanes in what was given for all of them
+#' @return A number; `NA` for what has not the form of several values of the space.
+#' @noRd
+lanes_given <- function(space, values) UseMethod("lanes_given")
+
+#' @exportS3Method
+lanes_given.default <- function(space, values) {
+  if (is.list(values)) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+lanes_given.gym_space_text <- function(space, values) {
+  if (is.character(values) || is.list(values)) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+lanes_given.gym_space_discrete <- function(space, values) {
+  if (is.atomic(values) && is.null(dim(values))) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+lanes_given.gym_space_array <- function(space, values) {
+  shape <- if (is.atomic(values)) value_shape(values, batch_space(space, 1L))
+  if (identical(shape[-1L], space$shape)) shape[[1L]] else NA_integer_
+}
+
+#' @exportS3Method
+lanes_given.gym_space_tuple <- function(space, values) {
+  keys <- names(space$spaces) %||% seq_along(space$spaces)
+  if (!is.list(values) || length(values) != length(keys)) {
+    return(NA_integer_)
+  }
+  if (is.character(keys)) {
+    values <- values[match(keys, enc2utf8(as.character(names(values))))]
+  }
+  counts <- unique(unlist(Map(lanes_given, unname(space$spaces), unname(values))))
+  if (length(counts) == 1L) counts else NA_integer_
+}
+
+#' @exportS3Method
+lanes_given.gym_space_dict <- lanes_given.gym_space_tuple
+
+# JSON has the values lane by lane, whatever the space.
+write_lanes <- function(space, values, n) {
+  lanes <- lapply(seq_len(n), function(lane) lane_value(space, values, lane))
+  json_array(vapply(lanes, write_value, "", space = space))
+}

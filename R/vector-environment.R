@@ -1,0 +1,150 @@
+# What a vector environment takes and gives beyond a single one: lanes, by number or by
+# mask, how they are made and begun again, and what each of them tells.
+
+vectorization_modes <- c("vector_entry_point", "sync", "async")
+autoreset_modes <- c("NextStep", "SameStep", "Disabled")
+
+# The space of what is sent and received: a batch where there are lanes.
+lanes_space <- function(space, num_envs) {
+  if (is.null(num_envs)) space else batch_space(space, num_envs)
+}
+
+# Lanes always do where they can. A file must have a tensor, though.
+travels_as_tensors <- function(space, num_envs) {
+  if (is.null(num_envs)) {
+    tensors_pay(space)
+  } else {
+    has_tensors(space) && count_numbers(space) > 0
+  }
+}
+
+# Steps ---------------------------------------------------------------------------------
+
+step_lanes <- function(x, instance, action, fields, lanes, call) {
+  check_step_lanes(lanes, instance, call)
+  n <- instance$num_envs
+  actions <- instance$actions
+  observations <- instance$observations
+  if (length(lanes) && length(lanes) < n) {
+    mask <- seq_len(n) %in% lanes
+    fields <- c(fields, step_mask = to_json(I(mask)))
+    n <- length(lanes)
+    actions <- batch_space(instance$single_action_space, n)
+    observations <- batch_space(instance$single_observation_space, n)
+  }
+  single <- instance$single_action_space
+  check_lanes(single, actions, action, n, call)
+  answer <- send_action(
+    x, instance, actions, action, write_lanes(single, action, n), fields, call
+  )
+  result <- numbers_by_lane(answer)
+  info <- info_by_lane(answer$info, n)
+  if (length(answer$final_lanes)) {
+    info$final_obs <- final_observations(instance, answer, n)
+  }
+  list(
+    observation = decode_observation(observations, answer),
+    reward = result$reward,
+    done = result$terminated | result$truncated,
+    info = info,
+    terminated = result$terminated,
+    truncated = result$truncated
+  )
+}
+
+numbers_by_lane <- function(answer) {
+  answer$tensors %||% list(
+    reward = as.numeric(numbers_from_json(answer$reward)),
+    terminated = unlist(answer$terminated),
+    truncated = unlist(answer$truncated)
+  )
+}
+
+# A list: the last observation of each lane that ended, NULL for the others.
+final_observations <- function(instance, answer, n) {
+  ended <- unlist(answer$final_lanes) + 1L
+  space <- instance$single_observation_space
+  values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
+  final <- vector("list", n)
+  final[ended] <- lapply(seq_along(ended), function(i) lane_value(space, values, i))
+  final
+}
+
+# The server draws lane by lane.
+decode_sample <- function(instance, json) {
+  single <- instance$single_action_space
+  if (is.null(instance$num_envs)) {
+    decode_value(single, json)
+  } else {
+    lanes_from(single, lapply(json, decode_value, space = single))
+  }
+}
+
+# Checks --------------------------------------------------------------------------------
+
+check_lane_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
+  if (is.null(x)) {
+    return(invisible())
+  }
+  check_choice(x, choices, arg, call)
+  if (is.null(num_envs)) {
+    gym_abort(
+      c(
+        paste0("`", arg, "` is for an environment with lanes."),
+        i = "Say how many with `num_envs`."
+      ),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+}
+
+check_lane_seeds <- function(seed, num_envs, call) {
+  right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, 2^53)
+  if (!right || length(seed) != num_envs) {
+    must <- paste0(
+      "a whole number of at least 0, or ", num_envs, " of them, one for each lane (NA for none)"
+    )
+    abort_argument(seed, must, "seed", call)
+  }
+}
+
+check_mask <- function(mask, instance, call) {
+  if (is.null(mask)) {
+    return(invisible())
+  }
+  check_has_lanes(instance, mask, "mask", call)
+  n <- instance$num_envs
+  if (!is.logical(mask) || length(mask) != n || anyNA(mask) || !any(mask)) {
+    must <- paste0("a logical vector of length ", n, ", one for each lane, with a TRUE in it")
+    abort_argument(mask, must, "mask", call)
+  }
+}
+
+check_step_lanes <- function(lanes, instance, call) {
+  if (is.null(lanes)) {
+    return(invisible())
+  }
+  check_has_lanes(instance, lanes, "lanes", call)
+  n <- instance$num_envs
+  if (!are_whole(lanes, 1, n) || length(lanes) == 0L || is.unsorted(lanes, strictly = TRUE)) {
+    must <- paste0("numbers of lanes from 1 to ", n, ", in increasing order")
+    abort_argument(lanes, must, "lanes", call)
+  }
+}
+
+are_whole <- function(x, min, max) {
+  is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
+}
+
+check_has_lanes <- function(instance, x, arg, call) {
+  if (is.null(instance$num_envs)) {
+    gym_abort(
+      c(
+        paste0("`", arg, "` is for an environment with lanes; this ", instance$spec$id,
+               " has none."),
+        i = "`gym_make()` makes one with `num_envs`."
+      ),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+}

@@ -1,0 +1,33 @@
+"""Plays a vector environment in process and writes down what came of it, for the R tests.
+
+Usage: reference_lanes.py ENV_ID NUM_ENVS MODE AUTORESET STEPS FILE < ACTIONS. MODE is
+"vector_entry_point" or "sync", AUTORESET a value of Gymnasium's AutoresetMode, and ACTIONS
+holds a line of numbers for each step, one for each lane. The file holds the observation of
+the reset with seed 7, then for each step observation, reward, terminated and truncated, lane
+by lane as little-endian doubles.
+"""
+
+import sys
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+SEED = 7
+
+
+def main(env_id, num_envs, mode, autoreset, steps, path):
+    more = {} if mode == "vector_entry_point" else {"autoreset_mode": AutoresetMode(autoreset)}
+    env = gym.make_vec(env_id, int(num_envs), vectorization_mode=mode, vector_kwargs=more)
+    with open(path, "wb") as out:
+        observation, _ = env.reset(seed=SEED)
+        out.write(np.asarray(observation, "<f8").tobytes())
+        for _ in range(int(steps)):
+            action = np.array(sys.stdin.readline().split(), env.action_space.dtype)
+            for part in env.step(action.reshape(env.action_space.shape))[:4]:
+                out.write(np.asarray(part, "<f8").tobytes())
+    env.close()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,55 @@
+spaces <- list(
+  discrete = list(name = "Discrete", n = 5L, start = 0L, dtype = "int64"),
+  flat = describe_box(c(-1, -2, -3), c(1, 2, 3)),
+  scalar = list(name = "Box", shape = list(), dtype = "float64", low = list(0), high = list(1)),
+  array = list(name = "Box", shape = list(2L, 3L), dtype = "float64", low = as.list(rep(-9, 6)),
+               high = as.list(1:6)),
+  binary = list(name = "MultiBinary", shape = list(3L), dtype = "int8"),
+  text = list(name = "Text", min_length = 1L, max_length = 3L, characters = "ab"),
+  sequence = list(name = "Sequence", space = describe_box(0, 1), stack = FALSE)
+)
+spaces$tuple <- list(name = "Tuple", spaces = unname(spaces))
+spaces$dict <- do.call(describe_dict, spaces)
+
+test_that("what was put together comes apart again, lane by lane and in any choice", {
+  for (name in names(spaces)) {
+    space <- new_space(spaces[[name]])
+    set.seed(1)
+    values <- replicate(4, space_sample(space), simplify = FALSE)
+    lanes <- lanes_from(space, values)
+    for (i in 1:4) {
+      expect_identical(lane_value(space, lanes, i), values[[i]], info = name)
+    }
+    chosen <- c(4L, 1L, 4L)
+    expect_identical(lane_rows(space, lanes, chosen), lanes_from(space, values[chosen]),
+                     info = name)
+    one <- lanes_from(space, values[1])
+    expect_identical(lane_value(space, one, 1L), values[[1]], info = name)
+    expect_identical(bind_lanes(space, list(one, lane_rows(space, lanes, 2:4))), lanes, info = name)
+  }
+})
+
+test_that("values for several lanes are drawn as single ones are, one after the other", {
+  for (name in c("discrete", "flat", "array", "binary", "text", "sequence")) {
+    space <- new_space(spaces[[name]])
+    set.seed(1)
+    values <- replicate(4, space_sample(space), simplify = FALSE)
+    set.seed(1)
+    expect_equal(sample_lanes(space, 4L), lanes_from(space, values), info = name)
+  }
+})
+
+test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
+  skip_if_not_installed("bit64")
+  space <- new_space(list(
+    name = "Box", shape = list(2L), dtype = "int64", low = list(-1e18, -1e18),
+    high = list(1e18, 1e18)
+  ))
+  large <- bit64::as.integer64(c("900719925474099301", "3"))
+  lanes <- lanes_from(space, list(large, c(1L, 2L)))
+  expect_identical(format(lane_value(space, lanes, 1L)), format(large))
+  bound <- bind_lanes(space, list(lanes, lanes_from(space, list(5:6))))
+  expect_identical(dim(bound), 3:2)
+  columns <- value_columns(space, bound, "obs")
+  expect_identical(as.character(columns$obs_1), c("900719925474099301", "1", "5"))
+})
