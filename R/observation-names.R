@@ -39,7 +39,7 @@ observation_names <- function(env_id, columns) {
 #'
 #' Numbers have a column each, in row-major order; so have the parts of Tuple and
 #' Dict. Values that may hold any number of parts have one column that is a list.
-#' @param values A list of values.
+#' @param values The values, as [lanes_from()] puts them together.
 #' @param name What they are, such as `"action"`.
 #' @return A named list of columns.
 #' @noRd
@@ -50,27 +50,24 @@ value_columns.default <- function(space, values, name) stats::setNames(list(I(va
 
 #' @exportS3Method
 value_columns.gym_space_array <- function(space, values, name) {
-  n <- prod(space$shape)
-  flat <- row_major(stack_values(space, values))
-  each <- lapply(seq_len(n), function(i) flat[seq.int(i, by = n, length.out = length(values))])
-  stats::setNames(each, if (n == 1) name else paste0(name, "_", seq_len(n), recycle0 = TRUE))
+  numbers <- lane_numbers(values)
+  n <- ncol(numbers)
+  each <- lapply(seq_len(n), function(i) numbers[, i])
+  stats::setNames(each, if (n == 1L) name else paste0(name, "_", seq_len(n), recycle0 = TRUE))
 }
 
 #' @exportS3Method
 value_columns.gym_space_discrete <- function(space, values, name) {
-  stats::setNames(list(stack_values(space, values)), name)
+  stats::setNames(list(values), name)
 }
 
 #' @exportS3Method
-value_columns.gym_space_text <- function(space, values, name) {
-  stats::setNames(list(unlist(values)), name)
-}
+value_columns.gym_space_text <- value_columns.gym_space_discrete
 
 #' @exportS3Method
 value_columns.gym_space_tuple <- function(space, values, name) {
   columns <- lapply(seq_along(space$spaces), function(i) {
-    part <- lapply(values, function(value) value[[i]])
-    value_columns(space$spaces[[i]], part, paste0(name, "_", names(space$spaces)[i] %||% i))
+    value_columns(space$spaces[[i]], values[[i]], paste0(name, "_", names(space$spaces)[i] %||% i))
   })
   do.call(c, columns)
 }

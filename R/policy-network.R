@@ -143,6 +143,12 @@ act.gym_policy_network <- function(policy, observation, ...) {
   network_action(policy$action_space, outputs, policy, lanes$one)
 }
 
+#' @exportS3Method
+act_lanes.gym_policy_network <- function(policy, observation, playing, lanes) {
+  outputs <- network_outputs(policy, lane_numbers(observation))
+  network_action(policy$action_space, outputs, policy, one = FALSE)
+}
+
 #' Compute the outputs for rows of observations
 #' @return A matrix with one row for each observation, one column for each output.
 #' @noRd

@@ -59,28 +59,19 @@ act.gym_policy_random <- function(policy, observation, ...) {
   }
   # What is observed matters only for how many there are, and observations that
   # are lists (of an environment with several parts) come one at a time.
-  lanes <- if (counts_lanes(observation, policy$observation_space)) {
+  observed <- if (counts_lanes(observation, policy$observation_space)) {
     observation_lanes(observation, policy$observation_space)
   }
-  if (is.null(lanes) || lanes$one) {
+  if (is.null(observed) || observed$one) {
     space_sample(space)
   } else {
-    stack_actions(replicate(nrow(lanes$values), space_sample(space), simplify = FALSE))
+    sample_lanes(space, nrow(observed$values))
   }
 }
 
-# Many actions: an integer vector, or an array with one action for each value of
-# its first index. Actions that are no numbers stay a list.
-stack_actions <- function(actions) {
-  if (is.list(actions[[1L]]) || is.character(actions[[1L]])) {
-    return(actions)
-  }
-  shape <- dim(actions[[1L]]) %||% length(actions[[1L]])
-  stacked <- unlist(actions)
-  if (identical(shape, 1L) && is.integer(stacked)) {
-    return(stacked)
-  }
-  aperm(array(stacked, c(shape, length(actions))), c(length(shape) + 1L, seq_along(shape)))
+#' @exportS3Method
+act_lanes.gym_policy_random <- function(policy, observation, playing, lanes) {
+  sample_lanes(policy$action_space, length(playing))
 }
 
 # Only of numbers can it be said how many observations there are.

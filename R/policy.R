@@ -5,12 +5,22 @@
 #' that a [random policy][policy_random()] draws from R's generator.
 #'
 #' A policy is an object made by [policy_random()] or [policy_network()], or any
-#' function that takes an observation and returns an action. A method of `act()`
-#' for a class of your own makes policies of another kind, which [rollout()] then
-#' plays.
+#' function that takes many observations, one in each row of a matrix, and returns as
+#' many actions. A method of `act()` for a class of your own makes policies of another
+#' kind, which [rollout()] then plays; it asks them about many observations at once, too.
 #'
-#' @param policy The policy: of class `gym_policy`, or a function of an
-#'   observation.
+#' # Functions as policies
+#'
+#' A function is always asked about many observations, be they one. For the usual
+#' environments they are the rows of a matrix, where observations are arrays themselves
+#' an array with one dimension more, the first, where they are single whole numbers an
+#' integer vector, and where they have several parts (Tuple and Dict) a list with the
+#' same for each part. What it returns has the same form: a vector with an action for
+#' each observation (a logical one counts as 0 and 1), a matrix with an action in each
+#' row, an array, or a list of these for the parts.
+#'
+#' @param policy The policy: of class `gym_policy`, or a function of many
+#'   observations.
 #' @param observation What is observed. For the usual environments a numeric
 #'   vector is one observation, and a numeric matrix has one observation in each
 #'   row. Where observations are arrays themselves, many of them have one
@@ -21,8 +31,9 @@
 #'   space, a numeric vector (or array) in the shape of the space for a Box. For
 #'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
 #'   (an array with `n` as its first dimension).
-#' @section Errors: `gym_error_argument` when `policy` is no policy, or the
-#'   observation does not have as many numbers as the policy takes.
+#' @section Errors: `gym_error_argument` when `policy` is no policy, the observation
+#'   does not have as many numbers as the policy takes, or a function does not return one
+#'   action for one observation.
 #' @export
 #' @examples
 #' policy <- policy_network(sizes = c(4, 2, 1))
@@ -32,8 +43,9 @@
 #' act(policy, observations)
 #'
 #' # The pole falls to the right: push the cart to the right.
-#' follow_pole <- function(observation) as.integer(observation[3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 #' act(follow_pole, c(0.01, -0.2, 0.03, 0.4))
+#' act(follow_pole, observations)
 act <- function(policy, observation, ...) UseMethod("act")
 
 #' @export
@@ -46,7 +58,22 @@ act.default <- function(policy, observation, ...) {
 }
 
 #' @export
-act.function <- function(policy, observation, ...) policy(observation)
+act.function <- function(policy, observation, ...) {
+  if (!is.atomic(observation) || !is.null(dim(observation))) {
+    return(policy(observation))
+  }
+  action <- policy(matrix(observation, nrow = 1L))
+  if (is.list(action)) {
+    return(action)
+  }
+  given <- stack_length(action)
+  if (given != 1L) {
+    abort_action_count(action, given, 1L, list(call = rlang::caller_env()))
+  }
+  shape <- dim(action)
+  dim(action) <- if (length(shape) > 2L) shape[-1L]
+  action
+}
 
 #' @export
 print.gym_policy <- function(x, ...) {
@@ -63,7 +90,7 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
     )
   }
   if (!inherits(x, "gym_policy") && !is.function(x)) {
-    abort_argument(x, "a policy or a function of an observation", arg, call)
+    abort_argument(x, "a policy or a function of observations", arg, call)
   }
   invisible(x)
 }
@@ -72,7 +99,7 @@ policy_text <- function(policy) {
   if (inherits(policy, "gym_policy")) format(policy) else "a function"
 }
 
-# Two questions that whoever plays or searches asks of a policy ------------------
+# Questions that whoever plays or searches asks of a policy ------------------
 
 #' Fit a policy to an environment
 #'
@@ -101,6 +128,22 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
     value = policy,
     call = call
   )
+}
+
+#' Choose an action for each lane that plays
+#'
+#' @param policy A policy that is bound to the lanes.
+#' @param observation What is observed, one row for each of the lanes `playing`.
+#' @param playing The numbers of these lanes.
+#' @param lanes As [lanes_of()] returns them.
+#' @return The actions, in the form in which lanes take them.
+#' @noRd
+act_lanes <- function(policy, observation, playing, lanes) UseMethod("act_lanes")
+
+#' @exportS3Method
+act_lanes.default <- function(policy, observation, playing, lanes) {
+  actions <- if (is.function(policy)) policy(observation) else act(policy, observation)
+  lane_actions(actions, length(playing), lanes)
 }
 
 # Observations as rows of numbers -------------------------------------------------

@@ -1,6 +1,6 @@
 #' Play whole episodes
 #'
-#' Plays a policy in an environment, episode after episode, and keeps what came of
+#' Plays a policy in an environment for a number of episodes, and keeps what came of
 #' it. An environment named by its id is made for the purpose and closed
 #' afterwards, whatever happens; one made by [gym_make()] is left open, in its last
 #' episode.
@@ -8,13 +8,29 @@
 #' An episode's return is the sum of its rewards, its length the number of its
 #' steps. Each episode is seeded: the seeds are drawn from R's generator before the
 #' first episode begins, and so are, while they play, the actions of a random
-#' policy. So [set.seed()] alone fixes everything, and `env$reset(seed = )` with a
-#' seed of the table begins the same episode again.
+#' policy. So [set.seed()] alone fixes everything.
+#'
+#' # Episodes side by side
+#'
+#' Where the environment is named by its id, or was made with `num_envs`, many episodes
+#' are played at once, each in a lane of its own: 256 where the environment has a vector
+#' implementation of its own (CartPole has), elsewhere 16. They are played in blocks:
+#' all lanes begin an episode together, and the next block begins when all have ended, so
+#' that short episodes are not favoured.
+#'
+#' # To begin an episode again
+#'
+#' A seed of the table begins the same episode again, by `env$reset(seed = )` of an
+#' environment made by [gym_make()]. A vector implementation of an environment's own has
+#' a single seed for all of its lanes; there `num_envs` of the result tells how many lanes
+#' it takes to begin the episode again, and `lane` of the table in which of them it is (see
+#' the examples).
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
-#'   see [gym_wrap()]), or an environment made by [gym_make()].
+#'   see [gym_wrap()]), or an environment made by [gym_make()], with lanes or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
-#'   function that takes an observation and returns an action.
+#'   function of many observations that returns as many actions: for the usual
+#'   environments a function of a matrix with an observation in each row, see [act()].
 #' @param episodes How many episodes to play, a whole number of at least 1; the
 #'   default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of
@@ -31,10 +47,10 @@
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
 #'   \describe{
-#'     \item{episodes}{A data frame with one row for each episode: `episode`
-#'       (integer), `seed` (integer), `return` (double), `length` (integer, in steps),
-#'       `terminated` (logical: ended by the environment's own rules), `truncated`
-#'       (logical: cut short by a limit of steps).}
+#'     \item{episodes}{A data frame with one row for each episode: `episode`, `seed`,
+#'       `lane` (integers; 1 where there are no lanes), `return` (double), `length`
+#'       (integer, in steps), `terminated` (logical: ended by the environment's own
+#'       rules), `truncated` (logical: cut short by a limit of steps).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
 #'       step: `episode`, `step` (integers), the observation that the action was taken
 #'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
@@ -43,12 +59,15 @@
 #'       `reward` (double), `terminated`, `truncated` (logical).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
+#'     \item{num_envs}{How many lanes share the seed of an episode, an integer; `NULL`
+#'       where each episode has a seed of its own.}
 #'     \item{seed}{As given.}
 #'   }
 #'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
 #'   the episodes.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be
-#'   (before anything is made) or a policy that does not fit the environment;
+#'   (before anything is made), a policy that does not fit the environment, or a function
+#'   that does not return one action for each observation;
 #'   `gym_error_http` when the server refuses the environment or an action;
 #'   `gym_error_connection` when it does not answer.
 #' @seealso [search_random()]
@@ -58,10 +77,22 @@
 #' random
 #' summary(random)
 #'
-#' # Any function can be a policy, and each step be kept.
-#' follow_pole <- function(observation) as.integer(observation[3] > 0)
+#' # Any function of a matrix of observations can be a policy, and each step be kept.
+#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
 #' head(as.data.frame(played))
+#'
+#' # The second episode begins again.
+#' second <- played$episodes[2, ]
+#' env <- gym_make("CartPole-v1", num_envs = played$num_envs)
+#' env$reset(seed = second$seed)[second$lane, ]
+#' env$close()
+#'
+#' # Where each episode has a seed of its own, a single environment will do.
+#' lake <- rollout("FrozenLake-v1", policy_random(), episodes = 2, seed = 1)
+#' env <- gym_make("FrozenLake-v1")
+#' env$reset(seed = lake$episodes$seed[2])
+#' env$close()
 rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, steps = FALSE,
                     client = gym_client()) {
   check_environment(env)
@@ -73,10 +104,13 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   with_random_seed(seed, {
     # A policy that is made in the call draws its weights under the seed, too.
     check_policy(policy)
-    with_environment(env, client, function(env) {
-      policy <- policy_bind(policy, env, call = call)
-      played <- play_episodes(env, policy, episodes, max_steps, keep_steps = steps)
-      new_rollout(played, policy, env, seed)
+    with_lanes(env, episodes, client, function(lanes) {
+      policy <- policy_bind(policy, lanes, call = call)
+      record <- new_record(episodes)
+      seeds <- draw_block_seeds(lanes, episodes)
+      begin <- function(block, episodes) list(seeds = seeds[[block]], policy = policy)
+      play_episodes(lanes, record, begin, max_steps, keep_steps = steps)
+      new_rollout(record, policy, lanes, seed, steps)
     })
   })
 }
@@ -96,131 +130,26 @@ is_playable <- function(x) {
   (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
 }
 
-#' Call a function with an environment
-#'
-#' One that is named by its id is made first and closed when `use` is left.
-#' @noRd
-with_environment <- function(env, client, use) {
-  if (!is.character(env) && !inherits(env, "gym_wrapped")) {
-    return(use(env))
-  }
-  env <- gym_make(env, client = client)
-  finished <- FALSE
-  on.exit(close_made(env, finished))
-  value <- use(env)
-  finished <- TRUE
-  value
-}
-
-# What was played is not lost because the environment could not be closed, and an
-# error on the way here says more than one from closing.
-close_made <- function(env, finished) {
-  tryCatch(
-    env$close(),
-    gym_error = function(cnd) {
-      if (finished) {
-        rlang::warn(
-          c("The environment could not be closed.", x = conditionMessage(cnd)),
-          class = "gym_warning_close"
-        )
-      }
-    }
-  )
-}
-
-# Episodes ------------------------------------------------------------------------
-
-#' Play episodes in an open environment with a policy that is fitted to it
-#' @return A list of episodes, each as [play_episode()] returns it.
-#' @noRd
-play_episodes <- function(env, policy, episodes, max_steps, keep_steps = FALSE) {
-  lapply(
-    draw_environment_seeds(episodes),
-    function(seed) play_episode(env, policy, seed, max_steps %||% Inf, keep_steps)
-  )
-}
-
-play_episode <- function(env, policy, seed, max_steps, keep_steps) {
-  observation <- env$reset(seed = seed)
-  total <- 0
-  length <- 0L
-  steps <- list()
-  repeat {
-    action <- act(policy, observation)
-    out <- env$step(action)
-    length <- length + 1L
-    total <- total + out$reward
-    if (keep_steps) {
-      steps[[length]] <- list(
-        observation = observation, action = action, reward = out$reward,
-        terminated = out$terminated, truncated = out$truncated
-      )
-    }
-    if (out$terminated || out$truncated || length >= max_steps) {
-      break
-    }
-    observation <- out$observation
-  }
-  cut <- !out$terminated && length >= max_steps
-  list(
-    seed = seed, total = total, length = length, steps = steps,
-    terminated = out$terminated, truncated = out$truncated || cut
-  )
+# All beforehand, so that policies which draw are played in the same episodes as those
+# which do not.
+draw_block_seeds <- function(lanes, episodes) {
+  replicate(ceiling(episodes / lanes$block), lanes$draw_seeds(), simplify = FALSE)
 }
 
 # Tables --------------------------------------------------------------------------
 
-new_rollout <- function(played, policy, env, seed) {
-  kept <- length(played[[1L]]$steps) > 0L
+new_rollout <- function(record, policy, lanes, seed, keep_steps) {
+  episodes <- episodes_table(record)
   structure(
     list(
-      episodes = episodes_table(played),
-      steps = if (kept) steps_table(played, env),
+      episodes = episodes,
+      steps = if (keep_steps) steps_table(record, episodes, lanes),
       policy = policy,
-      env_id = environment_label(env),
+      env_id = environment_label(lanes),
+      num_envs = lanes$num_envs,
       seed = seed
     ),
     class = "gym_rollout"
-  )
-}
-
-episodes_table <- function(played) {
-  column <- function(name, type) vapply(played, function(episode) episode[[name]], type)
-  data.frame(
-    episode = seq_along(played),
-    seed = column("seed", integer(1)),
-    return = column("total", numeric(1)),
-    length = column("length", integer(1)),
-    terminated = column("terminated", logical(1)),
-    truncated = column("truncated", logical(1))
-  )
-}
-
-steps_table <- function(played, env) {
-  lengths <- vapply(played, function(episode) episode$length, integer(1))
-  steps <- do.call(c, lapply(played, function(episode) episode$steps))
-  column <- function(name, type) vapply(steps, function(step) step[[name]], type)
-  values <- function(name) lapply(steps, function(step) step[[name]])
-  observations <- value_columns(env$observation_space, values("observation"), "obs")
-  if (is_stackable(env$observation_space)) {
-    names(observations) <- paste0("obs_", seq_along(observations), recycle0 = TRUE)
-  }
-  names(observations) <- observation_names(env$spec$id, names(observations))
-  actions <- value_columns(env$action_space, values("action"), "action")
-  truncated <- column("truncated", logical(1))
-  truncated[cumsum(lengths)] <- vapply(played, function(episode) episode$truncated, NA)
-  data.frame(
-    c(
-      list(episode = rep(seq_along(played), lengths), step = sequence(lengths)),
-      observations,
-      actions,
-      list(
-        reward = column("reward", numeric(1)),
-        terminated = column("terminated", logical(1)),
-        truncated = truncated
-      )
-    ),
-    check.names = FALSE
   )
 }
 

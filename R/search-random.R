@@ -7,10 +7,18 @@
 #'
 #' # What is drawn
 #'
-#' Each round draws its weights and the seeds of its episodes from R's generator, so that
-#' [set.seed()] alone fixes the whole search. The policy that is given tells only the sizes
+#' The weights of each round and the seeds of its episodes are drawn from R's generator, so
+#' that [set.seed()] alone fixes the whole search. The policy that is given tells only the sizes
 #' and activations: its own weights are not played, in the first round either, and drawing
 #' them in the call (as the default does) leaves the generator alone.
+#'
+#' # Rounds side by side
+#'
+#' As in [rollout()], many episodes are played at once, and so are the networks of many
+#' rounds. What comes of the search is decided round after round all the same: the first
+#' round that reaches the target ends it, and of later rounds, which may have been played
+#' beside it, nothing counts. With a single environment made by [gym_make()] one episode is
+#' played after the other.
 #'
 #' # Where it differs from the post's script
 #'
@@ -31,7 +39,7 @@
 #' ```
 #'
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
-#'   [gym_make()].
+#'   [gym_make()], with lanes or without.
 #' @param policy The kind of policy to search among: a network made by [policy_network()],
 #'   by default the post's, with 4 inputs, 2 hidden neurons and 1 output.
 #' @param rounds How many rounds to play at most, a whole number of at least 1; the default
@@ -60,12 +68,14 @@
 #'     \item{round}{The round of that policy, an integer, `NA` when no round was finished.}
 #'     \item{rounds}{A data frame with one row for each round: `round` (integer),
 #'       `mean_return` (double), `steps` (integer).}
-#'     \item{episodes}{A data frame with one row for each episode: `round`, `episode`, `seed`
-#'       (integers), `return` (double), `length` (integer, in steps), `terminated`,
+#'     \item{episodes}{A data frame with one row for each episode: `round`, `episode`, `seed`,
+#'       `lane` (integers), `return` (double), `length` (integer, in steps), `terminated`,
 #'       `truncated` (logical).}
 #'     \item{target}{The target, a double, or `NULL`.}
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{env}{The environment when an object was given, otherwise `NULL`.}
+#'     \item{num_envs}{How many lanes share the seed of an episode, an integer; `NULL` where
+#'       each episode has a seed of its own. [rollout()] tells how to begin one again.}
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps, seed}{`policy`, `rounds`, `max_steps` and `seed` as
 #'       given.}
@@ -98,14 +108,15 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   call <- rlang::current_env()
   keep_random_state(policy_resample(check_policy(policy), call = call))
   given <- if (!is.character(env)) env
-  with_environment(env, client, function(env) {
+  with_lanes(env, rounds * episodes, client, function(lanes) {
     settings <- list(
-      policy = policy, rounds = as.integer(rounds), episodes = episodes,
-      target = target %||% env$spec$reward_threshold, max_steps = max_steps, seed = seed,
-      env = given, env_id = environment_label(env), client = env$client
+      policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
+      target = target %||% lanes$spec$reward_threshold, max_steps = max_steps, seed = seed,
+      env = given, env_id = environment_label(lanes), num_envs = lanes$num_envs,
+      client = lanes$client
     )
-    bound <- policy_bind(policy, env, call = call)
-    with_random_seed(seed, play_rounds(env, bound, settings, progress, call))
+    bound <- policy_bind(policy, lanes, call = call)
+    with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call))
   })
 }
 
@@ -114,36 +125,25 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
 #' An interrupt ends them early, an error does too and carries what was played.
 #' @return A search, as [new_search()] makes it.
 #' @noRd
-play_rounds <- function(env, template, settings, progress, call) {
+play_rounds <- function(lanes, template, settings, progress, call) {
   started <- proc.time()[["elapsed"]]
-  show <- if (progress) progress_bar(settings$rounds) else function(best) NULL
-  played <- list()
-  best <- -Inf
+  show <- if (progress) progress_bar(settings$rounds) else function(finished, best) NULL
+  record <- new_rounds(settings$rounds, settings$episodes, settings$target, show)
   interrupted <- FALSE
+  begin <- function(block, episodes) {
+    list(seeds = lanes$draw_seeds(), policy = draw_policies(record, template, episodes))
+  }
   tryCatch(
-    while (length(played) < settings$rounds) {
-      round <- play_round(env, template, settings)
-      played[[length(played) + 1L]] <- round
-      best <- max(best, round$mean_return, na.rm = TRUE)
-      show(best)
-      if (reaches(round$mean_return, settings$target)) break
-    },
+    play_episodes(lanes, record, begin, settings$max_steps),
     interrupt = function(cnd) {
       interrupted <<- TRUE
-      inform_interrupted(length(played), settings$rounds)
+      inform_interrupted(count_finished(record), settings$rounds)
     },
     error = function(cnd) {
-      abort_search(cnd, new_search(played, settings, started), call)
+      abort_search(cnd, new_search(record, settings, started), call)
     }
   )
-  new_search(played, settings, started, interrupted)
-}
-
-play_round <- function(env, template, settings) {
-  policy <- policy_resample(template)
-  played <- play_episodes(env, policy, settings$episodes, settings$max_steps)
-  returns <- vapply(played, function(episode) episode$total, numeric(1))
-  list(policy = policy, played = played, mean_return = mean(returns))
+  new_search(record, settings, started, interrupted)
 }
 
 progress_bar <- function(rounds, frame = parent.frame()) {
@@ -156,8 +156,10 @@ progress_bar <- function(rounds, frame = parent.frame()) {
     extra = list(best = "-"),
     .envir = frame
   )
-  function(best) {
-    cli::cli_progress_update(id = bar, extra = list(best = number_text(best)), .envir = frame)
+  function(finished, best) {
+    cli::cli_progress_update(
+      id = bar, set = finished, extra = list(best = number_text(best)), .envir = frame
+    )
   }
 }
 

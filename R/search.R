@@ -2,23 +2,26 @@
 
 #' Make a result of a search
 #'
-#' @param rounds The rounds in the order of playing, each a list: `policy`, `played`
-#'   (episodes as [play_episodes()] returns them) and `mean_return`.
+#' @param record Its rounds, as [new_rounds()] keeps them. Only those count before which
+#'   none is unfinished.
 #' @noRd
-new_search <- function(rounds, settings, started, interrupted = FALSE) {
-  table <- rounds_table(rounds)
-  best <- which.max(table$mean_return)
+new_search <- function(record, settings, started, interrupted = FALSE) {
+  n <- count_finished(record)
+  episodes <- search_episodes_table(record, n)
+  rounds <- rounds_table(record, episodes, n)
+  best <- which.max(rounds$mean_return)
   found <- length(best) == 1L
   structure(
     list(
-      policy = if (found) rounds[[best]]$policy,
-      solved = found && reaches(table$mean_return[[best]], settings$target),
+      policy = if (found) record$policies[[best]],
+      solved = found && reaches(rounds$mean_return[[best]], settings$target),
       round = if (found) best else NA_integer_,
-      rounds = table,
-      episodes = search_episodes_table(rounds),
+      rounds = rounds,
+      episodes = episodes,
       target = settings$target,
       env_id = settings$env_id,
       env = settings$env,
+      num_envs = settings$num_envs,
       client = settings$client,
       template = settings$policy,
       max_rounds = settings$rounds,
@@ -31,22 +34,17 @@ new_search <- function(rounds, settings, started, interrupted = FALSE) {
   )
 }
 
-reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
-
-rounds_table <- function(rounds) {
-  steps <- function(round) sum(vapply(round$played, function(episode) episode$length, 1L))
-  data.frame(
-    round = seq_along(rounds),
-    mean_return = vapply(rounds, function(round) round$mean_return, numeric(1)),
-    steps = vapply(rounds, steps, integer(1))
-  )
+search_episodes_table <- function(record, n) {
+  episodes <- episodes_table(record, n * record$size)
+  episodes$episode <- rep(seq_len(record$size), n)
+  data.frame(round = rep(seq_len(n), each = record$size), episodes)
 }
 
-search_episodes_table <- function(rounds) {
-  sizes <- vapply(rounds, function(round) length(round$played), integer(1))
-  episodes <- episodes_table(do.call(c, lapply(rounds, function(round) round$played)))
-  episodes$episode <- sequence(sizes)
-  data.frame(round = rep(seq_along(rounds), sizes), episodes)
+rounds_table <- function(record, episodes, n) {
+  steps <- colSums(matrix(episodes$length, ncol = n))
+  data.frame(
+    round = seq_len(n), mean_return = record$means[seq_len(n)], steps = as.integer(steps)
+  )
 }
 
 #' Use what a search has found
@@ -73,8 +71,8 @@ search_episodes_table <- function(rounds) {
 #' @param seed A whole number that fixes the fresh episodes and leaves the session's
 #'   generator as it was, or `NULL`, the default, to draw from the session's generator.
 #' @return `as.data.frame()`: a data frame with one row for each episode of the search, in
-#'   the order in which they were played: `round`, `episode`, `seed` (integers), `return`
-#'   (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
+#'   their order: `round`, `episode`, `seed`, `lane` (integers),
+#'   `return` (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
 #'
 #'   `predict()`: for `n` observations the actions, an integer vector of length `n` (a
 #'   matrix with `n` rows where an action has several numbers), or the outputs, a numeric

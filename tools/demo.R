@@ -34,7 +34,7 @@ for (attempt in 1:5) {
   if (result$solved) break
 }
 
-cat("100 fresh episodes with the network found (20,000 steps, some 20 s):\n\n")
+cat("100 fresh episodes with the network found:\n\n")
 print(summary(result))
 cat("\n")
 

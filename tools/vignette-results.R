@@ -3,12 +3,12 @@
 #
 #   tools/in-env Rscript tools/vignette-results.R
 #
-# Takes some minutes.
+# Takes a minute or two.
 
 library(gym)
 
 started <- proc.time()[["elapsed"]]
-follow_pole <- function(observation) as.integer(observation[3] > 0)
+follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 
 results <- list()
 results$random <- rollout("CartPole-v0", policy_random(), episodes = 2000, seed = 2018)
@@ -29,9 +29,10 @@ searches <- lapply(seeds, function(seed) {
 results$searches <- do.call(rbind, searches)
 
 env <- gym_make("CartPole-v0")
-invisible(env$reset(seed = results$episode$episodes$seed))
-actions <- as.data.frame(results$episode)$action
-for (action in utils::head(actions, 100)) env$step(action)
+observation <- env$reset(seed = 1)
+for (step in 1:100) {
+  observation <- env$step(act(results$search$policy, observation))$observation
+}
 results$frame <- env$render()
 env$close()
 

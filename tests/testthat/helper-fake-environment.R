@@ -25,13 +25,7 @@ fake_environment <- function(reward = function(seed, step, action) 1,
   env$seeds <- integer()
   env$actions <- list()
   env$closed <- 0L
-  observe <- function() {
-    if (inherits(observation_space, "gym_space_discrete")) {
-      return(as.integer(observation_space$start + (env$seed + env$at) %% observation_space$n))
-    }
-    values <- sin(env$seed %% 1000 + env$at + seq_len(prod(observation_space$shape)))
-    if (length(observation_space$shape) > 1L) array(values, observation_space$shape) else values
-  }
+  observe <- function() fake_observation(observation_space, env$seed, env$at)
   env$reset <- function(seed = NULL, options = NULL) {
     env$seed <- seed
     env$seeds <- c(env$seeds, seed)
@@ -54,6 +48,72 @@ fake_environment <- function(reward = function(seed, step, action) 1,
   env
 }
 
+fake_observation <- function(space, seed, at) {
+  if (inherits(space, "gym_space_discrete")) {
+    return(as.integer(space$start + (seed + at) %% space$n))
+  }
+  values <- sin(seed %% 1000 + at + seq_len(prod(space$shape)))
+  if (length(space$shape) > 1L) array(values, space$shape) else values
+}
+
+# The same with lanes, strict as the server is: only with "sync" may some lanes be stepped
+# and each have a seed, a lane that is done takes no step in mode "Disabled", and starts
+# again otherwise. With "vector_entry_point" a lane's seed follows from the only one and
+# its number.
+fake_lanes <- function(num_envs, mode = "sync",
+                       autoreset = if (mode == "sync") "Disabled" else "NextStep",
+                       reward = function(seed, step, action) 1,
+                       ends = function(seed, step, action) step == 3L,
+                       observation_space = box_space(rep(-1, 4), rep(1, 4)),
+                       action_space = discrete_space(2L),
+                       reward_threshold = NULL, id = "Fake-v0") {
+  env <- new.env()
+  env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
+  env$num_envs <- as.integer(num_envs)
+  env$vectorization_mode <- mode
+  env$autoreset_mode <- autoreset
+  env$single_observation_space <- observation_space
+  env$single_action_space <- action_space
+  env$resets <- list()
+  env$lane_steps <- 0L
+  env$closed <- 0L
+  observe <- function(lanes) {
+    lanes_from(observation_space, lapply(lanes, function(i) {
+      fake_observation(observation_space, env$seed[[i]], env$at[[i]])
+    }))
+  }
+  env$reset <- function(seed = NULL, options = NULL) {
+    stopifnot(length(seed) == if (mode == "vector_entry_point") 1L else num_envs)
+    env$resets <- c(env$resets, list(seed))
+    env$seed <- if (length(seed) == num_envs) seed else seed %% 1e8 + 17L * seq_len(num_envs)
+    env$at <- integer(num_envs)
+    env$done <- logical(num_envs)
+    observe(seq_len(num_envs))
+  }
+  env$step <- function(action, lanes = NULL) {
+    stopifnot(is.null(lanes) || mode == "sync")
+    lanes <- lanes %||% seq_len(num_envs)
+    stopifnot(autoreset != "Disabled" || !any(env$done[lanes]))
+    stopifnot(lanes_given(action_space, action) == length(lanes))
+    env$lane_steps <- env$lane_steps + length(lanes)
+    again <- env$done[lanes]
+    env$at[lanes] <- ifelse(again, 0L, env$at[lanes] + 1L)
+    actions <- lapply(seq_along(lanes), lane_value, space = action_space, lanes = action)
+    each <- function(f) mapply(f, env$seed[lanes], env$at[lanes], actions)
+    ended <- each(ends) & !again
+    env$done[lanes] <- ended
+    list(
+      observation = observe(lanes), reward = ifelse(again, 0, each(reward)), done = ended,
+      info = list(), terminated = ended, truncated = logical(length(lanes))
+    )
+  }
+  env$close <- function() {
+    env$closed <- env$closed + 1L
+    invisible(env)
+  }
+  env
+}
+
 # Episodes of one step each, with these returns in the order in which they are played.
 scripted_environment <- function(returns, ...) {
   at <- 0L
@@ -65,6 +125,34 @@ scripted_environment <- function(returns, ...) {
     ends = function(seed, step, action) TRUE,
     ...
   )
+}
+
+# Lanes whose episodes have these returns and lengths, in the order in which they begin,
+# block after block. The return comes with the last step.
+scripted_lanes <- function(num_envs, returns, lengths, mode = "sync", ...) {
+  block <- -1L
+  at <- function(seed) block * num_envs + match(seed, current)
+  current <- NULL
+  env <- fake_lanes(
+    num_envs, mode,
+    reward = function(seed, step, action) {
+      if (step == lengths[[at(seed)]]) returns[[at(seed)]] else 0
+    },
+    ends = function(seed, step, action) step == lengths[[at(seed)]],
+    ...
+  )
+  reset <- env$reset
+  env$reset <- function(seed = NULL, options = NULL) {
+    observation <- reset(seed, options)
+    block <<- block + 1L
+    current <<- env$seed
+    observation
+  }
+  # Lanes beyond the last episode play along in some modes.
+  beyond <- 10L * num_envs
+  returns <- c(returns, numeric(beyond))
+  lengths <- c(lengths, rep(1L, beyond))
+  env
 }
 
 # For a reward by which weights and seeds make a difference.

@@ -1,7 +1,3 @@
-test_that("a function is a policy", {
-  expect_identical(act(function(observation) sum(observation), 1:3), 6L)
-})
-
 test_that("what is no policy cannot act", {
   expect_error(act("left", 1:4), "`policy` must be a policy", class = "gym_error_argument")
   expect_error(act(structure(list(), class = c("mine", "gym_policy")), 1),

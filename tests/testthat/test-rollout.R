@@ -12,8 +12,8 @@ test_that("the table of episodes has the promised columns and types", {
   expect_s3_class(played, "gym_rollout")
   expect_identical(
     vapply(played$episodes, typeof, ""),
-    c(episode = "integer", seed = "integer", return = "double", length = "integer",
-      terminated = "logical", truncated = "logical")
+    c(episode = "integer", seed = "integer", lane = "integer", return = "double",
+      length = "integer", terminated = "logical", truncated = "logical")
   )
   expect_identical(played$episodes$episode, 1:2)
   expect_identical(as.data.frame(played), played$episodes)
@@ -69,7 +69,7 @@ test_that("a row of the steps has the observation that its action was taken on",
   seen <- list()
   follow <- function(observation) {
     seen[[length(seen) + 1L]] <<- observation
-    as.integer(observation[3] > 0)
+    as.integer(observation[, 3] > 0)
   }
   played <- rollout(env, follow, episodes = 3, seed = 1, steps = TRUE)
   steps <- as.data.frame(played)
@@ -96,11 +96,11 @@ test_that("observations and actions of other shapes have a column for each numbe
   seen <- NULL
   keep_first <- function(observation) {
     if (is.null(seen)) seen <<- observation
-    c(0.5, 9.5)
+    rbind(c(0.5, 9.5))
   }
   steps <- rollout(env, keep_first, seed = 1, steps = TRUE)$steps
   expect_identical(names(steps)[3:10], c(paste0("obs_", 1:6), "action_1", "action_2"))
-  expect_identical(unlist(steps[1, 3:8], use.names = FALSE), as.vector(t(seen)))
+  expect_identical(unlist(steps[1, 3:8], use.names = FALSE), as.vector(t(seen[1, , ])))
   expect_identical(steps$action_2, rep(9.5, 3))
   one <- fake_environment(id = "FrozenLake-v1", observation_space = discrete_space(16L),
                           action_space = box_space(-2, 2))
@@ -189,11 +189,60 @@ test_that("CartPole: the same seed plays the same episodes, another does not", {
   expect_true(all(abs(first$pole_angle) < 0.4189))
 })
 
-test_that("CartPole: an episode can be begun again by its seed", {
+first_observations <- function(played) {
+  unname(as.matrix(played$steps[played$steps$step == 1, 3:6]))
+}
+
+test_that("CartPole: an episode can be begun again by its seed, in lanes by its lane, too", {
   env <- local_env("CartPole-v1")
   played <- rollout(env, policy_random(), 3, seed = 1, steps = TRUE)
-  first <- played$steps[played$steps$episode == 2 & played$steps$step == 1, 3:6]
-  expect_identical(env$reset(seed = played$episodes$seed[2]), unlist(first, use.names = FALSE))
+  expect_identical(env$reset(seed = played$episodes$seed[2]), first_observations(played)[2, ])
+  expect_null(played$num_envs)
+  client <- test_client()
+  played <- rollout("CartPole-v1", policy_random(), 300, seed = 1, steps = TRUE, client = client)
+  env <- local_env("CartPole-v1", num_envs = played$num_envs)
+  for (i in c(2, 299)) {
+    episode <- played$episodes[i, ]
+    expect_identical(
+      env$reset(seed = episode$seed)[episode$lane, ], first_observations(played)[i, ]
+    )
+  }
+})
+
+test_that("where lanes have seeds of their own, a single environment plays an episode again", {
+  client <- test_client()
+  skip_if_not(env_registry(client, "LunarLander-v3")$available, "the extra box2d")
+  set.seed(1)
+  policy <- policy_network(c(8, 4, 4))
+  played <- rollout("LunarLander-v3", policy, 20, seed = 1, client = client)
+  expect_null(played$num_envs)
+  expect_identical(played$episodes$lane, c(1:16, 1:4))
+  env <- local_env("LunarLander-v3")
+  alone <- rollout(env, policy, 20, seed = 1)
+  expect_identical(alone$episodes$seed, played$episodes$seed)
+  expect_identical(alone$episodes$return, played$episodes$return)
+})
+
+test_that("environments of every implementation given with lanes are played as they are", {
+  for (mode in c("vector_entry_point", "sync", "async")) {
+    env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = mode)
+    played <- rollout(env, policy_random(), 7, seed = 1)
+    expect_identical(played$episodes$lane, c(1:3, 1:3, 1L), info = mode)
+    expect_identical(played$num_envs, if (mode == "vector_entry_point") 3L, info = mode)
+  }
+  same <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "SameStep")
+  disabled <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "Disabled")
+  played <- rollout(same, policy_random(), 7, seed = 1)
+  expect_identical(played$episodes, rollout(disabled, policy_random(), 7, seed = 1)$episodes)
+})
+
+test_that("a vector implementation that plays another game is not taken for an id", {
+  client <- test_client()
+  skip_if_not(isTRUE(env_registry(client, "ALE/Pong-v5")$available[1]), "the extra atari")
+  lanes <- make_lanes("ALE/Pong-v5", 1, client)
+  withr::defer(lanes$close())
+  expect_identical(lanes$vectorization_mode, "sync")
+  expect_identical(lanes$single_observation_space$shape, c(210L, 160L, 3L))
 })
 
 test_that("an environment that was made is closed, a given one is not, also after an error", {
@@ -214,7 +263,7 @@ test_that("an environment that was made is closed, a given one is not, also afte
 
 test_that("CartPole: 200 pushes at most in v0, and a policy's mistake is the environment's error", {
   client <- test_client()
-  follow_pole <- function(observation) as.integer(observation[3] + observation[4] > 0)
+  follow_pole <- function(observation) as.integer(observation[, 3] + observation[, 4] > 0)
   played <- rollout("CartPole-v0", follow_pole, 10, seed = 1, client = client)
   expect_identical(max(played$episodes$length), 200L)
   expect_identical(played$episodes$truncated, played$episodes$length == 200L)
@@ -242,4 +291,14 @@ test_that("Blackjack: observations with several parts have named columns", {
   expect_identical(nrow(random$episodes), 5L)
   expect_error(rollout("Blackjack-v1", policy_network(c(3, 1)), client = client),
                "cannot observe <Tuple", class = "gym_error_argument")
+})
+
+test_that("a server that allows fewer lanes plays one episode after the other", {
+  server <- local_server(max_num_envs = 8)
+  played <- rollout("CartPole-v1", policy_random(), 9, seed = 1, client = server)
+  expect_identical(played$episodes$lane, rep(1L, 9))
+  expect_null(played$num_envs)
+  few <- rollout("CartPole-v1", policy_random(), 5, seed = 1, client = server)
+  expect_identical(few$episodes$lane, 1:5)
+  expect_length(env_list_all(server), 0)
 })

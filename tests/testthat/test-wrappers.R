@@ -41,7 +41,7 @@ test_that("a wrapper is applied at creation, in each way to make an environment"
   done <- vapply(1:7, function(i) env_step(client, id, i %% 2)$truncated, NA)
   expect_identical(done, rep(c(FALSE, TRUE), c(6, 1)))
   env_close(client, id)
-  balance <- function(observation) as.integer(observation[3] + observation[4] > 0)
+  balance <- function(observation) as.integer(observation[, 3] + observation[, 4] > 0)
   expect_identical(rollout(wrapped, balance, seed = 1, client = client)$episodes$length, 7L)
 })
 

@@ -1,0 +1,179 @@
+# What is played on: the lanes of an environment, whatever its kind. Each kind offers
+# the same: its spaces, how many episodes it plays at once, and reset and step on rows,
+# one for each lane that plays.
+
+# How many episodes a block has, where an environment is made for the purpose. They must
+# not depend on how many episodes are asked for: which seeds and weights are drawn for
+# an episode would depend on it, too.
+entry_point_lanes <- 256L
+sync_lanes <- 16L
+
+#' Call a function with the lanes of an environment
+#'
+#' One that is named by its id is made first and closed when `use` is left.
+#' @param episodes How many episodes are played at most: no more lanes are made.
+#' @noRd
+with_lanes <- function(env, episodes, client, use) {
+  call <- rlang::caller_env()
+  if (!is.character(env) && !inherits(env, "gym_wrapped")) {
+    return(use(lanes_of(env, call = call)))
+  }
+  env <- make_lanes(env, episodes, client)
+  finished <- FALSE
+  on.exit(close_made(env, finished))
+  value <- use(lanes_of(env, sync_lanes, call))
+  finished <- TRUE
+  value
+}
+
+# What was played is not lost because the environment could not be closed, and an
+# error on the way here says more than one from closing.
+close_made <- function(env, finished) {
+  tryCatch(
+    env$close(),
+    gym_error = function(cnd) {
+      if (finished) {
+        rlang::warn(
+          c("The environment could not be closed.", x = conditionMessage(cnd)),
+          class = "gym_warning_close"
+        )
+      }
+    }
+  )
+}
+
+make_lanes <- function(env_id, episodes, client) {
+  own <- if (has_own_lanes(env_id, client)) {
+    make_if_can(env_id, entry_point_lanes, "vector_entry_point", NULL, client)
+  }
+  own %||% make_if_can(env_id, min(episodes, sync_lanes), "sync", "Disabled", client) %||%
+    gym_make(env_id, client = client)
+}
+
+# Does the server take the environment's own vector implementation where it may choose?
+# Asked with one lane, as others are dear to make.
+has_own_lanes <- function(env_id, client) {
+  lane <- make_if_can(env_id, 1L, NULL, NULL, client)
+  if (is.null(lane)) {
+    return(FALSE)
+  }
+  on.exit(close_made(lane, finished = FALSE))
+  identical(lane$vectorization_mode, "vector_entry_point")
+}
+
+# NULL where the server cannot make such lanes, or not that many.
+make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, client) {
+  tryCatch(
+    gym_make(
+      env_id, num_envs = num_envs, vectorization_mode = vectorization_mode,
+      autoreset_mode = autoreset_mode, client = client
+    ),
+    gym_error_http_400 = function(cnd) {
+      if (!cnd$code %in% c("not_supported", "too_many_lanes", "unsupported_space")) {
+        rlang::cnd_signal(cnd)
+      }
+    }
+  )
+}
+
+#' Find out how an environment's lanes are played
+#'
+#' @param block How many episodes make a block where each lane has a seed of its own;
+#'   `NULL` for as many as there are lanes.
+#' @return A list: the spaces of a lane, `spec` and `client`, as an environment has them,
+#'   for [policy_bind()]; `call`, of which errors while they play are told; `block`, how
+#'   many episodes are played at once; `draw_seeds()`, which draws the seeds of a block,
+#'   one for each episode; `reset(seeds)`, which gives the observations of all lanes;
+#'   `step(action, playing)`, which takes and gives one row for each of the lanes
+#'   `playing`; `num_envs`, with how many lanes an episode has to be begun again, `NULL`
+#'   where its seed is enough.
+#' @noRd
+lanes_of <- function(env, block = NULL, call = rlang::caller_env()) {
+  if (is.null(env$num_envs)) {
+    lanes <- single_lane(env)
+  } else if (identical(env$vectorization_mode, "sync")) {
+    lanes <- lanes_apart(env, block %||% env$num_envs)
+  } else {
+    check_ended_lanes_step(env, call)
+    lanes <- lanes_together(env)
+  }
+  lanes$spec <- env$spec
+  lanes$client <- env$client
+  lanes$call <- call
+  lanes
+}
+
+# Without lanes: one episode after the other.
+single_lane <- function(env) {
+  observed <- env$observation_space
+  actions <- env$action_space
+  list(
+    observation_space = observed, action_space = actions, block = 1L,
+    draw_seeds = function() draw_environment_seeds(1L),
+    reset = function(seeds) lanes_from(observed, list(env$reset(seed = seeds))),
+    step = function(action, playing) {
+      out <- env$step(lane_value(actions, action, 1L))
+      out$observation <- lanes_from(observed, list(out$observation))
+      out
+    }
+  )
+}
+
+# Each lane is an environment of its own, with a seed of its own, and only those that
+# play are stepped.
+lanes_apart <- function(env, block) {
+  n <- env$num_envs
+  list(
+    observation_space = env$single_observation_space,
+    action_space = env$single_action_space, block = block,
+    draw_seeds = function() draw_environment_seeds(block),
+    reset = function(seeds) env$reset(seed = seeds[seq_len(n)]),
+    step = function(action, playing) {
+      if (length(playing) == n) env$step(action) else env$step(action, lanes = playing)
+    }
+  )
+}
+
+# All lanes are always stepped, those whose episode has ended too: what they do then is
+# of no interest. Where one generator serves them all, there is one seed.
+lanes_together <- function(env) {
+  n <- env$num_envs
+  observed <- env$single_observation_space
+  actions <- env$single_action_space
+  one_seed <- !identical(env$vectorization_mode, "async")
+  list(
+    observation_space = observed, action_space = actions, block = n,
+    num_envs = if (one_seed) n,
+    draw_seeds = function() rep_len(draw_environment_seeds(if (one_seed) 1L else n), n),
+    reset = function(seeds) env$reset(seed = if (one_seed) seeds[[1L]] else seeds),
+    step = function(action, playing) {
+      if (length(playing) == n) {
+        return(env$step(action))
+      }
+      row <- rep(1L, n)
+      row[playing] <- seq_along(playing)
+      out <- env$step(lane_rows(actions, action, row))
+      list(
+        observation = lane_rows(observed, out$observation, playing),
+        reward = out$reward[playing],
+        terminated = out$terminated[playing],
+        truncated = out$truncated[playing]
+      )
+    }
+  )
+}
+
+check_ended_lanes_step <- function(env, call) {
+  if (identical(env$autoreset_mode, "Disabled")) {
+    gym_abort(
+      c(
+        paste0("Episodes of different length cannot be played in ", environment_label(env),
+               " made with vectorization_mode \"", env$vectorization_mode,
+               "\" and autoreset_mode \"Disabled\": all of its lanes are stepped together, ",
+               "and one that has ended takes no step."),
+        i = "Make it with autoreset_mode \"NextStep\", or with vectorization_mode \"sync\"."
+      ),
+      class = "gym_error_argument", argument = "env", value = env, call = call
+    )
+  }
+}

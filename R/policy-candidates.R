@@ -1,0 +1,52 @@
+# Networks of the same sizes that play side by side, each in lanes of its own.
+
+#' Let several networks play in the same lanes
+#'
+#' @param policies A list of networks that differ only in their weights.
+#' @param candidate Which of them plays in each lane, its place in the list.
+#' @return What [act_lanes()] asks for actions: the network itself where it is one.
+#' @noRd
+candidates_of <- function(policies, candidate) {
+  if (length(policies) == 1L) {
+    return(policies[[1L]])
+  }
+  layers <- lapply(seq_along(policies[[1L]]$weights), function(layer) {
+    rows <- lapply(policies, function(policy) as.vector(policy$weights[[layer]]))
+    do.call(rbind, rows)[candidate, , drop = FALSE]
+  })
+  structure(
+    list(policy = policies[[1L]], layers = layers),
+    class = c("gym_policy_candidates", "gym_policy")
+  )
+}
+
+#' @exportS3Method
+act_lanes.gym_policy_candidates <- function(policy, observation, playing, lanes) {
+  network <- policy$policy
+  signal <- network_inputs(network$observation_space, lane_numbers(observation))
+  everyone <- length(playing) == nrow(policy$layers[[1L]])
+  for (layer in seq_along(policy$layers)) {
+    weights <- policy$layers[[layer]]
+    if (!everyone) {
+      weights <- weights[playing, , drop = FALSE]
+    }
+    signal <- activate(sum_weighted(signal, weights), network$activation[[layer]])
+  }
+  network_action(network$action_space, signal, network, one = FALSE)
+}
+
+#' Sum inputs with weights of their own for each row
+#'
+#' @param weights In each row the weight matrix of a layer, column after column: all
+#'   outputs of the first input, then those of the next.
+#' @return A matrix with one column for each output.
+#' @noRd
+sum_weighted <- function(signal, weights) {
+  n <- nrow(signal)
+  inputs <- ncol(signal)
+  outputs <- ncol(weights) %/% inputs
+  terms <- signal[, rep(seq_len(inputs), each = outputs)] * weights
+  sums <- .rowSums(terms, n * outputs, inputs)
+  dim(sums) <- c(n, outputs)
+  sums
+}

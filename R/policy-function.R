@@ -1,0 +1,78 @@
+# What functions as policies answer. They are asked about many observations at once.
+
+#' Check that there is one action for each lane, and bring them in the form of lanes
+#'
+#' Whether each is an action of the space is for the environment to say.
+#' @noRd
+lane_actions <- function(actions, n, lanes) {
+  actions <- as_lanes(lanes$action_space, actions)
+  given <- lanes_given(lanes$action_space, actions)
+  if (is.na(given) || given != n) {
+    abort_action_count(actions, given, n, lanes)
+  }
+  actions
+}
+
+as_lanes <- function(space, actions) {
+  if (has_parts(space)) {
+    complete <- is.list(actions) && length(actions) == length(space$spaces)
+    if (complete) map_parts(space, as_lanes, in_order(space, actions)) else actions
+  } else if (is_stackable(space) && prod(space$shape) == 1 && is_column(actions)) {
+    column_as_lanes(space, actions)
+  } else {
+    actions
+  }
+}
+
+# Of actions of one number each a vector and a column mean the same.
+is_column <- function(x) {
+  is.atomic(x) && length(x) > 0L && length(x) == stack_length(x)
+}
+
+column_as_lanes <- function(space, actions) {
+  if (is.logical(actions) && !identical(space$dtype, "bool")) {
+    actions <- as.integer(actions)
+  }
+  dim(actions) <- if (length(space$shape)) c(length(actions), space$shape)
+  actions
+}
+
+abort_action_count <- function(actions, given, n, lanes) {
+  gave <- if (is.na(given)) describe_argument(actions) else count_of(given, "action")
+  gym_abort(
+    c(
+      paste0(
+        "The policy must give one action for ",
+        if (n == 1L) "the one observation" else paste("each of", n, "observations"),
+        ", not ", gave, "."
+      ),
+      i = asked_text(lanes$observation_space),
+      i = answered_text(lanes$action_space)
+    ),
+    class = "gym_error_argument", argument = "policy", value = actions, call = lanes$call
+  )
+}
+
+# How to write a policy, for those who have written one for a single observation.
+asked_text <- function(space) {
+  if (inherits(space, "gym_space_discrete") || inherits(space, "gym_space_text")) {
+    "It is asked about many observations at once: `observation` is a vector of them."
+  } else if (is.null(space) || length(space$shape) == 1L) {
+    paste("It is asked about many observations at once, each a row of a matrix: the third",
+          "number of each is `observation[, 3]`.")
+  } else if (has_parts(space)) {
+    "It is asked about many observations at once, whose parts have a row for each of them."
+  } else {
+    "It is asked about many observations at once: the first dimension counts them."
+  }
+}
+
+answered_text <- function(space) {
+  if (inherits(space, "gym_space_array") && !identical(prod(space$shape), 1)) {
+    paste0("An action of ", format(space), " is a row, and so ", if (length(space$shape) > 1L) {
+      "several are an array with one dimension more, the first."
+    } else {
+      "several are a matrix."
+    })
+  }
+}

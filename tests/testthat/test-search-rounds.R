@@ -1,0 +1,161 @@
+modes <- c("sync", "vector_entry_point")
+
+# What counts of a search, without how long it took and where.
+figures <- function(search) search[c("policy", "solved", "round", "rounds", "episodes")]
+
+test_that("of rounds played at once the first in order wins, not the first in time", {
+  for (mode in modes) {
+    env <- scripted_lanes(
+      8, returns = c(1, 2, 10, 30, 50, 50, 90, 90), lengths = c(4, 2, 9, 3, 1, 1, 20, 2), mode
+    )
+    search <- search_random(env, rounds = 4, episodes = 2, target = 20, seed = 1)
+    expect_true(search$solved)
+    expect_identical(search$round, 2L)
+    expect_identical(
+      search$rounds, data.frame(round = 1:2, mean_return = c(1.5, 20), steps = c(6L, 12L))
+    )
+    expect_identical(search$episodes$return, c(1, 2, 10, 30))
+    expect_identical(search$episodes$length, c(4L, 2L, 9L, 3L))
+    expect_identical(search$episodes$round, rep(1:2, each = 2))
+    expect_identical(search$episodes$episode, rep(1:2, 2))
+    expect_output(print(search), "2 rounds, 4 episodes, 18 steps")
+  }
+})
+
+test_that("an earlier round that fails after a later one has reached the target counts", {
+  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(9, 9, 1, 1, 1, 1))
+  search <- search_random(env, rounds = 3, episodes = 2, target = 20)
+  expect_identical(search$round, 2L)
+  expect_identical(search$rounds$mean_return, c(1, 50))
+})
+
+test_that("once the search is decided nothing more is played", {
+  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(1, 1, 2, 2, 40, 40))
+  search_random(env, rounds = 30, episodes = 2, target = 20)
+  # Two steps of all that play, and no second block.
+  expect_identical(env$lane_steps, 6L + 4L)
+  expect_length(env$resets, 1)
+})
+
+test_that("lanes of rounds after one that has reached the target are not waited for", {
+  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(5, 5, 1, 1, 40, 40))
+  search_random(env, rounds = 30, episodes = 2, target = 20)
+  # After the first step only the first round plays, of which it is not yet known.
+  expect_identical(env$lane_steps, 6L + 4L * 2L)
+})
+
+test_that("a round may begin in one block and end in another", {
+  for (mode in modes) {
+    returns <- c(1, 2, 3, 4, 5, 21, 20, 20, 19, 20, 90)
+    env <- scripted_lanes(4, returns, lengths = rep(c(3L, 1L), length.out = 11), mode)
+    search <- search_random(env, rounds = 4, episodes = 5, target = 20)
+    expect_identical(search$rounds$mean_return, c(3, 20))
+    expect_identical(search$episodes$return, returns[1:10])
+    expect_identical(search$episodes$lane, c(1:4, 1:4, 1:2))
+  }
+})
+
+test_that("without a target all rounds are played", {
+  env <- scripted_lanes(4, returns = 1:9, lengths = rep(1:3, 3))
+  search <- search_random(env, rounds = 3, episodes = 3)
+  expect_identical(search$rounds$mean_return, c(2, 5, 8))
+  expect_false(search$solved)
+  expect_identical(search$round, 3L)
+})
+
+test_that("a shorter search is the beginning of a longer one, with the same policies", {
+  for (mode in modes) {
+    play <- function(rounds) {
+      env <- fake_lanes(16, mode, reward = first_action)
+      search_random(env, rounds = rounds, target = Inf, seed = 1)
+    }
+    short <- play(20)
+    long <- play(50)
+    expect_identical(long$episodes[long$episodes$round <= 20, ], short$episodes)
+    expect_identical(long$rounds[1:20, ], short$rounds)
+    expect_identical(figures(play(50)), figures(long))
+    expect_identical(short$policy, play(short$round)$policy)
+  }
+})
+
+test_that("the policy returned is the one that was played in its round", {
+  env <- fake_lanes(16, reward = first_action)
+  search <- search_random(env, rounds = 10, episodes = 3, target = Inf, seed = 1)
+  played <- search$episodes[search$episodes$round == search$round, ]
+  alone <- fake_environment(reward = first_action)
+  again <- vapply(played$seed, function(seed) {
+    action <- act(search$policy, alone$reset(seed = seed))
+    alone$step(action)$reward
+  }, 0)
+  expect_identical(again, played$return)
+})
+
+test_that("set.seed() alone fixes a search in lanes, and seed = gives the same", {
+  play <- function(...) {
+    figures(search_random(fake_lanes(8, "vector_entry_point", reward = first_action), ...))
+  }
+  set.seed(5)
+  beforehand <- play(rounds = 4)
+  set.seed(99)
+  state <- .Random.seed
+  expect_identical(play(rounds = 4, seed = 5), beforehand)
+  expect_identical(.Random.seed, state)
+  expect_false(identical(play(rounds = 4, seed = 6), beforehand))
+})
+
+test_that("an interrupt keeps the finished rounds up to the first unfinished one", {
+  play <- function(lengths, at) {
+    env <- scripted_lanes(8, returns = 1:8, lengths = lengths)
+    step <- env$step
+    env$step <- function(...) {
+      at <<- at - 1L
+      if (at < 0L) rlang::interrupt()
+      step(...)
+    }
+    suppressMessages(search_random(env, rounds = 9, episodes = 2, target = Inf))
+  }
+  search <- play(c(1, 2, 2, 1, 9, 1, 1, 1), at = 2)
+  expect_true(search$interrupted)
+  expect_identical(search$rounds$mean_return, c(1.5, 3.5))
+  expect_identical(search$round, 2L)
+  none <- play(c(9, 1, 1, 1, 1, 1, 1, 1), at = 2)
+  expect_identical(nrow(none$rounds), 0L)
+  expect_identical(nrow(none$episodes), 0L)
+  expect_null(none$policy)
+})
+
+test_that("a target reached behind an unfinished round does not solve an interrupted search", {
+  env <- scripted_lanes(4, returns = c(1, 1, 50, 50), lengths = c(9, 9, 1, 1))
+  step <- env$step
+  env$step <- function(...) if (env$lane_steps > 8L) rlang::interrupt() else step(...)
+  suppressMessages(search <- search_random(env, rounds = 9, episodes = 2, target = 20))
+  expect_false(search$solved)
+  expect_identical(nrow(search$rounds), 0L)
+})
+
+test_that("an error in the middle carries the rounds that were finished", {
+  env <- scripted_lanes(8, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
+  step <- env$step
+  env$step <- function(...) {
+    if (env$lane_steps > 10L) gym_abort("lost", class = "gym_error_connection")
+    step(...)
+  }
+  cnd <- tryCatch(search_random(env, episodes = 2, target = Inf), gym_error_search = identity)
+  expect_s3_class(cnd, "gym_error_connection")
+  expect_identical(cnd$result$rounds$mean_return, c(1.5, 3.5))
+  expect_match(conditionMessage(cnd), "after 2 rounds")
+})
+
+test_that("the progress bar counts the rounds in their order", {
+  env <- scripted_lanes(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
+  shown <- list()
+  record <- new_rounds(4L, 2L, NULL, function(finished, best) {
+    shown[[length(shown) + 1L]] <<- c(finished, best)
+  })
+  template <- policy_bind(policy_network(), lanes_of(env))
+  begin <- function(block, episodes) {
+    list(seeds = draw_environment_seeds(4L), policy = draw_policies(record, template, episodes))
+  }
+  play_episodes(lanes_of(env), record, begin)
+  expect_identical(shown, list(c(2, 3.5), c(4, 7.5)))
+})
