@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo test check lint document clean
+.PHONY: help demo bench test check lint document clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -12,6 +12,8 @@ endif
 
 help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
+	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
+	@echo '               some ten minutes, or a glance: make bench QUICK=1'
 	@echo 'make test      every test: of the server (pytest) and of the R package (testthat)'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
 	@echo 'make lint      lintr for R, ruff for Python'
@@ -24,6 +26,10 @@ help:
 demo:
 	@tools/setup demo
 	@tools/in-env Rscript --no-init-file tools/demo.R
+
+bench:
+	@tools/setup bench
+	@tools/in-env Rscript --no-init-file tools/bench.R $(if $(QUICK),quick)
 
 test:
 	@tools/setup test

@@ -25,6 +25,7 @@ goal_packages <- function(goal) {
   optional <- setdiff(names(declared("Suggests")), c("testthat", vignettes, benchmarks))
   switch(goal,
     demo = list(need = imports),
+    bench = list(need = c(imports, benchmarks)),
     test = list(need = c(imports, "testthat"), want = optional),
     check = list(need = c(imports, "testthat", vignettes, "codetools"), want = optional),
     lint = list(need = c("lintr", "codetools")),

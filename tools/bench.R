@@ -1,0 +1,118 @@
+# The benchmark: steps a second of single and vector environments through gym, reticulate,
+# the classic pattern and Python itself, seconds of searches, memory. All in one run, turn by
+# turn, on CartPole with alternating actions.
+#
+#   make bench              some ten minutes; writes vignettes/bench.csv, vignettes/bench.md
+#                           and man/figures/bench.png
+#   make bench QUICK=1      a glance: the same with few turns, into pictures/
+#
+# tools/in-env Rscript tools/bench.R [quick] [single] [lanes] [search] [memory] runs parts.
+
+library(gym)
+for (file in c("turns", "workers", "classic", "contenders", "search", "results", "table",
+               "figure")) {
+  source(file.path("tools", "bench", paste0(file, ".R")))
+}
+
+progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
+
+# `searches`: how often search_random() plays the rounds that the post's way plays once.
+settings <- function(quick) {
+  if (quick) {
+    list(turns = 3L, seconds = 0.3, lanes = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,
+         fresh = 1L, steps = 1e5)
+  } else {
+    list(turns = 7L, seconds = 0.7, lanes = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
+         rounds = 50, fresh = 5L, steps = 1e6)
+  }
+}
+
+bench <- function(parts, quick) {
+  python <- Sys.getenv("GYM_PYTHON")
+  scale <- settings(quick)
+  setup <- set_up(python)
+  on.exit(tear_down(setup))
+  started <- now()
+  contenders <- c(
+    if ("single" %in% parts) single_contenders(setup),
+    if ("lanes" %in% parts) {
+      unlist(lapply(scale$lanes, function(n) lanes_contenders(setup, n)), recursive = FALSE)
+    }
+  )
+  rows <- rbind(
+    if (length(contenders)) play_turns(contenders, scale$turns, scale$seconds),
+    if ("search" %in% parts) compare_searches(setup, scale$searches, scale$rounds),
+    if ("search" %in% parts) fresh_searches(scale$fresh),
+    if ("memory" %in% parts) measure_memory(scale$steps)
+  )
+  list(rows = rows, run = c(describe_run(setup), took = paste(round(now() - started), "s")))
+}
+
+set_up <- function(python) {
+  numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
+  list(
+    client = gym_server_start(python = python),
+    development = start_development_server(python),
+    python = start_python(python),
+    reticulate = lapply(c(list(NULL), numpy_1), start_reticulate, python = python)
+  )
+}
+
+tear_down <- function(setup) {
+  for (worker in c(list(setup$development, setup$python), setup$reticulate)) end_worker(worker)
+  gym_server_stop(setup$client)
+}
+
+measure_memory <- function(steps) {
+  progress("memory")
+  lines <- processx::run(
+    file.path(R.home("bin"), "Rscript"), c("--no-init-file", "tools/bench/memory.R", steps)
+  )$stdout
+  lines <- strsplit(strsplit(trimws(lines), "\n")[[1L]], ": ")
+  do.call(rbind, lapply(lines, function(line) {
+    measured("memory", 0, line[[1L]], "", 1L, as.numeric(line[[2L]]), "MB")
+  }))
+}
+
+describe_run <- function(setup) {
+  server <- ask(setup$python, "versions")
+  ours <- c("gym", "httr", "curl", "jsonlite")
+  reticulates <- lapply(setup$reticulate, ask, "versions")
+  c(
+    date = format(Sys.Date()),
+    cores = server$cores, system = server$system,
+    R = format(getRversion()),
+    vapply(ours, function(package) format(utils::packageVersion(package)), ""),
+    libcurl = curl::curl_version()$version,
+    unlist(server[setdiff(names(server), c("cores", "system"))]),
+    reticulate = paste(vapply(reticulates, function(its) {
+      paste0(its$reticulate, " on Python ", its$Python, " with gymnasium ", its$Gymnasium,
+             ", NumPy ", its$NumPy)
+    }, ""), collapse = " and ")
+  )
+}
+
+report <- function(result, csv, text, figure) {
+  write_results(result$rows, result$run, csv)
+  lines <- c(table_lines(result$rows), "", goal_lines(result$rows), "", run_lines(result$run))
+  writeLines(lines, text)
+  cat(lines, sep = "\n")
+  if (all(c("single", "lanes") %in% result$rows$part)) {
+    draw_figure(result$rows, result$run, figure)
+  }
+}
+
+arguments <- commandArgs(trailingOnly = TRUE)
+quick <- "quick" %in% arguments
+all_parts <- c("single", "lanes", "search", "memory")
+parts <- intersect(all_parts, arguments)
+whole <- !quick && !length(parts)
+if (!length(parts)) parts <- all_parts
+if (!whole) dir.create("pictures", showWarnings = FALSE)
+result <- bench(parts, quick)
+report(
+  result,
+  csv = if (whole) "vignettes/bench.csv" else "pictures/bench.csv",
+  text = if (whole) "vignettes/bench.md" else "pictures/bench.md",
+  figure = if (whole) "man/figures/bench.png" else "pictures/bench.png"
+)

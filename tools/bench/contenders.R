@@ -1,0 +1,98 @@
+# The contenders in steps a second: for each what it is, how it is called, and a function
+# that plays a turn. Environments are made at once and kept for all turns.
+
+contender <- function(part, lanes, name, called, play) {
+  list(part = part, lanes = lanes, name = name, called = called, play = play)
+}
+
+# How reticulate is named with the NumPy of the server, and with one that it converts.
+reticulate_name <- function(worker) {
+  paste0("reticulate, NumPy ", sub("[.].*", "", ask(worker, "versions")$NumPy))
+}
+
+single_contenders <- function(setup) {
+  client <- setup$client
+  id <- env_create(client, "CartPole-v1", seed = 1)
+  env <- gym_make("CartPole-v1", seed = 1, client = client)
+  classic <- setup$development$url
+  classic_id <- classic_create(classic, "CartPole-v1")
+  c(
+    list(
+      contender("single", 0, "gym, env_step()", "env_step(client, id, a)", function(seconds) {
+        play_single(
+          function() env_reset(client, id), function(a) env_step(client, id, a)$done, seconds
+        )
+      }),
+      contender("single", 0, "gym, env$step()", "env$step(a)", function(seconds) {
+        play_single(env$reset, function(a) env$step(a)$done, seconds)
+      }),
+      contender("single", 0, "classic pattern", "httr::POST() for each call", function(seconds) {
+        play_single(
+          function() classic_reset(classic, classic_id),
+          function(a) classic_step(classic, classic_id, a)$done,
+          seconds
+        )
+      }),
+      contender("single", 0, "Python", "env.step(a) in a loop", function(seconds) {
+        ask(setup$python, "single", seconds)
+      })
+    ),
+    unlist(lapply(setup$reticulate, reticulate_single), recursive = FALSE)
+  )
+}
+
+# Both ways to call it are contenders of their own.
+reticulate_single <- function(worker) {
+  forms <- ask(worker, "forms single")
+  lapply(seq_along(forms), function(form) {
+    name <- paste0(reticulate_name(worker), if (form > 1L) ", step kept")
+    contender("single", 0, name, forms[[form]], function(seconds) {
+      ask(worker, "single", form, seconds)
+    })
+  })
+}
+
+lanes_contenders <- function(setup, lanes) {
+  env <- gym_make("CartPole-v1", num_envs = lanes, seed = 1, client = setup$client)
+  env$reset()
+  actions <- alternating(lanes)
+  mode <- env$vectorization_mode
+  c(
+    list(
+      contender("lanes", lanes, own[["lanes"]], paste0("env$step(a), ", mode), function(seconds) {
+        play_lanes(lanes, actions, env$step, seconds)
+      }),
+      contender("lanes", lanes, "Python", paste0("envs.step(a), ", mode), function(seconds) {
+        ask(setup$python, "lanes", seconds, lanes, mode)
+      })
+    ),
+    lapply(setup$reticulate, reticulate_lanes, lanes, mode)
+  )
+}
+
+# Of the ways to call it the fastest: the best of some tries, in which they take turns.
+reticulate_lanes <- function(worker, lanes, mode) {
+  forms <- ask(worker, "forms lanes")
+  tries <- replicate(5L, vapply(seq_along(forms), function(form) {
+    ask(worker, "lanes", form, 0.1, lanes, mode)
+  }, 0))
+  best <- which.max(apply(tries, 1L, max))
+  contender("lanes", lanes, reticulate_name(worker), forms[[best]], function(seconds) {
+    ask(worker, "lanes", best, seconds, lanes, mode)
+  })
+}
+
+# Turn by turn: in each all of them, every second time in the other direction.
+play_turns <- function(contenders, turns, seconds) {
+  for (contender in contenders) contender$play(seconds / 4)
+  orders <- lapply(seq_len(turns), function(turn) {
+    if (turn %% 2L) seq_along(contenders) else rev(seq_along(contenders))
+  })
+  rows <- lapply(seq_len(turns), function(turn) {
+    progress("turn ", turn, " of ", turns, ": ", length(contenders), " contenders")
+    do.call(rbind, lapply(contenders[orders[[turn]]], function(one) {
+      measured(one$part, one$lanes, one$name, one$called, turn, one$play(seconds), "steps/s")
+    }))
+  })
+  do.call(rbind, rows)
+}

@@ -1,0 +1,89 @@
+"""The contender Python: loops in process, in the Python of the server.
+
+Reads one line a turn and answers with one, env steps a second (or what was asked for):
+
+    versions                       as JSON
+    single SECONDS
+    lanes SECONDS LANES MODE       MODE is Gymnasium's vectorization_mode
+"""
+
+import json
+import os
+import platform
+import re
+import sys
+import time
+from functools import cache
+from importlib import metadata
+
+import gymnasium
+import numpy as np
+
+
+def single(seconds: str) -> float:
+    """Play one environment, one step after the other."""
+    env = _single_env()
+    env.reset()
+    steps = 0
+    started = time.perf_counter()
+    while True:
+        for i in range(100):
+            _, _, terminated, truncated, _ = env.step(i % 2)
+            if terminated or truncated:
+                env.reset()
+        steps += 100
+        elapsed = time.perf_counter() - started
+        if elapsed >= float(seconds):
+            return steps / elapsed
+
+
+def lanes(seconds: str, number: str, mode: str) -> float:
+    """Play a vector of environments."""
+    envs = _vector_env(int(number), mode)
+    actions = [(np.arange(int(number)) + i) % 2 for i in range(2)]
+    steps = 0
+    started = time.perf_counter()
+    while True:
+        for i in range(10):
+            envs.step(actions[i % 2])
+        steps += 10 * int(number)
+        elapsed = time.perf_counter() - started
+        if elapsed >= float(seconds):
+            return steps / elapsed
+
+
+@cache
+def _single_env() -> gymnasium.Env:
+    env = gymnasium.make("CartPole-v1")
+    env.reset(seed=1)
+    return env
+
+
+@cache
+def _vector_env(number: int, mode: str) -> gymnasium.vector.VectorEnv:
+    envs = gymnasium.make_vec("CartPole-v1", num_envs=number, vectorization_mode=mode)
+    envs.reset(seed=1)
+    return envs
+
+
+def versions() -> dict:
+    """Tell the versions of Python and of what the server needs, its HTTP server among them."""
+    needed = [
+        re.match(r"[\w.-]+", requirement).group()
+        for requirement in metadata.requires("gym-server")
+        if "extra ==" not in requirement
+    ]
+    return {
+        "Python": platform.python_version(),
+        "system": platform.system(),
+        "cores": len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count(),
+        **{name: metadata.version(name) for name in needed},
+    }
+
+
+for line in sys.stdin:
+    command, *arguments = line.split()
+    answer = {"versions": versions, "single": single, "lanes": lanes}[command](*arguments)
+    print(json.dumps(answer), flush=True)

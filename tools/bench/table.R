@@ -1,0 +1,54 @@
+# The bench's table, as Markdown that also reads well on a terminal.
+
+number <- function(x) {
+  ifelse(is.na(x), "", trimws(formatC(signif(x, 3), format = "fg", big.mark = ",", digits = 3)))
+}
+
+what_text <- function(summary) {
+  lanes <- ifelse(summary$lanes == 1, "lane", "lanes")
+  ifelse(
+    summary$part == "lanes", sprintf("%.0f %s", summary$lanes, lanes),
+    c(single = "single", search = "random search", fresh = "search in a fresh R",
+      memory = "memory")[summary$part]
+  )
+}
+
+table_lines <- function(rows) {
+  summary <- summarise(rows)
+  range <- ifelse(summary$turns > 1, paste(number(summary$low), "to", number(summary$high)), "")
+  markdown(list(
+    what = what_text(summary), contender = calls_as_code(summary$contender),
+    median = number(summary$median), range = range, unit = summary$unit,
+    `gym is ... times as fast` = number(summary$ratio), called = code(summary$called)
+  ), right = c("median", "range", "gym is ... times as fast"))
+}
+
+goal_lines <- function(rows) {
+  goals <- check_goals(rows)
+  markdown(list(
+    goal = calls_as_code(goals$goal), measured = number(goals$measured),
+    reached = ifelse(goals$reached, "reached", "NOT reached")
+  ), right = "measured")
+}
+
+# What stands between two dollars would be mathematics.
+calls_as_code <- function(text) gsub("([a-z_]+[$]?[a-z_]*\\(\\))", "`\\1`", text)
+
+code <- function(text) ifelse(nzchar(text), paste0("`", text, "`"), "")
+
+markdown <- function(columns, right) {
+  cells <- Map(function(name, column) {
+    format(c(name, column), justify = if (name %in% right) "right" else "left")
+  }, names(columns), columns)
+  rule <- Map(function(name, column) {
+    dashes <- strrep("-", nchar(column[[1L]]) + 1L)
+    if (name %in% right) paste0(dashes, ":") else paste0(":", dashes)
+  }, names(columns), cells)
+  line <- function(cells) paste0("|", paste(cells, collapse = "|"), "|")
+  rows <- do.call(Map, c(list(function(...) line(paste0(" ", c(...), " "))), unname(cells)))
+  c(rows[[1L]], line(unlist(rule)), unlist(rows[-1L], use.names = FALSE))
+}
+
+run_lines <- function(run) {
+  strwrap(paste0(paste(names(run), run, collapse = "; "), "."), 100)
+}
