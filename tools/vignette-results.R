@@ -13,7 +13,7 @@ follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 results <- list()
 results$random <- rollout("CartPole-v0", policy_random(), episodes = 2000, seed = 2018)
 results$follow <- rollout("CartPole-v0", follow_pole, episodes = 200, seed = 2018)
-results$search <- search_random("CartPole-v0", seed = 2018)
+results$search <- search_random("CartPole-v0", seed = 2027)
 results$summary <- summary(results$search, seed = 1)
 results$episode <- rollout("CartPole-v0", results$search$policy, seed = 1, steps = TRUE)
 
