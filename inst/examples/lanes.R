@@ -1,0 +1,25 @@
+# Many environments at once: 1,000 carts whose poles are followed, in one call a step.
+
+library(gym)
+
+env <- gym_make("CartPole-v1", num_envs = 1000, seed = 1)
+print(env)
+
+observation <- env$reset()
+alive <- rep(TRUE, 1000)
+steps <- 0
+while (any(alive)) {
+  # Push to the side to which the pole leans: a row of the matrix is a cart.
+  out <- env$step(observation[, 3] > 0)
+  observation <- out$observation
+  steps <- steps + sum(alive)
+  # A lane whose episode has ended begins another one by itself; the first one counts.
+  alive <- alive & !out$done
+}
+env$close()
+
+cat("1,000 episodes of", steps / 1000, "steps on average\n")
+
+# rollout() does the same, with a table of what came of it.
+played <- rollout("CartPole-v1", function(observation) observation[, 3] > 0, episodes = 1000)
+print(summary(played))
