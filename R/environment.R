@@ -102,7 +102,8 @@ env_list_all <- function(x) {
 #'   `TRUE` or `FALSE`, the default.
 #' @param mask For an environment with lanes: which of them to reset, a logical
 #'   vector with an element for each lane, at least one of them `TRUE`. `NULL`, the
-#'   default, resets all.
+#'   default, resets all. An environment's own vector implementation knows no masks:
+#'   make it with `vectorization_mode = "sync"`.
 #' @return The first observation, in the form of the observation space: a
 #'   numeric vector for a Box of one dimension, an array for one of more, an
 #'   integer for Discrete; [space_sample()] lists all kinds. With

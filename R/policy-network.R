@@ -153,7 +153,7 @@ act_lanes.gym_policy_network <- function(policy, observation, playing, lanes) {
 #' @return A matrix with one row for each observation, one column for each output.
 #' @noRd
 network_outputs <- function(policy, values, call = rlang::caller_env()) {
-  signal <- network_inputs(policy$observation_space, values)
+  signal <- network_inputs(policy$observation_space, values, call)
   if (ncol(signal) != policy$sizes[[1L]] || !is.numeric(signal)) {
     abort_observation(policy, values, call)
   }
@@ -176,12 +176,17 @@ abort_observation <- function(policy, values, call) {
   )
 }
 
-network_inputs <- function(space, values) {
+network_inputs <- function(space, values, call = rlang::caller_env()) {
   if (!inherits(space, "gym_space_discrete")) {
     return(values)
   }
+  at <- if (is.numeric(values)) values[, 1L] - space$start + 1 else NA
+  if (anyNA(at) || any(at < 1 | at > space$n | at != trunc(at))) {
+    must <- paste("whole numbers from", space$start, "to", space$start + space$n - 1L)
+    abort_argument(as.vector(values), must, "observation", call)
+  }
   inputs <- matrix(0, nrow = nrow(values), ncol = space$n)
-  inputs[cbind(seq_len(nrow(values)), values[, 1L] - space$start + 1)] <- 1
+  inputs[cbind(seq_len(nrow(values)), at)] <- 1
   inputs
 }
 

@@ -25,7 +25,8 @@
 #'   vector is one observation, and a numeric matrix has one observation in each
 #'   row. Where observations are arrays themselves, many of them have one
 #'   dimension more, the first; where they are single whole numbers, many of them
-#'   are an integer vector.
+#'   are an integer vector. A function knows of no space: to it a vector is always
+#'   passed as a matrix of one row.
 #' @param ... For methods.
 #' @return For one observation one action: a whole number for a discrete action
 #'   space, a numeric vector (or array) in the shape of the space for a Box. For

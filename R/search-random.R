@@ -108,7 +108,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   call <- rlang::current_env()
   keep_random_state(policy_resample(check_policy(policy), call = call))
   given <- if (!is.character(env)) env
-  with_lanes(env, rounds * episodes, client, function(lanes) {
+  with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
     settings <- list(
       policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
       target = target %||% lanes$spec$reward_threshold, max_steps = max_steps, seed = seed,

@@ -11,7 +11,7 @@
 #'   policies of the rounds that have begun.
 #' @noRd
 new_rounds <- function(rounds, episodes, target, on_round) {
-  record <- new_record(rounds * episodes, end_round_episodes)
+  record <- new_record(as.numeric(rounds) * episodes, end_round_episodes)
   record$size <- episodes
   record$target <- target
   record$on_round <- on_round
@@ -30,10 +30,12 @@ new_rounds <- function(rounds, episodes, target, on_round) {
 end_round_episodes <- function(record, episodes, returns) {
   record$returns[episodes] <- returns
   counts <- table_of_rounds(record, episodes)
-  record$open[counts$round] <- record$open[counts$round] - counts$n
-  ended <- counts$round[record$open[counts$round] == 0L]
+  left <- record$open[counts$round] - counts$n
+  ended <- counts$round[left == 0L]
+  # First what they came to: an interrupt must not find rounds that have ended without.
+  record$means[ended] <- vapply(ended, mean_of_round, 0, record = record)
+  record$open[counts$round] <- left
   if (length(ended)) {
-    record$means[ended] <- vapply(ended, mean_of_round, 0, record = record)
     reached <- ended[vapply(record$means[ended], reaches, NA, target = record$target)]
     record$wanted <- min(record$wanted, reached * record$size)
     finished <- count_finished(record)

@@ -150,8 +150,9 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 #' All lanes at once, as nearly always they all fit; if not, one after the other, so that
 #' the error tells which lane it is and shows that lane's value.
 #' @param space The space of one lane, `batch` that of all `n`.
+#' @param lanes Their numbers; `NULL` for 1 to `n`.
 #' @noRd
-check_lanes <- function(space, batch, values, n, call) {
+check_lanes <- function(space, batch, values, n, call, lanes = NULL) {
   if (fits_space(batch, values)) {
     return(invisible())
   }
@@ -161,8 +162,8 @@ check_lanes <- function(space, batch, values, n, call) {
     abort_space(batch, values, problem, call)
   }
   if (!is.na(given)) {
-    for (lane in seq_len(n)) {
-      check_lane(space, lane_value(space, values, lane), lane, call)
+    for (i in seq_len(n)) {
+      check_lane(space, lane_value(space, values, i), if (is.null(lanes)) i else lanes[[i]], call)
     }
   }
   check_value(batch, values, "", call)

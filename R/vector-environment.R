@@ -33,7 +33,7 @@ step_lanes <- function(x, instance, action, fields, lanes, call) {
     observations <- batch_space(instance$single_observation_space, n)
   }
   single <- instance$single_action_space
-  check_lanes(single, actions, action, n, call)
+  check_lanes(single, actions, action, n, call, lanes)
   answer <- send_action(
     x, instance, actions, action, write_lanes(single, action, n), fields, call
   )

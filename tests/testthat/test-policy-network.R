@@ -228,3 +228,13 @@ test_that("a network prints in one line", {
     print(policy_network()), "<policy: network 4-2-1, tanh, logistic, 10 weights>", fixed = TRUE
   )
 })
+
+test_that("a discrete observation that there is not is told", {
+  space <- new_space(list(name = "Discrete", n = 4L, start = 1L))
+  policy <- policy_network(c(4, 2))
+  policy$observation_space <- space
+  expect_length(act(policy, 1:4), 4)
+  for (wrong in list(0L, 5L, NA_integer_, 1.5, c(1L, 7L), "a")) {
+    expect_error(act(policy, wrong), "from 1 to 4", class = "gym_error_argument")
+  }
+})

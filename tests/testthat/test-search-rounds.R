@@ -159,3 +159,21 @@ test_that("the progress bar counts the rounds in their order", {
   play_episodes(lanes_of(env), record, begin)
   expect_identical(shown, list(c(2, 3.5), c(4, 7.5)))
 })
+
+test_that("an interrupt finds no round that has ended without a mean", {
+  record <- new_rounds(2, 1, NULL, function(finished, best) NULL)
+  record$open <- c(1L, 1L)
+  rm("means", envir = record)
+  makeActiveBinding("means", function(value) {
+    if (missing(value)) numeric() else rlang::interrupt()
+  }, record)
+  interrupted <- tryCatch(end_round_episodes(record, 1L, 5), interrupt = function(cnd) "interrupt")
+  expect_identical(interrupted, "interrupt")
+  expect_equal(count_finished(record), 0)
+})
+
+test_that("there may be more rounds than R's integers count episodes", {
+  search <- search_random("CartPole-v0", rounds = 1e9, target = 30, seed = 1,
+                          client = test_client())
+  expect_true(search$solved)
+})

@@ -352,3 +352,10 @@ test_that("kwargs and wrappers reach every lane", {
   expect_identical(short$step(c(0, 1))$truncated, c(TRUE, TRUE))
   expect_identical(short$vectorization_mode, "sync")
 })
+
+test_that("a wrong action of some lanes is named by its lane", {
+  env <- local_env("FrozenLake-v1", num_envs = 5, autoreset_mode = "Disabled")
+  env$reset()
+  error <- expect_error(env$step(c(0, NA), lanes = c(2, 4)), "Lane 4", class = "gym_error_space")
+  expect_identical(error$lane, 4)
+})

@@ -99,9 +99,13 @@ class Connection:
     def _respond(self, request: _Request) -> tuple[str, list[tuple[str, str]], bytes]:
         if request.refusal is not None:
             return _refuse(request.refusal)
+        try:
+            environ = self._environ(request)
+        except HttpParserError as error:
+            return _refuse(_malformed(str(error)))
         started: list = []
         result = self._app(
-            self._environ(request),
+            environ,
             lambda status, headers, exc_info=None: started.extend((status, headers)),
         )
         try:
@@ -243,6 +247,10 @@ class _Reader:
             # To a protocol that we do not speak. The parser takes what follows for that, also the
             # request's body, so it gets the head once more without the wish.
             wished = self._complete.pop()
+            if wished.method == "CONNECT":
+                self._request = wished
+                self._give_up(_malformed("this is no proxy"))
+                return b""
             self._parser = HttpRequestParser(self)
             return wished.plain_head() + data[upgrade.args[0] :]
         return b""

@@ -11,6 +11,7 @@ earlier and elsewhere, beside waitress with 185/310: cheroot 11.1.2 206/350, gra
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
 import select
@@ -137,8 +138,11 @@ class Server:
                 return
         try:
             client, address = self._listener.accept()
-        except OSError:
-            return  # It has left again.
+        except OSError as error:
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                log.warning("No more connections: this process may open no more files")
+                time.sleep(1.0)
+            return  # Else it has left again.
         client.setblocking(True)
         environ = {**self._base_environ, "REMOTE_ADDR": address[0]}
         connection = Connection(client, self._app, environ, self._max_body_bytes)

@@ -1,9 +1,11 @@
 """The server as its clients' sockets see it."""
 
 import json
+import os
 import re
 import socket
 import struct
+import sys
 import threading
 import time
 
@@ -167,6 +169,35 @@ def test_an_upgrade_is_declined_and_the_request_answered(server):
             request("GET", "/v1/health/"),
         ):
             assert answered(connection, sent)[0] == 200
+
+
+def test_a_proxys_request_is_refused_and_the_server_goes_on(server):
+    with server.socket() as connection:
+        answer = answered(connection, b"CONNECT a:80 HTTP/1.1\r\nHost: a\r\n\r\n")
+        assert (answer[0], connection.recv(1)) == (400, b"")
+    assert server.stop()[0] == 0
+
+
+def test_a_url_that_is_none_is_400_in_json(server):
+    with server.socket() as connection:
+        status, headers, _, _ = answered(connection, request("GET", "http://[x"))
+    assert (status, headers["content-type"]) == (400, "application/json")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="prlimit() and /proc")
+def test_a_server_without_file_handles_says_so_and_goes_on(server):
+    import resource
+
+    pid = server.process.pid
+    _, hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+    opened = len(os.listdir(f"/proc/{pid}/fd"))
+    resource.prlimit(pid, resource.RLIMIT_NOFILE, (opened + 3, hard))
+    connections = [server.socket() for _ in range(10)]
+    time.sleep(0.5)
+    for connection in connections:
+        connection.close()
+    assert server.get("/v1/health/")[0] == 200
+    assert "no more files" in server.stop()[2]
 
 
 def test_http_1_0_is_answered_and_closed(server):
