@@ -50,7 +50,8 @@
 #'     \item{episodes}{A data frame with one row for each episode: `episode`, `seed`,
 #'       `lane` (integers; 1 where there are no lanes), `return` (double), `length`
 #'       (integer, in steps), `terminated` (logical: ended by the environment's own
-#'       rules), `truncated` (logical: cut short by a limit of steps).}
+#'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
+#'       by both at once is both where the limit is the environment's own).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
 #'       step: `episode`, `step` (integers), the observation that the action was taken
 #'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
