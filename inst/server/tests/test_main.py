@@ -1,4 +1,5 @@
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ def test_a_python_without_flask_says_so_in_one_line_and_ends_with_78(tmp_path):
     assert refused.stderr.count("\n") == 1
     version = ".".join(map(str, sys.version_info[:3]))
     assert refused.stderr == (
-        f"gym_server cannot run on this Python ({version}, {sys.executable}): "
+        f"gym_server cannot run on this Python ({version}, {os.path.abspath(sys.executable)}): "
         "No module named 'flask'\n"
     )
 
