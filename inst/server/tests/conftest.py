@@ -52,6 +52,17 @@ def faulty(create):
     return lambda name, **kwargs: create(f"faulty_envs:{name}-v0", kwargs=kwargs)
 
 
+@pytest.fixture
+def lanes(create):
+    """Make a vector instance of the environment whose infos come and go."""
+
+    def lanes(space="Box", num_envs=3, name="Uneven", longest=4, **fields):
+        kwargs = {"space": space, "longest": longest}
+        return create(f"faulty_envs:{name}-v0", num_envs=num_envs, kwargs=kwargs, **fields)
+
+    return lanes
+
+
 class ServerProcess:
     """A real server in a process of its own."""
 

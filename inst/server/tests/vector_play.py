@@ -2,6 +2,7 @@
 
 import json
 
+import faulty_envs
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Dict, Discrete, Text, Tuple
@@ -14,6 +15,8 @@ from gym_server.tensors import TENSORS
 
 MODES = ["NextStep", "SameStep", "Disabled"]
 ACCEPT = {"Accept": TENSORS}
+KINDS = [kind for kind in faulty_envs.SPACES if kind != "nothing"]
+IN_TENSORS = [kind for kind in KINDS if spaces.travels_as_tensors(faulty_envs.SPACES[kind])]
 
 
 def in_process(env_id, num_envs, autoreset_mode="NextStep", **kwargs):
@@ -114,3 +117,45 @@ def read_tensors(answer):
     """Return the file in an answer."""
     assert (answer.status_code, answer.content_type) == (200, TENSORS), answer.data
     return tensors.read(answer.data)
+
+
+def twin(space="Box", num_envs=3, autoreset_mode="NextStep", longest=4):
+    return in_process("Uneven-v0", num_envs, autoreset_mode, space=space, longest=longest)
+
+
+def post(client, url, route, headers=None, **body):
+    answer = client.post(f"{url}/{route}/", json=body, headers=headers)
+    assert answer.status_code == 200, answer.json
+    return answer.json if headers is None else read_tensors(answer)
+
+
+def refusal(client, url, route, **body):
+    answer = client.post(f"{url}/{route}/", json=body)
+    assert answer.status_code == 400, answer.json
+    return answer.json["code"], answer.json["message"]
+
+
+def reset_those_that_ended(client, url, env, ended):
+    """Reset them here and there, as the mode without autoreset wants it."""
+    expected, info = env.reset(options={"reset_mask": np.array(ended)})
+    answer = post(client, url, "reset", reset_mask=ended)
+    space = env.single_observation_space
+    assert apart(space, answer["observation"]) == members(env, expected)
+    assert answer["info"] == plain(info)
+
+
+def action_file(env, batch, **metadata):
+    parts = spaces.encode_batch_tensors(env.single_action_space, "action", batch)
+    if parts.texts:
+        metadata["texts"] = parts.texts
+    metadata = {name: json.dumps(value) for name, value in metadata.items()}
+    return tensors.write(parts.tensors, metadata)
+
+
+def check_that_no_lane_moved(client, url, kind, seed, mode="NextStep"):
+    """Hold the next step equal to the first one after a reset."""
+    env = twin(kind, autoreset_mode=mode)
+    env.reset(seed=seed)
+    actions, batch = actions_of(env, 0)
+    encoded = [plain(spaces.encode(env.single_action_space, action)) for action in actions]
+    check_step(env, post(client, url, "step", action=encoded), env.step(batch))

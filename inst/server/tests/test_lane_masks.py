@@ -1,0 +1,188 @@
+import numpy as np
+import pytest
+from vector_play import (
+    ACCEPT,
+    MODES,
+    action_file,
+    actions_of,
+    apart,
+    check_that_no_lane_moved,
+    members,
+    post,
+    read_tensors,
+    refusal,
+    twin,
+)
+
+from gym_server import spaces
+from gym_server.plain import plain
+from gym_server.tensors import TENSORS
+
+
+def row(info, index):
+    """Return what a vector info says of one lane."""
+    return {
+        key: row(value, index) if isinstance(value, dict) else value[index]
+        for key, value in info.items()
+        if not key.startswith("_") and info[f"_{key}"][index]
+    }
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("kind", ["Box", "Dict", "Text", "Sequence"])
+def test_lanes_that_step_alone_go_on_as_if_they_were_alone(client, lanes, kind, mode):
+    url = lanes(kind, num_envs=4, autoreset_mode=mode, vectorization_mode="sync")
+    alone = [twin(kind, num_envs=1, autoreset_mode=mode) for _ in range(4)]
+    post(client, url, "reset", seed=20)
+    for lane, env in enumerate(alone):
+        env.reset(seed=20 + lane)
+    space = alone[0].single_observation_space
+    rng = np.random.default_rng(1)
+    ended = np.zeros(4, dtype=bool)
+    steps = 0
+    for step in range(25):
+        mask = rng.random(4) < 0.6
+        mask &= ~ended
+        if not mask.any():
+            ended[:] = False
+            post(client, url, "reset", seed=step)
+            for lane, env in enumerate(alone):
+                env.reset(seed=step + lane)
+            continue
+        stepping = np.flatnonzero(mask)
+        expected, encoded = [], []
+        for lane in stepping:
+            actions, batch = actions_of(alone[lane], step)
+            encoded += [spaces.encode(alone[lane].single_action_space, one) for one in actions]
+            expected.append(alone[lane].step(batch))
+        answer = post(client, url, "step", action=plain(encoded), step_mask=mask.tolist())
+        steps += len(stepping)
+        observations = [members(env, one[0])[0] for env, one in zip(alone, expected, strict=False)]
+        assert apart(space, answer["observation"]) == observations
+        for name, index in (("reward", 1), ("terminated", 2), ("truncated", 3)):
+            assert answer[name] == [one[index].item() for one in expected]
+        final_lanes = []
+        for index, one in enumerate(expected):
+            info = plain(one[4])
+            final_lanes += [index] if info.pop("final_obs", None) is not None else []
+            info.pop("_final_obs", None)
+            assert row(answer["info"], index) == row(info, 0)
+        assert answer.get("final_lanes", []) == final_lanes
+        if mode == "Disabled":
+            ended[stepping] = answer["done"]
+    assert client.get(url).json["steps"] == steps
+
+
+def test_a_reset_by_mask_shows_the_other_lanes_where_they_are(client, lanes):
+    url = lanes("Discrete", vectorization_mode="sync")
+    before = post(client, url, "reset", seed=2)["observation"]
+    stepped = post(client, url, "step", action=[0], step_mask=[False, True, False])["observation"]
+    assert stepped != before[1:2]
+    after = post(client, url, "reset", seed=9, reset_mask=[True, False, False])["observation"]
+    assert after[1:] == [*stepped, before[2]]
+
+
+def test_a_seed_for_some_lanes_leaves_the_action_space_alone(client, lanes):
+    one, other = (lanes(seed=3, vectorization_mode="sync") for _ in range(2))
+    post(client, one, "reset")
+    post(client, one, "reset", seed=5, reset_mask=[True, False, False])
+    samples = [client.get(f"{url}/action_space/sample").json for url in (one, other)]
+    assert samples[0] == samples[1]
+
+
+def test_stepping_every_lane_by_mask_is_stepping(client, lanes):
+    masked, plainly = lanes(vectorization_mode="sync"), lanes()
+    for url in (masked, plainly):
+        post(client, url, "reset", seed=2)
+    for step in range(8):
+        action = np.full((3, 2, 3), step).tolist()
+        assert post(client, masked, "step", action=action, step_mask=[True] * 3) == post(
+            client, plainly, "step", action=action
+        )
+
+
+def test_a_step_mask_travels_in_the_metadata_of_tensors(client, lanes):
+    url, env = lanes("Discrete", vectorization_mode="sync"), twin("Discrete")
+    post(client, url, "reset", seed=2)
+    file = read_tensors(
+        client.post(
+            f"{url}/step/",
+            data=action_file(env, np.array([0, 1]), step_mask=[True, False, True]),
+            headers={"Content-Type": TENSORS, **ACCEPT},
+        )
+    )
+    assert {name: tensor.shape for name, tensor in file.tensors.items()} == dict.fromkeys(
+        ("observation", "reward", "terminated", "truncated"), (2,)
+    )
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_a_reset_by_mask_leaves_the_other_lanes_alone(client, lanes, mode):
+    url, env = lanes(vectorization_mode=mode), twin()
+    post(client, url, "reset", seed=2)
+    env.reset(seed=2)
+    for seed in (None, 4, [None, 6, 8]):
+        mask = [False, True, True]
+        answer = post(client, url, "reset", seed=seed, reset_mask=mask)
+        expected, info = env.reset(seed=seed, options={"reset_mask": np.array(mask)})
+        assert answer["observation"] == expected.tolist()
+        assert answer["info"] == plain(info)
+
+
+@pytest.mark.parametrize(
+    ("mask", "wanted"),
+    [
+        ([True, False], "must hold one boolean for each of the 3 lanes, not 2"),
+        ([False] * 3, "must hold true for at least one lane"),
+        ([], "must be a list of true or false for each lane, not []"),
+        ([1, 0, 1], "must be a list of true or false for each lane"),
+        ([[True]] * 3, "must be a list of true or false for each lane"),
+        ("true", "must be a list of true or false for each lane"),
+    ],
+)
+@pytest.mark.parametrize("route", ["reset", "step"])
+def test_what_is_no_mask_for_these_lanes_is_refused(client, lanes, route, mask, wanted):
+    url = lanes("Discrete")
+    post(client, url, "reset", seed=1)
+    code, message = refusal(client, url, route, action=[0] * 3, **{f"{route}_mask": mask})
+    assert code == "invalid_parameter"
+    assert wanted in message
+    check_that_no_lane_moved(client, url, "Discrete", seed=1)
+
+
+def test_what_an_implementation_has_not_is_refused(client, create, lanes):
+    own, processes = create(num_envs=3), lanes("Discrete", vectorization_mode="async")
+    for url in (own, processes):
+        post(client, url, "reset", seed=1)
+    refused = client.post(f"{own}/reset/", json={"reset_mask": [True] * 3}).json
+    assert refused["code"] == "not_supported"
+    assert refused["hint"] == "create the environment with vectorization_mode 'sync'"
+    assert refusal(client, own, "reset", seed=[1, 2, 3])[0] == "not_supported"
+    for url in (own, processes):
+        code, _ = refusal(client, url, "step", action=[0] * 3, step_mask=[True] * 3)
+        assert code == "not_supported"
+    check_that_no_lane_moved(client, processes, "Discrete", seed=1)
+
+
+def test_a_mask_in_the_options_is_refused(client, lanes):
+    refused = refusal(client, lanes(), "reset", options={"reset_mask": [True] * 3})
+    assert refused[0] == "invalid_parameter"
+
+
+def test_a_mask_needs_lanes_that_were_reset(client, lanes):
+    assert refusal(client, lanes(), "reset", reset_mask=[True] * 3)[0] == "reset_needed"
+
+
+@pytest.mark.parametrize("name", ["reset_mask", "step_mask"])
+def test_a_mask_for_a_single_environment_is_refused(client, create, name):
+    url = create()
+    client.post(f"{url}/reset/")
+    route = name.partition("_")[0]
+    refused = client.post(f"{url}/{route}/", json={"action": 0, name: [True]}).json
+    assert (refused["code"], refused["hint"]) == ("not_supported", "create it with num_envs")
+
+
+def test_a_list_of_seeds_for_a_single_environment_is_refused(client, create):
+    code, message = refusal(client, create(), "reset", seed=[5])
+    assert code == "invalid_parameter"
+    assert message == "The parameter 'seed' must be an integer, 0 or greater, not [5]"
