@@ -101,7 +101,7 @@ write_value.gym_space_dict <- function(space, value) {
   if (!length(keys)) {
     return("{}")
   }
-  ordered <- unname(value)[match(keys, enc2utf8(names(value)))]
+  ordered <- unname(in_order(space, value))
   paste0(
     "{", paste0(json_string(keys), ":", mapply(write_value, space$spaces, ordered),
                 collapse = ","), "}"

@@ -121,12 +121,9 @@ to_tensors.gym_space_text <- function(space, value, name, call, path = "") {
 
 #' @exportS3Method
 to_tensors.gym_space_tuple <- function(space, value, name, call, path = "") {
-  if (!is.null(names(space$spaces))) {
-    value <- value[match(names(space$spaces), enc2utf8(names(value)))]
-  }
   parts <- Map(
-    to_tensors, unname(space$spaces), unname(value), part_names(space, name), list(call),
-    part_paths(space, path)
+    to_tensors, unname(space$spaces), unname(in_order(space, value)), part_names(space, name),
+    list(call), part_paths(space, path)
   )
   as.list(do.call(c, unname(parts)))
 }

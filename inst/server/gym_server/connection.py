@@ -60,24 +60,15 @@ class Connection:
         with contextlib.suppress(OSError), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._socket.settimeout(_IDLE_SECONDS)
+            in_part = False
             while data := self._socket.recv(_RECEIVE_BYTES):
                 self._answering = True
                 if not self._answer_all(self._reader.feed(data)):
                     break
                 self._answering = False
-                if self._reader.began and not self._wait_for_rest():
-                    break
-
-    def _wait_for_rest(self) -> bool:
-        self._socket.settimeout(_REST_SECONDS)
-        while self._reader.began:
-            data = self._socket.recv(_RECEIVE_BYTES)
-            self._answering = True
-            if not data or not self._answer_all(self._reader.feed(data)):
-                return False
-            self._answering = False
-        self._socket.settimeout(_IDLE_SECONDS)
-        return not self._stopping
+                if self._reader.began != in_part:
+                    in_part = self._reader.began
+                    self._socket.settimeout(_REST_SECONDS if in_part else _IDLE_SECONDS)
 
     def _answer_all(self, requests: list[_Request]) -> bool:
         return all(map(self._answer, requests))

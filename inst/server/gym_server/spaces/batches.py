@@ -20,11 +20,12 @@ from gym_server.spaces.stacking import stack, unstack
 from gym_server.spaces.tensor_parts import (
     Parts,
     part_name,
+    put_array,
     put_part_together,
     refuse_leftovers,
     take_array,
 )
-from gym_server.tensors import Tensor, has_tensor
+from gym_server.tensors import Tensor
 
 _ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
 
@@ -121,14 +122,8 @@ def _take_apart(space: Space, name: str, batch: object, parts: Parts) -> None:
     raise TypeError(f"no tensors for {type(space).__name__}")
 
 
-@_take_apart.register(Box)
-@_take_apart.register(MultiBinary)
-@_take_apart.register(MultiDiscrete)
-def _(space: Space, name: str, batch: object, parts: Parts) -> None:
-    array = np.asarray(batch)
-    if not has_tensor(array.dtype):
-        array = array.astype(space.dtype)
-    parts.tensors[name] = Tensor.of(array)
+for _kind in (Box, MultiBinary, MultiDiscrete):
+    _take_apart.register(_kind, put_array)
 
 
 @_take_apart.register

@@ -129,7 +129,8 @@ def _(space: Space) -> bool:
 @_take_apart.register(Box)
 @_take_apart.register(MultiBinary)
 @_take_apart.register(MultiDiscrete)
-def _(space: Space, name: str, value: object, parts: Parts) -> None:
+def put_array(space: Space, name: str, value: object, parts: Parts) -> None:
+    """Put an array of a space's numbers, of one member or of many, into some parts."""
     array = np.asarray(value)
     if not has_tensor(array.dtype):
         array = array.astype(space.dtype)
