@@ -30,6 +30,11 @@
 #' )
 #' ```
 #'
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", seed = 1)
+#' search
+#' plot(search)
+#'
 #' @importFrom R6 R6Class
 #' @importFrom rlang %||%
 #' @keywords internal

@@ -2,7 +2,8 @@
 #'
 #' From the next reset on the server writes one row for each finished episode
 #' into `episodes.csv`: its number, return, length in steps and seconds. Videos
-#' are recorded where `video_callable` asks for them.
+#' are recorded where `video_callable` asks for them. `env_monitor_close()`, or
+#' closing the environment, ends the monitor and finishes its files.
 #'
 #' @inheritParams env_reset
 #' @param directory Where the server writes, a string: a path below the server's
@@ -21,8 +22,9 @@
 #'   package moviepy).
 #' @return Nothing, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance, a directory
-#'   that is refused, an active monitor, or videos that cannot be made, with the
-#'   reason; `gym_error_argument`; `gym_error_connection`.
+#'   that is refused, a monitor that is active already (or, to be closed, none), or
+#'   videos that cannot be made, with the reason; `gym_error_argument`;
+#'   `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -50,16 +52,7 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
   invisible()
 }
 
-#' Stop recording an environment's episodes
-#'
-#' Ends the monitor and finishes its files. Closing the environment does the
-#' same.
-#'
-#' @inheritParams env_reset
-#' @return Nothing, invisibly.
-#' @section Errors: `gym_error_http_400` for an unknown instance or one without
-#'   a monitor, `gym_error_connection`.
-#' @seealso [env_monitor_start()], with an example.
+#' @rdname env_monitor_start
 #' @export
 env_monitor_close <- function(x, instance_id) {
   check_client(x)
