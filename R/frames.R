@@ -73,7 +73,7 @@ frame_from_png <- function(file) {
   check_suggested("png", "unpack a frame")
   values <- png::readPNG(file)
   shape <- c(dim(values), 1L)[1:3]
-  structure(array(as.integer(round(255 * values)), shape), class = "gym_frame")
+  new_frame(array(as.integer(round(255 * values)), shape))
 }
 
 # Width and height stand in the header of the file.
