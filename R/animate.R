@@ -121,16 +121,16 @@ new_animation <- function(frames, file, fps, width, every) {
   # Whoever interrupts it keeps the file that was there before.
   made <- tempfile(fileext = ".gif")
   write_gif(unclass(frames)[plan$steps + 1L], made, plan$delays, width)
+  size <- gif_size(made)
   if (!is.null(file)) {
     copy_animation(made, file)
   }
-  own <- png_size(unclass(frames)[[1L]])
   structure(
     list(
       file = file %||% made,
       steps = plan$steps,
       delays = plan$delays,
-      size = as.integer(if (is.null(width)) own else gif_size(made)),
+      size = size,
       stills = pick_stills(frames, 8L)
     ),
     class = "gym_animation"

@@ -87,7 +87,7 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
 #'   one for each episode; `reset(seeds)`, which gives the observations of all lanes;
 #'   `step(action, playing)`, which takes and gives one row for each of the lanes
 #'   `playing`; `num_envs`, with how many lanes an episode has to be begun again, `NULL`
-#'   where its seed is enough; `draw()`, which gives the current frame as the bytes of a
+#'   where its seed is enough; `frame()`, which gives the current frame as the bytes of a
 #'   PNG file, `NULL` where none are wanted.
 #' @noRd
 lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
@@ -104,7 +104,7 @@ lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FAL
   lanes$call <- call
   if (frames) {
     check_draws(env, call)
-    lanes$draw <- function() png_frame(env$client, env$instance_id, call)
+    lanes$frame <- function() png_frame(env$client, env$instance_id, call)
   }
   lanes
 }

@@ -79,8 +79,8 @@ flags <- c("terminated", "truncated")
 
 # Lanes that draw are single, and their blocks have one episode each.
 keep_frame <- function(block, lanes) {
-  if (!is.null(lanes$draw)) {
-    block$frames[[length(block$frames) + 1L]] <- lanes$draw()
+  if (!is.null(lanes$frame)) {
+    block$frames[[length(block$frames) + 1L]] <- lanes$frame()
   }
 }
 

@@ -158,7 +158,7 @@ new_rollout <- function(record, policy, lanes, seed, keep_steps) {
     list(
       episodes = episodes,
       steps = if (keep_steps) steps_table(record, episodes, lanes),
-      frames = if (!is.null(lanes$draw)) frames_of(record, lanes),
+      frames = if (!is.null(lanes$frame)) frames_of(record, lanes),
       policy = policy,
       env_id = environment_label(lanes),
       num_envs = lanes$num_envs,
