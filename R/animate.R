@@ -2,8 +2,9 @@
 #'
 #' Writes an episode as an animated GIF file: of a rollout one that was played with
 #' `frames = TRUE`, of a search or a policy a fresh one, which is played for it. Printed in an
-#' interactive session it opens in the viewer (RStudio's, else the browser), and in a
-#' document of knitr it is part of the page, in one made by LaTeX its [filmstrip][plot.gym_rollout()].
+#' interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
+#' names another function that opens it, or `FALSE`), and a document of knitr has it on the page,
+#' one made by LaTeX its [filmstrip][plot.gym_rollout()].
 #'
 #' The episode is shown at the environment's own pace. A GIF counts in hundredths of a second, and
 #' browsers take a delay of less than two for a slow one of ten: so there are at most 50
@@ -175,10 +176,20 @@ gif_size <- function(file) {
 #' @export
 print.gym_animation <- function(x, ...) {
   cat(format(x), "\n", sep = "")
-  if (rlang::is_interactive()) {
-    show_file(x$file)
+  viewer <- getOption("gym.viewer") %||% if (rlang::is_interactive()) {
+    getOption("viewer") %||% utils::browseURL
+  }
+  if (is.function(viewer) && file.exists(x$file)) {
+    viewer(among_temporary_files(x$file))
   }
   invisible(x)
+}
+
+# RStudio's viewer shows no others.
+among_temporary_files <- function(file) {
+  copy <- tempfile(fileext = ".gif")
+  file.copy(file, copy)
+  copy
 }
 
 #' @export
@@ -191,16 +202,6 @@ format.gym_animation <- function(x, ...) {
     paste(x$size, collapse = " x "), " pixels, ", format(sum(x$delays) / 100), " s",
     kilobytes, ">\n  ", x$file
   )
-}
-
-# RStudio's viewer shows only files among the session's temporary ones.
-show_file <- function(file) {
-  seen <- tempfile(fileext = paste0(".", tools::file_ext(file)))
-  file.copy(file, seen)
-  viewer <- getOption("gym.viewer") %||% getOption("viewer") %||% utils::browseURL
-  if (is.function(viewer)) {
-    viewer(seen)
-  }
 }
 
 # knitr's name for the file, in the folder of the document's figures. LaTeX knows no GIF.

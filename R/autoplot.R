@@ -34,7 +34,7 @@ autoplot_returns <- function(x) {
   plot <- ggplot2::ggplot(data.frame(value = data$returns), ggplot2::aes(x = .data$value))
   if (!is.null(data$density)) {
     plot <- plot + ggplot2::geom_area(
-      ggplot2::aes(x = .data$x, y = .data$y), data = data$density,
+      ggplot2::aes(x = .data$x, y = .data$y), data = data$density, stat = "identity",
       fill = okabe_ito$sky_blue, alpha = 0.4, colour = okabe_ito$blue
     )
   }

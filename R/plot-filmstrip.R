@@ -30,7 +30,8 @@ draw_filmstrip <- function(stills, main = NULL) {
   for (i in seq_along(pictures)) {
     x <- left + ((i - 1) %% grid$columns) * grid$cell[[1L]]
     y <- top - ((i - 1) %/% grid$columns) * grid$cell[[2L]] - grid$label
-    raster <- as.raster(new_frame(shrink(pictures[[i]], device_shrinkage(pictures[[i]], grid$width))))
+    picture <- shrink(pictures[[i]], device_shrinkage(pictures[[i]], grid$width))
+    raster <- as.raster(new_frame(picture))
     graphics::rasterImage(raster, x, y - grid$height, x + grid$width, y)
     graphics::rect(x, y - grid$height, x + grid$width, y, border = "grey70", lwd = 0.8)
     graphics::text(x, y + 0.45 * grid$label, paste("step", stills$steps[[i]]), adj = c(0, 0.5),

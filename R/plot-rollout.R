@@ -27,7 +27,8 @@
 #' @param xlab,ylab The axes' labels, for `"returns"`.
 #' @param episode Which episode to show, a whole number; the default is the first.
 #' @param variables The parts of the observation to show in a trajectory: names of columns of the
-#'   table of steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, takes the first 8.
+#'   table of steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, takes the
+#'   first 8.
 #' @param n How many frames a filmstrip has at most, a whole number; the default is 8.
 #' @param ... For `"returns"` further arguments of [plot()][graphics::plot.default()], such as
 #'   `xlim`; the other types take none.

@@ -82,11 +82,11 @@ draw_panel <- function(data, i, at_bottom, title_cex) {
   values <- data$values[data$values$panel == panel$panel, ]
   limits <- data$limits[data$limits$panel == panel$panel, ]
   choice <- panel$kind == "choice"
-  at <- if (nrow(limits)) near_limits(limits$at, values$value)
-  seen <- values$value[is.finite(values$value)]
-  ylim <- if (choice) range(data$choices$value) + c(-0.5, 0.5) else range(seen, at)
+  at <- near_limits(limits$at, values$value)
+  seen <- c(values$value[is.finite(values$value)], at)
+  ylim <- if (choice) range(data$choices$value) + c(-0.5, 0.5) else if (length(seen)) range(seen)
   graphics::plot.new()
-  graphics::plot.window(c(0, data$length), if (all(is.finite(ylim))) ylim else 0:1)
+  graphics::plot.window(c(0, data$length), ylim %||% 0:1)
   graphics::abline(h = at, col = limit_colours[limits$kind[limits$at %in% at]], lty = "dashed",
                    lwd = 1.5)
   if (choice) {

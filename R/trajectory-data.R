@@ -155,6 +155,9 @@ trajectory_limits <- function(env_id, observed, labels) {
 
 # A limit far from what happened would press it flat: of the room, a tenth must remain.
 near_limits <- function(at, value) {
+  if (!any(is.finite(value))) {
+    return(numeric())
+  }
   seen <- range(value, finite = TRUE)
   at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
 }

@@ -108,6 +108,10 @@ test_that("it prints where it is, and opens where somebody looks", {
   expect_null(seen)
   rlang::with_interactive(expect_output(print(animation), animation$file, fixed = TRUE))
   expect_identical(tools::md5sum(seen)[[1]], tools::md5sum(animation$file)[[1]])
+  seen <- NULL
+  withr::local_options(gym.viewer = FALSE)
+  rlang::with_interactive(expect_output(print(animation), animation$file, fixed = TRUE))
+  expect_null(seen)
   unlink(animation$file)
   expect_output(print(animation), animation$file, fixed = TRUE)
 })

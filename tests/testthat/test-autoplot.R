@@ -31,7 +31,7 @@ test_that("a trajectory has the values of the steps, in a facet for each part", 
   tiles <- ggplot2::layer_data(plot, 5)
   expect_identical(as.integer(tiles$y), played$steps$action)
   expect_identical(as.character(unique(tiles$PANEL)), "5")
-  expect_identical(ggplot2::layer_data(plot, 2)$xintercept[[1]], 10L)
+  expect_identical(ggplot2::layer_data(plot, 2)$xintercept[[1]], 10)
   expect_identical(facet_labels(trajectory_plot_data(played))[["action"]],
                    "action: 0 push left, 1 push right")
 })

@@ -42,8 +42,8 @@ test_that("CartPole plots with all of its labels", {
 })
 
 test_that("panels have their places, the last one a row of its own where one is free", {
-  expect_identical(arrange_panels(1), matrix(1L))
-  expect_identical(arrange_panels(2), matrix(1:2))
-  expect_identical(arrange_panels(4), matrix(c(1L, 3L, 2L, 4L), 2))
-  expect_identical(arrange_panels(5), matrix(c(1L, 3L, 5L, 2L, 4L, 5L), 3))
+  expect_equal(arrange_panels(1), matrix(1L))
+  expect_equal(arrange_panels(2), matrix(1:2))
+  expect_equal(arrange_panels(4), matrix(c(1L, 3L, 2L, 4L), 2))
+  expect_equal(arrange_panels(5), matrix(c(1, 3, 5, 2, 4, 5), 3))
 })
