@@ -55,8 +55,12 @@ autoplot_trajectory <- function(x, episode, data) {
   near <- near_rows(data)
   near$panel <- panel(near)
   ggplot2::ggplot() +
-    ggplot2::geom_hline(ggplot2::aes(yintercept = .data$at), data = near, linetype = "dashed",
-                        colour = unname(limit_colours[near$kind])) +
+    lapply(names(limit_colours), function(kind) {
+      ggplot2::geom_hline(
+        ggplot2::aes(yintercept = .data$at), data = near[near$kind == kind, ],
+        linetype = "dashed", colour = limit_colours[[kind]]
+      )
+    }) +
     ggplot2::geom_vline(xintercept = data$length, colour = ending_colours[[data$ending]]) +
     trajectory_layers(values, data) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 2L,

@@ -46,7 +46,7 @@
 #' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, steps = TRUE, frames = TRUE)
 #' plot(played, type = "trajectory")
-#' plot(played, type = "filmstrip")
+#' if (requireNamespace("png", quietly = TRUE)) plot(played, type = "filmstrip")
 plot.gym_rollout <- function(x, type = c("returns", "trajectory", "filmstrip"), main = NULL,
                              xlab = NULL, ylab = NULL, episode = 1, variables = NULL, n = 8,
                              ...) {

@@ -23,15 +23,15 @@ test_that("a trajectory has the values of the steps, in a facet for each part", 
   played <- short_rollout()
   plot <- ggplot2::autoplot(played, type = "trajectory")
   expect_drawn(plot)
-  lines <- ggplot2::layer_data(plot, 3)
+  lines <- ggplot2::layer_data(plot, 4)
   for (i in 1:4) {
     expect_identical(lines$y[lines$PANEL == i], played$steps[[2 + i]])
   }
   expect_identical(unique(lines$x), as.numeric(0:9))
-  tiles <- ggplot2::layer_data(plot, 5)
+  tiles <- ggplot2::layer_data(plot, 6)
   expect_identical(as.integer(tiles$y), played$steps$action)
   expect_identical(as.character(unique(tiles$PANEL)), "5")
-  expect_identical(ggplot2::layer_data(plot, 2)$xintercept[[1]], 10)
+  expect_identical(ggplot2::layer_data(plot, 3)$xintercept[[1]], 10)
   expect_identical(facet_labels(trajectory_plot_data(played))[["action"]],
                    "action: 0 push left, 1 push right")
 })
@@ -52,7 +52,7 @@ test_that("other kinds of trajectories are drawn, too", {
   plot <- ggplot2::autoplot(rollout(numbers, policy_random(), seed = 1, steps = TRUE),
                             type = "trajectory")
   expect_drawn(plot)
-  colours <- unique(ggplot2::layer_data(plot, 6)$colour)
+  colours <- unique(ggplot2::layer_data(plot, 7)$colour)
   expect_identical(colours, line_colours[1:2])
   expect_drawn(ggplot2::autoplot(rollout(fake_environment(), policy_random(), steps = TRUE),
                                  type = "trajectory"))
