@@ -36,7 +36,7 @@
 #' plot(search)
 #'
 #' @importFrom R6 R6Class
-#' @importFrom rlang %||%
+#' @importFrom rlang %||% .data
 #' @keywords internal
 "_PACKAGE"
 
