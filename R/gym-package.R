@@ -31,7 +31,7 @@
 #' ```
 #'
 #' @importFrom R6 R6Class
-#' @importFrom rlang %||%
+#' @importFrom rlang %||% .data
 #' @keywords internal
 "_PACKAGE"
 

@@ -1,0 +1,44 @@
+# What the actions of an environment mean, from the sections "Action Space" in Gymnasium's
+# documentation of each environment (https://gymnasium.farama.org/environments/).
+
+action_meanings <- list(
+  Acrobot = c("torque -1", "no torque", "torque +1"),
+  Blackjack = c("stick", "hit"),
+  CartPole = c("push left", "push right"),
+  CliffWalking = c("up", "right", "down", "left"),
+  CliffWalkingSlippery = c("up", "right", "down", "left"),
+  FrozenLake = c("left", "down", "right", "up"),
+  FrozenLake8x8 = c("left", "down", "right", "up"),
+  LunarLander = c("no engine", "left engine", "main engine", "right engine"),
+  LunarLanderContinuous = c("main engine", "side engines"),
+  MountainCar = c("push left", "no push", "push right"),
+  MountainCarContinuous = "force",
+  Pendulum = "torque",
+  Taxi = c("south", "north", "east", "west", "pick up", "drop off")
+)
+
+# NULL where the environment is unknown or a wrapper has changed what there is to do.
+action_meaning <- function(env_id, n) {
+  meaning <- action_meanings[[environment_family(env_id), exact = TRUE]]
+  if (length(meaning) == n) meaning
+}
+
+# CartPole of CartPole-v1.
+environment_family <- function(env_id) sub("-v[0-9]+$", "", env_id %||% "")
+
+#' Name the actions of an environment
+#' @param n How many actions there are; of a Box, how many numbers an action has.
+#' @param start The first of them.
+#' @return Strings such as `"0: push left"`, or the numbers alone where nothing is known.
+#' @noRd
+action_names <- function(env_id, n, start = 0L) {
+  number <- as.character(start + seq_len(n) - 1L)
+  meaning <- action_meaning(env_id, n)
+  if (is.null(meaning)) number else paste0(number, ": ", meaning)
+}
+
+#' Name the numbers of an action that is a Box
+#' @noRd
+action_parts <- function(env_id, n) {
+  action_meaning(env_id, n) %||% if (n == 1L) "action" else paste0("action_", seq_len(n))
+}

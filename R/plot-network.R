@@ -1,0 +1,271 @@
+#' Plot a network
+#'
+#' Draws the diagram of a network: its layers from left to right, neurons as circles,
+#' weights as lines that are the wider the further from 0, blue where they are positive,
+#' vermillion and dashed where they are negative. Few weights are written on the
+#' lines as numbers; of a layer with many neurons some are left out, which the dots say.
+#'
+#' Inputs are named as the observation's parts and outputs as what they decide, where the
+#' policy knows its environment: because it was played there, or because `env` says it.
+#'
+#' With `x` and `y` the names of two parts of an observation it is a [decision_map()] that
+#' is drawn instead: `plot(policy, env, x = "pole_angle", y = "pole_angular_velocity")`.
+#'
+#' `autoplot()` draws the same with ggplot2, where that is installed.
+#'
+#' @param x,object A network, as [policy_network()] makes it. In a call that names two
+#'   observations as `x` and `y` the network comes first and has no name.
+#' @param env The environment: an id, such as `"CartPole-v1"` or what [gym_wrap()] returns, or
+#'   an environment made by [gym_make()]. `NULL`, the default, is that in which the policy
+#'   was played.
+#' @param neurons How many neurons of a layer to draw at most, a whole number of at least 3;
+#'   the default is 12.
+#' @param digits With how many digits to write weights on their lines. `NULL`, the
+#'   default, is 2 for up to 24 lines and none for more; 0 writes none.
+#' @param main The title; `NULL`, the default, tells the sizes.
+#' @param client The client of the server that is asked about an environment named by its id;
+#'   the default is the session's own, [gym_client()].
+#' @param ... For a decision map: the arguments of [decision_map()], `x` and `y` first, and
+#'   of its [plot()][plot.gym_decision_map()].
+#' @return `x`, invisibly, for a decision map what [decision_map()] returns; `autoplot()` a
+#'   ggplot.
+#' @section Errors: `gym_error_argument` when the network does not fit the environment, and
+#'   for a policy that has no weights to draw, such as [policy_random()].
+#' @export
+#' @examples
+#' set.seed(1)
+#' plot(policy_network(c(4, 2, 1)))
+#'
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", seed = 1)
+#' plot(search$policy)
+#' plot(search$policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity")
+plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = NULL,
+                                    main = NULL, client = gym_client()) {
+  if (...length()) {
+    return(plot_decision(x, env, ..., main = main, client = client))
+  }
+  policy <- bind_named(x, env, client)
+  data <- network_plot_data(policy, neurons, digits)
+  old <- graphics::par(mar = c(2.5, 1, 4, 1))
+  on.exit(graphics::par(old))
+  open_diagram(data)
+  draw_weights_lines(data$weights)
+  draw_neurons(data)
+  graphics::title(main = main %||% network_title(policy), line = 2.5)
+  legend_above(
+    labels = c("positive weight", "negative (wider: further from 0)"),
+    col = weight_colours(), pch = NA, lty = weight_types
+  )
+  invisible(x)
+}
+
+network_title <- function(x) {
+  paste0(if (!is.null(x$env_id)) paste0(x$env_id, ": "), "network ", paste(x$sizes, collapse = "-"))
+}
+
+#' @export
+plot.gym_policy <- function(x, ...) {
+  gym_abort(
+    c(paste0("Only a network can be drawn, not a policy that is ", format(x), "."),
+      i = "`policy_network()` makes one."),
+    class = "gym_error_argument", argument = "x", value = x
+  )
+}
+
+weight_colours <- function() c(positive = okabe_ito$blue, negative = okabe_ito$vermillion)
+weight_types <- c(positive = "solid", negative = "31")
+
+# Data ----------------------------------------------------------------------------
+
+#' Compute what a diagram of a network shows
+#'
+#' The layers stand at x = 0, 1, ..., the neurons between y = 0 and 1.
+#' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`,
+#'   `y`, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
+#'   left out), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
+#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`), `layers` (data frame `x`,
+#'   `label`).
+#' @noRd
+network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
+  check_count(most, min = 3, arg = "neurons", call = call)
+  check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
+  layers <- length(policy$sizes)
+  each <- lapply(seq_len(layers), function(layer) place_neurons(policy$sizes[[layer]], layer, most))
+  neurons <- do.call(rbind, lapply(each, function(placed) placed$neurons))
+  neurons$label <- ""
+  first <- neurons$layer == 1L
+  last <- neurons$layer == layers
+  neurons$label[first] <- input_labels(policy)[neurons$neuron[first]]
+  neurons$label[last] <- output_labels(policy)[neurons$neuron[last]]
+  list(
+    neurons = neurons,
+    dots = do.call(rbind, lapply(each, function(placed) placed$dots)),
+    weights = place_weights(policy, neurons, digits),
+    layers = data.frame(x = seq_len(layers) - 1, label = c("observation", policy$activation))
+  )
+}
+
+# Of too many all but the last places are for the first, one is left for the dots.
+place_neurons <- function(size, layer, most) {
+  shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
+  y <- 1 - (seq_along(shown) - 0.5) / length(shown)
+  gap <- is.na(shown)
+  list(
+    neurons = data.frame(layer = layer, neuron = shown[!gap], x = layer - 1, y = y[!gap]),
+    dots = data.frame(x = rep(layer - 1, sum(gap)), y = y[gap])
+  )
+}
+
+place_weights <- function(policy, neurons, digits) {
+  each <- lapply(seq_along(policy$weights), function(layer) {
+    from <- neurons[neurons$layer == layer, ]
+    to <- neurons[neurons$layer == layer + 1L, ]
+    pairs <- expand.grid(to = seq_len(nrow(to)), from = seq_len(nrow(from)))
+    number <- cbind(to$neuron[pairs$to], from$neuron[pairs$from])
+    data.frame(
+      layer = layer, from = number[, 2L], to = number[, 1L],
+      weight = policy$weights[[layer]][number],
+      x = from$x[pairs$from], y = from$y[pairs$from], xend = to$x[pairs$to], yend = to$y[pairs$to]
+    )
+  })
+  weights <- do.call(rbind, each)
+  largest <- max(abs(unlist(policy$weights)))
+  weights$sign <- ifelse(weights$weight < 0, "negative", "positive")
+  weights$width <- if (largest > 0) abs(weights$weight) / largest else 0
+  digits <- digits %||% if (nrow(weights) <= 24L) 2 else 0
+  weights$label <- if (digits > 0) sprintf("%.*f", as.integer(digits), weights$weight) else ""
+  weights
+}
+
+input_labels <- function(policy) {
+  space <- policy$observation_space
+  size <- policy$sizes[[1L]]
+  if (inherits(space, "gym_space_discrete")) {
+    return(paste(observation_names(policy$env_id, "observed"), space$start + seq_len(size) - 1L))
+  }
+  observation_names(policy$env_id, if (size == 1L) "obs" else paste0("obs_", seq_len(size)))
+}
+
+output_labels <- function(policy) {
+  space <- policy$action_space
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  if (inherits(space, "gym_space_box")) {
+    bounds <- paste0(number_text(space$low), " to ", number_text(space$high))
+    return(paste0(action_parts(policy$env_id, outputs), "\n", bounds))
+  }
+  actions <- action_names(policy$env_id, space$n %||% max(outputs, 2L), space$start %||% 0L)
+  if (outputs == 1L && length(actions) == 2L) {
+    half <- if (output_activation(policy) == "tanh") "0" else "0.5"
+    return(paste0("above ", half, "\n", actions[[2L]], "\notherwise\n", actions[[1L]]))
+  }
+  actions
+}
+
+# Drawing -------------------------------------------------------------------------
+
+# As wide as the labels beside the first and the last layer leave room.
+open_diagram <- function(data) {
+  graphics::plot.new()
+  across <- graphics::par("pin")[[1L]]
+  layers <- max(data$layers$x)
+  label <- function(layer) {
+    labels <- unlist(strsplit(data$neurons$label[data$neurons$x == layer], "\n"))
+    max(graphics::strwidth(labels, "inches", cex = diagram_cex(data)), 0) +
+      1.2 * graphics::par("csi")
+  }
+  left <- label(0)
+  right <- label(layers)
+  inch <- layers / max(across - left - right, 0.2 * across)
+  graphics::plot.window(c(-left * inch, layers + right * inch), c(-0.02, 1.02), xaxs = "i",
+                        yaxs = "i")
+}
+
+diagram_cex <- function(data) if (nrow(data$neurons) > 40L) 0.7 else 0.9
+
+draw_weights_lines <- function(weights) {
+  drawn <- weights[order(weights$width), ]
+  drawn <- drawn[drawn$width > 0, ]
+  widest <- if (nrow(drawn) > 60L) 3 else 6
+  graphics::segments(
+    drawn$x, drawn$y, drawn$xend, drawn$yend, lwd = widest * drawn$width,
+    lty = weight_types[drawn$sign], lend = "butt", col = weight_colours()[drawn$sign]
+  )
+  labelled <- weights[nzchar(weights$label), ]
+  if (nrow(labelled)) {
+    boxed_text(
+      labelled$x + weight_label_place * (labelled$xend - labelled$x),
+      labelled$y + weight_label_place * (labelled$yend - labelled$y), labelled$label
+    )
+  }
+}
+
+# Nearer to where the lines come from: in the middle they cross.
+weight_label_place <- 0.3
+
+boxed_text <- function(x, y, labels, cex = 0.75) {
+  half_width <- 0.55 * graphics::strwidth(labels, cex = cex)
+  half_height <- 0.75 * graphics::strheight(labels, cex = cex)
+  graphics::rect(x - half_width, y - half_height, x + half_width, y + half_height,
+                 col = "white", border = NA)
+  graphics::text(x, y, labels, cex = cex)
+}
+
+draw_neurons <- function(data) {
+  neurons <- data$neurons
+  cex <- diagram_cex(data)
+  size <- if (max(table(neurons$x)) > 8L) 2 else 3
+  graphics::points(neurons$x, neurons$y, pch = 21L, cex = size, bg = "white", lwd = 1.5)
+  graphics::points(rep(data$dots$x, 3L), rep(data$dots$y, 3L) + rep(c(-1, 0, 1), each = nrow(data$dots)) *
+                     0.5 * graphics::strheight("M"), pch = 16L, cex = 0.5)
+  away <- 0.7 * graphics::strwidth("MM")
+  last <- max(neurons$x)
+  first <- neurons$x == 0
+  graphics::text(-away, neurons$y[first], neurons$label[first], adj = c(1, 0.5), cex = cex, xpd = NA)
+  out <- neurons$x == last
+  graphics::text(last + away, neurons$y[out], neurons$label[out], adj = c(0, 0.5), cex = cex,
+                 xpd = NA)
+  graphics::mtext(data$layers$label, 1L, line = 0.5, at = data$layers$x, cex = cex * graphics::par("cex"),
+                  font = 3L)
+}
+
+# With ggplot2 -----------------------------------------------------------------------
+
+#' @rdname plot.gym_policy_network
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
+                                        client = gym_client()) {
+  if (...length()) {
+    return(autoplot_decision(object, env, ..., client = client))
+  }
+  policy <- bind_named(object, env, client)
+  data <- network_plot_data(policy, neurons, digits)
+  weights <- data$weights[order(data$weights$width), ]
+  widest <- if (nrow(weights) > 60L) 1.5 else 3
+  labelled <- weights[nzchar(weights$label), ]
+  labelled$x <- labelled$x + weight_label_place * (labelled$xend - labelled$x)
+  labelled$y <- labelled$y + weight_label_place * (labelled$yend - labelled$y)
+  neurons <- data$neurons
+  neurons$side <- ifelse(neurons$x == 0, 1, 0)
+  neurons$beside <- neurons$x + ifelse(neurons$x == 0, -0.08, 0.08)
+  ggplot2::ggplot(neurons, ggplot2::aes(.data$x, .data$y)) +
+    ggplot2::geom_segment(
+      ggplot2::aes(xend = .data$xend, yend = .data$yend, colour = .data$sign,
+                   linetype = .data$sign),
+      weights[weights$width > 0, ], linewidth = widest * weights$width[weights$width > 0]
+    ) +
+    ggplot2::geom_label(ggplot2::aes(label = .data$label), labelled, size = 3, label.size = 0) +
+    ggplot2::geom_point(shape = 21, size = if (max(table(neurons$x)) > 8L) 5 else 9,
+                        fill = "white") +
+    ggplot2::geom_text(ggplot2::aes(label = "..."), data$dots, angle = 90) +
+    ggplot2::geom_text(ggplot2::aes(.data$beside, label = .data$label, hjust = .data$side),
+                       size = 3.2) +
+    ggplot2::scale_colour_manual(values = weight_colours()) +
+    ggplot2::scale_linetype_manual(values = weight_types) +
+    ggplot2::scale_x_continuous(breaks = data$layers$x, labels = data$layers$label,
+                                expand = ggplot2::expansion(mult = 0.45)) +
+    ggplot2::labs(title = network_title(policy), colour = "weight", linetype = "weight") +
+    ggplot2::theme_void() +
+    ggplot2::theme(axis.text.x = ggplot2::element_text(face = "italic"),
+                   legend.position = "top")
+}
