@@ -265,4 +265,5 @@ held_text <- function(at) {
   paste0("Held: ", paste(names(few), "=", number_text_each(few), collapse = ", "), more)
 }
 
-number_text_each <- function(x) vapply(x, number_text, "")
+# One by one, as together they would get as many decimals as the longest needs.
+number_text_each <- function(x) vapply(unname(x), number_text, "")

@@ -28,8 +28,12 @@ plot.gym_decision_map <- function(x, main = NULL, xlab = x$x, ylab = x$y, ...) {
   draw_regions(data$regions)
   draw_path(data$path)
   graphics::box(bty = "l")
-  graphics::title(main = main %||% decision_title(x), line = 2.5)
-  colour_key_above(data$key)
+  title_above(main %||% decision_title(x))
+  if (is.null(data$key$labels)) {
+    colour_key_above(data$key)
+  } else {
+    legend_above(data$key$labels, col = data$key$palette, pch = 15L, lty = NA)
+  }
   invisible(x)
 }
 
@@ -84,13 +88,15 @@ decision_plot_data <- function(x) {
   data
 }
 
+# As far to either side of one half as outputs go: small weights make small differences.
 output_colours <- function(x, data) {
   palette <- diverging_colours()
-  region <- 1 + (data$z > 0.5)
+  reach <- max(abs(data$z - 0.5), 0.01)
+  zlim <- 0.5 + c(-reach, reach)
   list(
-    zlim = c(0, 1), palette = palette, border = 0.5,
-    regions = region_labels(data, region, x$actions),
-    key = list(palette = palette, ends = c("0", "1"), label = "output")
+    zlim = zlim, palette = palette, border = 0.5,
+    regions = region_labels(data, 1 + (data$z > 0.5), x$actions),
+    key = list(palette = palette, ends = sprintf("%.2f", zlim), label = "output")
   )
 }
 
@@ -107,26 +113,32 @@ value_colours <- function(x, data) {
 
 choice_colours <- function(x, data) {
   n <- length(x$actions)
-  region <- match(data$z, sort(unique(as.vector(data$z))))
-  taken <- sort(unique(as.vector(data$z)))
-  first <- suppressWarnings(as.numeric(sub(":.*", "", x$actions[[1L]])))
-  names <- x$actions[taken - first + 1]
-  region <- matrix(region, nrow(data$z))
+  start <- as.integer(sub(":.*", "", x$actions[[1L]]))
+  palette <- choice_palette(n)
+  taken <- sort(unique(as.vector(data$z))) - start + 1
   list(
-    zlim = first + c(-0.5, n - 0.5), palette = choice_palette(n), border = NULL,
-    regions = region_labels(data, region, names), key = NULL
+    zlim = start + c(-0.5, n - 0.5), palette = palette, border = NULL,
+    regions = region_labels(data, data$z - start + 1, x$actions),
+    key = list(palette = palette[taken], labels = x$actions[taken])
   )
 }
 
-# From one action to the other: light to dark as well, for print without colours.
+# Orange and blue, light enough for black text on them; they differ in lightness, too.
 diverging_colours <- function() {
-  grDevices::colorRampPalette(c("#FDE9C4", "#F2C879", "#F7F7F7", "#7FB6DA", okabe_ito$blue))(101L)
+  grDevices::colorRampPalette(c("#EFB549", "#FAF7F0", "#4797C8"))(101L)
 }
 
+# Lighter than the colours of lines, for names and paths to be read on them.
 choice_palette <- function(n) {
-  colours <- c("#FBE3B4", okabe_ito$sky_blue, okabe_ito$green, okabe_ito$purple, okabe_ito$yellow,
-               okabe_ito$vermillion, okabe_ito$blue, okabe_ito$orange)
-  if (n <= length(colours)) colours[seq_len(n)] else grDevices::hcl.colors(n, "viridis")
+  strong <- c(okabe_ito$orange, okabe_ito$sky_blue, okabe_ito$green, okabe_ito$purple,
+              okabe_ito$yellow, okabe_ito$vermillion, okabe_ito$blue)
+  if (n > length(strong)) {
+    return(grDevices::hcl.colors(n, "viridis"))
+  }
+  tint <- c(0.35, 0.75, 0.8, 0.7, 0.8, 0.7, 0.7)[seq_len(n)]
+  mixed <- grDevices::col2rgb(strong[seq_len(n)]) %*% diag(tint, n) +
+    matrix(255 * (1 - tint), 3L, n, byrow = TRUE)
+  grDevices::rgb(t(mixed), maxColorValue = 255)
 }
 
 #' Find places for the names of regions
@@ -188,42 +200,11 @@ draw_path <- function(path) {
   }
   for (episode in split(path, path$episode)) {
     last <- nrow(episode)
-    graphics::lines(episode$x, episode$y, col = "white", lwd = 4)
-    graphics::lines(episode$x, episode$y, lwd = 1.5)
+    graphics::lines(episode$x, episode$y, col = "white", lwd = 2.5)
+    graphics::lines(episode$x, episode$y)
     graphics::points(episode$x[[1L]], episode$y[[1L]], pch = 21L, bg = "white", lwd = 2, cex = 1.4)
     graphics::points(episode$x[[last]], episode$y[[last]], pch = 4L, lwd = 3, cex = 1.4)
   }
-}
-
-#' Draw a bar of colours with its ends' values in one line above the plot
-#' @param key A list: `palette`, `ends` (two strings), `label`; `NULL` for none.
-#' @noRd
-colour_key_above <- function(key, cex = 0.9) {
-  if (is.null(key)) {
-    return(invisible())
-  }
-  width <- function(text) graphics::strwidth(text, "inches", cex = cex)
-  em <- graphics::strwidth("M", "inches", cex = cex)
-  texts <- width(key$label) + width(key$ends[[1L]]) + width(key$ends[[2L]]) + 3 * em
-  sides <- graphics::grconvertX(0:1, "npc", "inches")
-  long <- max(min(diff(sides) - texts, 12 * em), 3 * em)
-  left <- mean(sides) - (long + texts) / 2
-  label <- left + width(key$label) + em
-  bar <- label + width(key$ends[[1L]]) + 0.6 * em
-  height <- graphics::grconvertY(1, "npc", "inches") + 0.9 * graphics::par("csi")
-  x <- function(inches) graphics::grconvertX(inches, "inches", "user")
-  y <- function(inches) graphics::grconvertY(inches, "inches", "user")
-  say <- function(inches, text) {
-    graphics::text(x(inches), y(height), text, adj = c(0, 0.4), cex = cex, xpd = NA)
-  }
-  say(left, key$label)
-  say(label, key$ends[[1L]])
-  half <- 0.3 * graphics::par("csi")
-  graphics::rasterImage(t(key$palette), x(bar), y(height - half), x(bar + long), y(height + half),
-                        xpd = NA, interpolate = FALSE)
-  graphics::rect(x(bar), y(height - half), x(bar + long), y(height + half), xpd = NA, lwd = 0.5)
-  say(bar + long + 0.6 * em, key$ends[[2L]])
-  invisible(list(left = left, right = left + long + texts))
 }
 
 # With ggplot2 -----------------------------------------------------------------------
@@ -239,12 +220,16 @@ autoplot.gym_decision_map <- function(object, ...) {
       episode[if (last) nrow(episode) else 1L, ]
     }))
   }
+  fill <- if (is.null(data$key$labels)) {
+    ggplot2::scale_fill_gradientn(colours = data$palette, limits = data$zlim,
+                                  name = data$key$label)
+  } else {
+    points$z <- factor(points$z, labels = data$key$labels)
+    ggplot2::scale_fill_manual(values = data$key$palette, name = "action")
+  }
   plot <- ggplot2::ggplot(points, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_raster(ggplot2::aes(fill = .data$z)) +
-    ggplot2::scale_fill_gradientn(
-      colours = data$palette, limits = data$zlim, name = data$key$label,
-      guide = if (is.null(data$key)) "none" else "colourbar"
-    ) +
+    fill +
     ggplot2::labs(title = decision_title(object), x = object$x, y = object$y) +
     ggplot2::coord_cartesian(expand = FALSE)
   if (length(data$border)) {

@@ -28,7 +28,7 @@ plot.gym_landscape <- function(x, main = NULL, xlab = "first direction",
   draw_heights(data)
   graphics::points(0, 0, pch = 4L, lwd = 6, cex = 1.6, col = "white")
   graphics::points(0, 0, pch = 4L, lwd = 3, cex = 1.6)
-  graphics::title(main = main %||% landscape_title(x), line = 2.5)
+  title_above(main %||% landscape_title(x))
   colour_key_above(data$key)
   invisible(x)
 }
@@ -67,7 +67,7 @@ landscape_plot_data <- function(x, call = rlang::caller_env()) {
     palette = palette,
     levels = setdiff(inside(pretty(zlim, 5L)), x$target),
     target = if (length(inside(x$target))) x$target,
-    key = list(palette = palette, ends = unname(number_text_each(zlim)), label = "mean return")
+    key = list(palette = palette, ends = number_text_each(zlim), label = "mean return")
   )
 }
 

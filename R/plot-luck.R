@@ -34,13 +34,14 @@ plot.gym_searches <- function(x, mark = 3, main = luck_title(x), xlab = "rounds 
   curve <- bars[!bars$unsolved, ]
   graphics::lines(curve$x, curve$expected, col = okabe_ito$blue, lwd = 2)
   given_up <- bars[bars$unsolved, ]
-  graphics::points(given_up$x, given_up$expected, col = okabe_ito$blue, pch = "-", cex = 2)
-  graphics::title(main = main, line = 2.5)
+  graphics::segments(given_up$x - 0.4, given_up$expected, given_up$x + 0.4, col = okabe_ito$blue,
+                     lwd = 2)
+  title_above(main)
   legend_above(
     labels = c("searches", data$curve_label), col = c(okabe_ito$sky_blue, okabe_ito$blue),
     pch = c(15L, NA), lty = c(NA, "solid")
   )
-  corner_text(data$mark_label)
+  corner_text(data$mark_label, max(curve$x))
   invisible(x)
 }
 
@@ -94,7 +95,7 @@ luck_bars <- function(x) {
   )
   if (given_up > 0L) {
     bars <- rbind(bars, data.frame(
-      round = NA, x = last + max(2, 0.06 * last), searches = given_up,
+      round = NA, x = last + max(2, 0.14 * last), searches = given_up,
       expected = n * (1 - x$chance)^last, unsolved = TRUE
     ))
   }
@@ -103,10 +104,9 @@ luck_bars <- function(x) {
 
 luck_label <- function(mark, lucky) {
   c(
-    paste0(if (mark == 1) "Solved in the first round: " else paste0("Solved within ", mark,
-                                                                    " rounds: ")),
-    paste0(percent_text(lucky$expected), " by the geometric,"),
-    paste0(percent_text(lucky$observed), " of these searches")
+    paste0("Solved ", if (mark == 1) "in the first round:" else paste("within", mark, "rounds:")),
+    paste(percent_text(lucky$expected), "by the curve,"),
+    paste(percent_text(lucky$observed), "of these searches")
   )
 }
 
@@ -121,17 +121,6 @@ luck_axis <- function(data) {
   }
 }
 
-# Lines of text in the upper right corner of the plot.
-corner_text <- function(lines, cex = 0.9) {
-  right <- graphics::grconvertX(0.98, "npc", "user")
-  top <- graphics::grconvertY(0.98, "npc", "inches")
-  heights <- top - 1.2 * cex * graphics::par("csi") * seq_along(lines)
-  if (length(lines)) {
-    graphics::text(right, graphics::grconvertY(heights, "inches", "user"), lines,
-                   adj = c(1, 0), cex = cex, col = okabe_ito$vermillion)
-  }
-}
-
 #' @rdname plot.gym_searches
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_searches <- function(object, mark = 3, ...) {
@@ -142,8 +131,8 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
   at <- at[at >= 1 & at <= max(solved$round)]
   ggplot2::ggplot(data$bars, ggplot2::aes(x = .data$x)) +
     ggplot2::geom_col(ggplot2::aes(y = .data$searches, fill = .data$lucky), width = 0.8) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$expected), solved, colour = okabe_ito$blue,
-                       linewidth = 1) +
+    ggplot2::geom_line(ggplot2::aes(y = .data$expected, group = 1), solved,
+                       colour = okabe_ito$blue, linewidth = 1) +
     ggplot2::geom_errorbar(ggplot2::aes(ymin = .data$expected, ymax = .data$expected), given_up,
                            colour = okabe_ito$blue, width = 1, linewidth = 1) +
     ggplot2::scale_fill_manual(
@@ -152,8 +141,9 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
     ggplot2::scale_x_continuous(
       breaks = c(at, given_up$x), labels = c(at, rep("not\nsolved", nrow(given_up)))
     ) +
-    ggplot2::annotate("text", x = Inf, y = Inf, label = paste(data$mark_label, collapse = "\n"),
-                      hjust = 1.05, vjust = 1.2, colour = okabe_ito$vermillion) +
+    ggplot2::annotate("text", x = max(solved$x), y = Inf, colour = okabe_ito$vermillion,
+                      hjust = 1, vjust = 1.2,
+                      label = paste(data$mark_label, collapse = "\n")) +
     ggplot2::labs(title = luck_title(object), subtitle = paste("line:", data$curve_label),
                   x = "rounds to solve", y = "searches")
 }

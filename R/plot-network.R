@@ -49,10 +49,10 @@ plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = N
   data <- network_plot_data(policy, neurons, digits)
   old <- graphics::par(mar = c(2.5, 1, 4, 1))
   on.exit(graphics::par(old))
-  open_diagram(data)
-  draw_weights_lines(data$weights)
-  draw_neurons(data)
-  graphics::title(main = main %||% network_title(policy), line = 2.5)
+  room <- open_diagram(data)
+  weight_lines(data$weights, room)
+  draw_neurons(data, room)
+  title_above(main %||% network_title(policy))
   legend_above(
     labels = c("positive weight", "negative (wider: further from 0)"),
     col = weight_colours(), pch = NA, lty = weight_types
@@ -84,8 +84,8 @@ weight_types <- c(positive = "solid", negative = "31")
 #' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`,
 #'   `y`, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
 #'   left out), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
-#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`), `layers` (data frame `x`,
-#'   `label`).
+#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`, which stands at `label_x`,
+#'   `label_y`), `layers` (data frame `x`, `label`).
 #' @noRd
 network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
   check_count(most, min = 3, arg = "neurons", call = call)
@@ -131,11 +131,29 @@ place_weights <- function(policy, neurons, digits) {
   })
   weights <- do.call(rbind, each)
   largest <- max(abs(unlist(policy$weights)))
+  along <- label_places(weights)
+  weights$label_x <- weights$x + along * (weights$xend - weights$x)
+  weights$label_y <- weights$y + along * (weights$yend - weights$y)
   weights$sign <- ifelse(weights$weight < 0, "negative", "positive")
   weights$width <- if (largest > 0) abs(weights$weight) / largest else 0
   digits <- digits %||% if (nrow(weights) <= 24L) 2 else 0
   weights$label <- if (digits > 0) sprintf("%.*f", as.integer(digits), weights$weight) else ""
   weights
+}
+
+# How far along its line a weight's number stands, from 0 to 1: the same for all of a layer,
+# as near to the middle as the lines are about as far apart there as they ever are.
+label_places <- function(weights) {
+  apart <- function(layer, along) {
+    heights <- sort(layer$y + along * (layer$yend - layer$y))
+    if (length(heights) > 1L) min(diff(heights)) else 1
+  }
+  candidates <- seq(0.5, 0.14, by = -0.04)
+  best <- vapply(split(weights, weights$layer), function(layer) {
+    distance <- vapply(candidates, apart, 0, layer = layer)
+    candidates[[which(distance >= 0.85 * max(distance))[[1L]]]]
+  }, 0)
+  unname(best[as.character(weights$layer)])
 }
 
 input_labels <- function(policy) {
@@ -151,39 +169,43 @@ output_labels <- function(policy) {
   space <- policy$action_space
   outputs <- policy$sizes[[length(policy$sizes)]]
   if (inherits(space, "gym_space_box")) {
-    bounds <- paste0(number_text(space$low), " to ", number_text(space$high))
+    bounds <- paste(number_text_each(space$low), "to", number_text_each(space$high))
     return(paste0(action_parts(policy$env_id, outputs), "\n", bounds))
   }
   actions <- action_names(policy$env_id, space$n %||% max(outputs, 2L), space$start %||% 0L)
   if (outputs == 1L && length(actions) == 2L) {
     half <- if (output_activation(policy) == "tanh") "0" else "0.5"
-    return(paste0("above ", half, "\n", actions[[2L]], "\notherwise\n", actions[[1L]]))
+    return(paste0("above ", half, ":\n", actions[[2L]], "\n\notherwise:\n", actions[[1L]]))
   }
   actions
 }
 
 # Drawing -------------------------------------------------------------------------
 
-# As wide as the labels beside the first and the last layer leave room.
+#' Open a plot as wide as the labels beside the first and the last layer leave room
+#' @return A list: `cex` of the labels, smaller where they would take more than half of the
+#'   width; `gap` between two layers, in inches.
+#' @noRd
 open_diagram <- function(data) {
   graphics::plot.new()
   across <- graphics::par("pin")[[1L]]
   layers <- max(data$layers$x)
-  label <- function(layer) {
+  wide <- function(layer, cex) {
     labels <- unlist(strsplit(data$neurons$label[data$neurons$x == layer], "\n"))
-    max(graphics::strwidth(labels, "inches", cex = diagram_cex(data)), 0) +
-      1.2 * graphics::par("csi")
+    max(graphics::strwidth(labels, "inches", cex = cex), 0) + 1.2 * neuron_away()
   }
-  left <- label(0)
-  right <- label(layers)
-  inch <- layers / max(across - left - right, 0.2 * across)
-  graphics::plot.window(c(-left * inch, layers + right * inch), c(-0.02, 1.02), xaxs = "i",
-                        yaxs = "i")
+  cex <- if (nrow(data$neurons) > 40L) 0.7 else 0.9
+  while (wide(0, cex) + wide(layers, cex) > 0.55 * across && cex > 0.4) cex <- 0.95 * cex
+  gap <- max(across - wide(0, cex) - wide(layers, cex), 0.2 * across) / layers
+  graphics::plot.window(c(-wide(0, cex) / gap, layers + wide(layers, cex) / gap), c(-0.02, 1.02),
+                        xaxs = "i", yaxs = "i")
+  list(cex = cex, gap = gap)
 }
 
-diagram_cex <- function(data) if (nrow(data$neurons) > 40L) 0.7 else 0.9
+# How far from the middle of a neuron its label begins, in inches.
+neuron_away <- function() 0.95 * graphics::par("csi")
 
-draw_weights_lines <- function(weights) {
+weight_lines <- function(weights, room) {
   drawn <- weights[order(weights$width), ]
   drawn <- drawn[drawn$width > 0, ]
   widest <- if (nrow(drawn) > 60L) 3 else 6
@@ -192,40 +214,48 @@ draw_weights_lines <- function(weights) {
     lty = weight_types[drawn$sign], lend = "butt", col = weight_colours()[drawn$sign]
   )
   labelled <- weights[nzchar(weights$label), ]
-  if (nrow(labelled)) {
-    boxed_text(
-      labelled$x + weight_label_place * (labelled$xend - labelled$x),
-      labelled$y + weight_label_place * (labelled$yend - labelled$y), labelled$label
-    )
+  if (nrow(labelled) && room$gap > 1) {
+    boxed_text(labelled$label_x, labelled$label_y, labelled$label)
   }
 }
 
-# Nearer to where the lines come from: in the middle they cross.
-weight_label_place <- 0.3
-
 boxed_text <- function(x, y, labels, cex = 0.75) {
   half_width <- 0.55 * graphics::strwidth(labels, cex = cex)
-  half_height <- 0.75 * graphics::strheight(labels, cex = cex)
+  half_height <- 0.7 * graphics::strheight(labels, cex = cex)
   graphics::rect(x - half_width, y - half_height, x + half_width, y + half_height,
                  col = "white", border = NA)
   graphics::text(x, y, labels, cex = cex)
 }
 
-draw_neurons <- function(data) {
+draw_neurons <- function(data, room) {
   neurons <- data$neurons
-  cex <- diagram_cex(data)
-  size <- if (max(table(neurons$x)) > 8L) 2 else 3
-  graphics::points(neurons$x, neurons$y, pch = 21L, cex = size, bg = "white", lwd = 1.5)
-  graphics::points(rep(data$dots$x, 3L), rep(data$dots$y, 3L) + rep(c(-1, 0, 1), each = nrow(data$dots)) *
-                     0.5 * graphics::strheight("M"), pch = 16L, cex = 0.5)
-  away <- 0.7 * graphics::strwidth("MM")
+  crowded <- max(table(neurons$x)) * 0.35 > graphics::par("pin")[[2L]]
+  graphics::points(neurons$x, neurons$y, pch = 21L, cex = if (crowded) 1.8 else 3, bg = "white",
+                   lwd = 1.5)
+  draw_dots(data$dots)
+  away <- neuron_away() / room$gap
   last <- max(neurons$x)
-  first <- neurons$x == 0
-  graphics::text(-away, neurons$y[first], neurons$label[first], adj = c(1, 0.5), cex = cex, xpd = NA)
-  out <- neurons$x == last
-  graphics::text(last + away, neurons$y[out], neurons$label[out], adj = c(0, 0.5), cex = cex,
-                 xpd = NA)
-  graphics::mtext(data$layers$label, 1L, line = 0.5, at = data$layers$x, cex = cex * graphics::par("cex"),
+  side <- function(layer, x, adj) {
+    there <- neurons[neurons$x == layer, ]
+    graphics::text(x, there$y, there$label, adj = c(adj, 0.5), cex = room$cex, xpd = NA)
+  }
+  side(0, -away, 1)
+  side(last, last + away, 0)
+  draw_layer_names(data$layers, room)
+}
+
+# Where neurons are left out.
+draw_dots <- function(dots) {
+  for (i in seq_len(nrow(dots))) {
+    graphics::points(rep(dots$x[[i]], 3L), dots$y[[i]] + c(-0.5, 0, 0.5) * graphics::strheight("M"),
+                     pch = 16L, cex = 0.5)
+  }
+}
+
+# Under the layers, small enough for their neighbours.
+draw_layer_names <- function(layers, room) {
+  cex <- min(room$cex, 0.95 * room$gap / max(graphics::strwidth(layers$label, "inches", font = 3L)))
+  graphics::mtext(layers$label, 1L, line = 0.5, at = layers$x, cex = cex * graphics::par("cex"),
                   font = 3L)
 }
 
@@ -243,18 +273,17 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
   weights <- data$weights[order(data$weights$width), ]
   widest <- if (nrow(weights) > 60L) 1.5 else 3
   labelled <- weights[nzchar(weights$label), ]
-  labelled$x <- labelled$x + weight_label_place * (labelled$xend - labelled$x)
-  labelled$y <- labelled$y + weight_label_place * (labelled$yend - labelled$y)
   neurons <- data$neurons
   neurons$side <- ifelse(neurons$x == 0, 1, 0)
-  neurons$beside <- neurons$x + ifelse(neurons$x == 0, -0.08, 0.08)
+  neurons$beside <- neurons$x + ifelse(neurons$x == 0, -0.05, 0.05) * max(data$layers$x, 1)
   ggplot2::ggplot(neurons, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_segment(
       ggplot2::aes(xend = .data$xend, yend = .data$yend, colour = .data$sign,
                    linetype = .data$sign),
       weights[weights$width > 0, ], linewidth = widest * weights$width[weights$width > 0]
     ) +
-    ggplot2::geom_label(ggplot2::aes(label = .data$label), labelled, size = 3, label.size = 0) +
+    ggplot2::geom_label(ggplot2::aes(.data$label_x, .data$label_y, label = .data$label), labelled,
+                        size = 3, label.padding = ggplot2::unit(0.1, "lines"), label.size = NA) +
     ggplot2::geom_point(shape = 21, size = if (max(table(neurons$x)) > 8L) 5 else 9,
                         fill = "white") +
     ggplot2::geom_text(ggplot2::aes(label = "..."), data$dots, angle = 90) +
@@ -264,6 +293,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     ggplot2::scale_linetype_manual(values = weight_types) +
     ggplot2::scale_x_continuous(breaks = data$layers$x, labels = data$layers$label,
                                 expand = ggplot2::expansion(mult = 0.45)) +
+    ggplot2::scale_y_continuous(expand = ggplot2::expansion(mult = 0.1)) +
     ggplot2::labs(title = network_title(policy), colour = "weight", linetype = "weight") +
     ggplot2::theme_void() +
     ggplot2::theme(axis.text.x = ggplot2::element_text(face = "italic"),
