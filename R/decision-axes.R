@@ -29,11 +29,12 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   )
 }
 
-# From the middle to either side. The angle's and the position's are where an episode
-# ends, the velocities' hold nearly all steps of networks as search_random() draws them.
+# From the middle to either side. The position's and the angle's are where an episode
+# ends. The velocities' hold 99.5 in 100 steps of 500 episodes of the random policy and of 1,200
+# episodes of 60 random networks.
 usual_ranges <- list(
-  CartPole = list(cart_position = 2.4, cart_velocity = 3, pole_angle = 0.2095,
-                  pole_angular_velocity = 3)
+  CartPole = list(cart_position = 2.4, cart_velocity = 2, pole_angle = 0.2095,
+                  pole_angular_velocity = 2.5)
 )
 
 #' Find the two numbers of an observation to map

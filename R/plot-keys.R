@@ -8,11 +8,10 @@ title_above <- function(main) {
   }
   cex <- graphics::par("cex.main")
   wide <- max(graphics::strwidth(main, "inches", cex = cex, font = 2L))
-  room <- 0.98 * graphics::par("fin")[[1L]]
-  # Around the middle of the plot, which is not the middle of the figure.
+  # It is centred over the plot, which is not the middle of the figure.
   middle <- mean(graphics::grconvertX(0:1, "npc", "inches"))
-  room <- 2 * min(middle, graphics::par("fin")[[1L]] - middle, room / 2)
-  graphics::title(main = main, line = 2.5, cex.main = cex * min(1, room / wide))
+  room <- 2 * min(abs(graphics::grconvertX(0:1, "nfc", "inches") - middle))
+  graphics::title(main = main, line = 2.5, cex.main = cex * min(1, 0.98 * room / wide))
 }
 
 #' Draw a bar of colours with its ends' values in one line above the plot

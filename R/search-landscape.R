@@ -232,9 +232,7 @@ print.gym_landscape <- function(x, ...) {
     paste0("Landscape around the best policy found in ", x$env_id, ": ", n, " x ", n,
            " networks, ", count_of(x$episodes, "episode"), " each",
            if (x$common) ", the same for all"),
-    paste0("Mean return: best policy ", number_text(x$best),
-           if (length(played)) paste0(", all from ", number_text(min(played)), " to ",
-                                      number_text(max(played)))),
+    landscape_returns_line(x, played),
     if (length(played) && is.numeric(x$target) && is.finite(x$target)) {
       paste0("Networks that reach the target of ", number_text(x$target), ": ",
              percent_text(mean(played >= x$target)))
@@ -243,4 +241,11 @@ print.gym_landscape <- function(x, ...) {
     sep = "\n"
   )
   invisible(x)
+}
+
+landscape_returns_line <- function(x, played) {
+  if (length(played)) {
+    paste0("Mean return: ", if (!is.na(x$best)) paste0("best policy ", number_text(x$best), ", "),
+           "all from ", number_text(min(played)), " to ", number_text(max(played)))
+  }
 }

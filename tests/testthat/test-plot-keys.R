@@ -15,5 +15,10 @@ test_that("titles and remarks may be missing or long", {
   expect_silent(title_above(NULL))
   expect_silent(title_above(strrep("long ", 40)))
   expect_silent(corner_text(NULL))
+  graphics::par(mfrow = c(2, 3))
+  for (panel in 1:6) {
+    graphics::plot(1)
+    expect_silent(title_above("a title of some length"))
+  }
   expect_silent(corner_text(c("one", strrep("long ", 40))))
 })
