@@ -96,9 +96,11 @@ held_at <- function(observed, axes, at, call = rlang::caller_env()) {
   strange <- setdiff(names(at), observed$names[-axes])
   if (length(strange)) {
     gym_abort(
-      c(paste0("`at` names ", strange[[1L]], ", which is ",
-               if (strange[[1L]] %in% observed$names) "on an axis" else "no part of the observation",
-               "."),
+      c(paste0("`at` names ", strange[[1L]], ", which is ", if (strange[[1L]] %in% observed$names) {
+        "on an axis."
+      } else {
+        "no part of the observation."
+      }),
         i = observed_text(observed)),
       class = "gym_error_argument", argument = "at", value = at, call = call
     )

@@ -101,7 +101,8 @@ decision_map <- function(policy, env = NULL, x = NULL, y = NULL, at = NULL, path
   held <- held_at(observed, axes, at)
   points <- expand.grid(
     x = seq(xlim[[1L]], xlim[[2L]], length.out = size),
-    y = seq(ylim[[1L]], ylim[[2L]], length.out = size)
+    y = seq(ylim[[1L]], ylim[[2L]], length.out = size),
+    KEEP.OUT.ATTRS = FALSE
   )
   values <- matrix(held, nrow(points), length(held), byrow = TRUE)
   values[, axes] <- as.matrix(points)
@@ -128,7 +129,8 @@ check_mappable <- function(policy, call = rlang::caller_env()) {
 }
 
 check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (!is.null(x) && !(is.numeric(x) && length(x) == 2L && all(is.finite(x)) && x[[1L]] < x[[2L]])) {
+  two <- is.numeric(x) && length(x) == 2L && all(is.finite(x))
+  if (!is.null(x) && !(two && x[[1L]] < x[[2L]])) {
     abort_argument(x, "two numbers, the lower first, or NULL", arg, call)
   }
 }
@@ -198,7 +200,8 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
   }
   if (!is.null(space) && !inherits(space, "gym_space_discrete")) {
     gym_abort(
-      paste0("A decision map shows actions that are discrete or a Box, not of ", format(space), "."),
+      paste0("A decision map shows actions that are discrete or a Box, not of ", format(space),
+             "."),
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }

@@ -52,7 +52,7 @@ landscape_plot_data <- function(x, call = rlang::caller_env()) {
   played <- x$grid$mean_return
   if (all(is.na(played))) {
     gym_abort(
-      "There is nothing to plot: the landscape was interrupted before its first network had played.",
+      "There is nothing to plot: the landscape was interrupted before a network had played.",
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }

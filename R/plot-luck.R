@@ -117,7 +117,8 @@ luck_axis <- function(data) {
   graphics::axis(1L, at = c(1, at[at > 1 & at <= last]))
   given_up <- data$bars[data$bars$unsolved, ]
   if (nrow(given_up)) {
-    graphics::mtext("not\nsolved", 1L, line = 1.5, at = given_up$x, cex = 0.8 * graphics::par("cex"))
+    graphics::mtext("not\nsolved", 1L, line = 1.5, at = given_up$x,
+                    cex = 0.8 * graphics::par("cex"))
   }
 }
 

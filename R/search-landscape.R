@@ -127,7 +127,7 @@ new_plane <- function(policy, directions, size, span) {
   steps <- span * seq(-1, 1, length.out = size)
   # Exactly the best policy, whatever rounding makes of the middle.
   steps[(size + 1) / 2] <- 0
-  grid <- expand.grid(a = steps, b = steps)
+  grid <- expand.grid(a = steps, b = steps, KEEP.OUT.ATTRS = FALSE)
   move <- function(a, b) {
     policy$weights <- Map(
       function(layer, first, second) layer + a * first + b * second,
@@ -135,7 +135,6 @@ new_plane <- function(policy, directions, size, span) {
     )
     policy
   }
-  attr(grid, "out.attrs") <- NULL
   list(grid = grid, policies = Map(move, grid$a, grid$b), directions = directions)
 }
 

@@ -24,11 +24,15 @@ test_that("the picture's field has a row for each step of the first direction", 
 test_that("any landscape plots, returns itself and leaves par and R's generator alone", {
   local_device()
   set.seed(1)
-  for (landscape in list(landscape_of(1:9), landscape_of(-(1:25), target = -10),
-                         landscape_of(rep(200, 9), target = 195), landscape_of(c(1:4, rep(NA, 5))))) {
+  landscapes <- list(
+    landscape_of(1:9), landscape_of(-(1:25), target = -10),
+    landscape_of(rep(200, 9), target = 195), landscape_of(c(1:4, rep(NA, 5)))
+  )
+  for (landscape in landscapes) {
     expect_leaves_session_alone(expect_identical(expect_invisible(plot(landscape)), landscape))
   }
-  expect_error(plot(landscape_of(rep(NA_real_, 9))), "nothing to plot", class = "gym_error_argument")
+  expect_error(plot(landscape_of(rep(NA_real_, 9))), "nothing to plot",
+               class = "gym_error_argument")
 })
 
 test_that("a search plays and shows its landscape, which it returns", {

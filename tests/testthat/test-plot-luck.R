@@ -47,7 +47,8 @@ test_that("the mark tells the chance of that many rounds or fewer, and what was 
 test_that("any searches plot, return themselves and leave par and R's generator alone", {
   local_device()
   set.seed(1)
-  for (searches in list(searches_of(c(1, 1, 3, 7, NA)), searches_of(1), searches_of(c(300, NA), 400L))) {
+  each <- list(searches_of(c(1, 1, 3, 7, NA)), searches_of(1), searches_of(c(300, NA), 400L))
+  for (searches in each) {
     expect_leaves_session_alone(expect_identical(expect_invisible(plot(searches)), searches))
   }
   expect_silent(plot(searches, mark = NULL))

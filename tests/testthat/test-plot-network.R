@@ -51,7 +51,8 @@ test_that("of big layers the first neurons and the last are drawn, and dots betw
   expect_gt(data$dots$y, first$y[[11]])
   expect_identical(sum(data$neurons$layer == 2), 12L)
   expect_identical(nrow(data$weights), 11L * 12L + 12L * 2L)
-  expect_identical(sum(network_plot_data(policy_network(c(100, 2)), most = 5)$neurons$layer == 1), 4L)
+  few <- network_plot_data(policy_network(c(100, 2)), most = 5)
+  expect_identical(sum(few$neurons$layer == 1), 4L)
 })
 
 test_that("the width is relative to all weights, drawn or not", {
@@ -138,7 +139,8 @@ test_that("ggplot2 draws the same lines", {
   policy <- small_network()
   plot <- ggplot2::autoplot(policy)
   drawn <- ggplot2::layer_data(plot, 1L)
-  expect_setequal(round(drawn$linewidth / 3, 6), abs(unlist(policy$weights))[unlist(policy$weights) != 0])
+  weights <- unlist(policy$weights)
+  expect_setequal(round(drawn$linewidth / 3, 6), abs(weights)[weights != 0])
   expect_identical(sum(drawn$colour == okabe_ito$vermillion), 4L)
   local_device()
   expect_silent(print(plot))

@@ -39,9 +39,10 @@ test_that("a point's return is that of its network", {
   search <- found(env)
   landscape <- search_landscape(search, size = 3, episodes = 2, span = 2, seed = 5)
   for (i in c(1, 6, 9)) {
+    point <- landscape$grid[i, ]
     policy <- search$policy
     policy$weights <- Map(
-      function(layer, first, second) layer + landscape$grid$a[i] * first + landscape$grid$b[i] * second,
+      function(layer, first, second) layer + point$a * first + point$b * second,
       policy$weights, landscape$directions[[1]], landscape$directions[[2]]
     )
     returns <- vapply(landscape$seeds, function(seed) {
@@ -52,7 +53,7 @@ test_that("a point's return is that of its network", {
         out$reward
       }, 0))
     }, 0)
-    expect_identical(landscape$grid$mean_return[i], mean(returns))
+    expect_identical(point$mean_return, mean(returns))
   }
   expect_identical(range(landscape$grid$a), c(-2, 2))
 })
@@ -108,7 +109,7 @@ test_that("an interrupt leaves the networks that were played, with a message", {
   env <- fake_environment(reward = weights_matter)
   search <- found(env)
   step <- env$step
-  env$step <- function(action) if (length(env$seeds) == 8L + 5L) rlang::interrupt() else step(action)
+  env$step <- function(action) if (length(env$seeds) == 13L) rlang::interrupt() else step(action)
   expect_message(
     landscape <- search_landscape(search, size = 3, episodes = 2, seed = 1),
     "after 2 of 9 networks", class = "gym_message_interrupted"

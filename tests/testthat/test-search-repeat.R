@@ -127,7 +127,9 @@ test_that("a progress bar is shown when asked for and nothing is said otherwise"
     step(action)
   }
   shown <- capture.output(
-    searches <- search_repeat(slow, rounds = 1, episodes = 1, target = 9, seeds = 1:40, progress = TRUE),
+    searches <- search_repeat(
+      slow, rounds = 1, episodes = 1, target = 9, seeds = 1:40, progress = TRUE
+    ),
     type = "message"
   )
   expect_match(paste(shown, collapse = " "), "Search [0-9]+ of 40 .*0 solved")
