@@ -86,6 +86,18 @@ check_dots_named <- function(dots, example, call = rlang::caller_env()) {
   check_unique_names(dots, "...", call)
 }
 
+# For functions that have `...` for their methods' sake only.
+check_dots_empty <- function(..., call = rlang::caller_env()) {
+  if (...length()) {
+    given <- names(list(...))[[1L]] %||% ""
+    name <- if (nzchar(given)) paste0("`", given, "`") else describe_argument(..1)
+    gym_abort(
+      paste0("There is no argument for ", name, " here."),
+      class = "gym_error_argument", argument = "...", value = list(...), call = call
+    )
+  }
+}
+
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
     paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),

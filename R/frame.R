@@ -7,8 +7,8 @@
 #'   default. An implementation of an environment's own (`"vector_entry_point"`) draws
 #'   all lanes at once, and the server lets it have 16 at most for that.
 #' @return An object of class `gym_frame`: an integer array of height x width x
-#'   3 (red, green, blue, each 0 to 255). [plot()] shows it, [as.raster()] makes
-#'   it a raster image.
+#'   3 (red, green, blue, each 0 to 255), where the environment draws such also x 1 (grey)
+#'   or x 4 (the last how opaque). [plot()] shows it, [as.raster()] makes it a raster image.
 #' @section Errors: `gym_error_http_400` for an unknown instance, one that has
 #'   not been reset yet (code `reset_needed`) or that cannot be drawn (code
 #'   `cannot_render`); `gym_error_connection`.
@@ -26,13 +26,20 @@ env_render <- function(x, instance_id, lane = 1) {
   query <- if (lane != 1) paste0("?lane=", whole_text(lane - 1))
   route <- paste0(instance_route(instance_id), "render/", query)
   answer <- get_answer(x, route, take_tensors = TRUE)
-  structure(answer$tensors$frame, class = "gym_frame")
+  new_frame(answer$tensors$frame)
 }
+
+new_frame <- function(values) structure(values, class = "gym_frame")
 
 #' @importFrom grDevices as.raster
 #' @export
 as.raster.gym_frame <- function(x, ...) {
-  as.raster(unclass(x), max = 255L)
+  values <- unclass(x)
+  if (dim(values)[[3L]] == 1L) {
+    # Shades of grey are a matrix to as.raster().
+    dim(values) <- dim(values)[1:2]
+  }
+  as.raster(values, max = 255L)
 }
 
 #' Show a frame

@@ -31,8 +31,9 @@
 #'     lanes the same,
 #'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many lanes there are
 #'     and what was chosen for them, see [env_create()]; `NULL` without lanes,
-#'   * `$spec`: a list of `id`, `reward_threshold` and `max_episode_steps`, the
-#'     latter two `NULL` where the environment has none,
+#'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` and `render_fps`
+#'     (how many frames make a second of it), the latter three `NULL` where the environment
+#'     has none,
 #'   * `$client`, `$instance_id`: for the classic calls.
 #' @section Errors: As [env_create()]; `gym_error_server_start` when no server
 #'   could be started.

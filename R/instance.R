@@ -77,8 +77,10 @@ ask_instance <- function(x, instance_id, call) {
   instance$spec <- list(
     id = answer$env_id,
     reward_threshold = answer$reward_threshold,
-    max_episode_steps = answer$max_episode_steps
+    max_episode_steps = answer$max_episode_steps,
+    render_fps = answer$render_fps
   )
+  instance$draws <- !is.null(answer$render_mode)
   instance$done <- FALSE
   instance
 }

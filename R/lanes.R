@@ -12,16 +12,17 @@ sync_lanes <- 16L
 #'
 #' One that is named by its id is made first and closed when `use` is left.
 #' @param episodes How many episodes are played at most: no more lanes are made.
+#' @param frames Whether the lanes must draw: then there is a single one.
 #' @noRd
-with_lanes <- function(env, episodes, client, use) {
+with_lanes <- function(env, episodes, client, use, frames = FALSE) {
   call <- rlang::caller_env()
   if (!is.character(env) && !inherits(env, "gym_wrapped")) {
-    return(use(lanes_of(env, call = call)))
+    return(use(lanes_of(env, call = call, frames = frames)))
   }
-  env <- make_lanes(env, episodes, client)
+  env <- if (frames) gym_make(env, client = client) else make_lanes(env, episodes, client)
   finished <- FALSE
   on.exit(close_made(env, finished))
-  value <- use(lanes_of(env, sync_lanes, call))
+  value <- use(lanes_of(env, sync_lanes, call, frames))
   finished <- TRUE
   value
 }
@@ -86,9 +87,10 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
 #'   one for each episode; `reset(seeds)`, which gives the observations of all lanes;
 #'   `step(action, playing)`, which takes and gives one row for each of the lanes
 #'   `playing`; `num_envs`, with how many lanes an episode has to be begun again, `NULL`
-#'   where its seed is enough.
+#'   where its seed is enough; `frame()`, which gives the current frame as the bytes of a
+#'   PNG file, `NULL` where none are wanted.
 #' @noRd
-lanes_of <- function(env, block = NULL, call = rlang::caller_env()) {
+lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
   if (is.null(env$num_envs)) {
     lanes <- single_lane(env)
   } else if (identical(env$vectorization_mode, "sync")) {
@@ -100,6 +102,10 @@ lanes_of <- function(env, block = NULL, call = rlang::caller_env()) {
   lanes$spec <- env$spec
   lanes$client <- env$client
   lanes$call <- call
+  if (frames) {
+    check_draws(env, call)
+    lanes$frame <- function() png_frame(env$client, env$instance_id, call)
+  }
   lanes
 }
 

@@ -38,7 +38,7 @@ new_block <- function(episodes, seeds) {
   rlang::env(
     episodes = episodes, seeds = seeds, seed = seeds[seq_len(n)], lane = seq_len(n),
     return = numeric(n), length = integer(n), terminated = logical(n), truncated = logical(n),
-    steps = list()
+    steps = list(), frames = list()
   )
 }
 
@@ -47,12 +47,14 @@ new_block <- function(episodes, seeds) {
 play_block <- function(lanes, block, policy, record, max_steps, keep_steps) {
   playing <- block$lane
   observation <- lane_rows(lanes$observation_space, lanes$reset(block$seeds), playing)
+  keep_frame(block, lanes)
   returns <- numeric(length(playing))
   at <- 0L
   while (length(playing)) {
     action <- act_lanes(policy, observation, playing, lanes)
     out <- lanes$step(action, playing)
     at <- at + 1L
+    keep_frame(block, lanes)
     returns <- returns + out$reward
     if (keep_steps) {
       block$steps[[at]] <- list(
@@ -74,6 +76,13 @@ play_block <- function(lanes, block, policy, record, max_steps, keep_steps) {
 }
 
 flags <- c("terminated", "truncated")
+
+# Lanes that draw are single, and their blocks have one episode each.
+keep_frame <- function(block, lanes) {
+  if (!is.null(lanes$frame)) {
+    block$frames[[length(block$frames) + 1L]] <- lanes$frame()
+  }
+}
 
 # One that neither terminated nor was truncated by the environment was cut short here.
 end_episodes <- function(block, lane, returns, at, out) {

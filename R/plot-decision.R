@@ -10,7 +10,8 @@
 #'
 #' @param x,object What [decision_map()] returned.
 #' @param main The title; `NULL`, the default, tells the environment and the policy.
-#' @param xlab,ylab The axes' labels; the default are the names of the parts.
+#' @param xlab,ylab The axes' labels; the default are the names of the parts, with their units
+#'   where Gymnasium's documentation has them.
 #' @param ... Further arguments of [plot()][graphics::plot.default()]; not used by
 #'   `autoplot()`.
 #' @return `x`, invisibly; `autoplot()` a ggplot.
@@ -18,7 +19,8 @@
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
 #' plot(decision_map(follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3)))
-plot.gym_decision_map <- function(x, main = NULL, xlab = x$x, ylab = x$y, ...) {
+plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
+                                  ylab = decision_label(x, x$y), ...) {
   data <- decision_plot_data(x)
   open_plot(
     list(x = range(data$x), y = range(data$y), xlab = xlab, ylab = ylab, xaxs = "i", yaxs = "i"),
@@ -36,6 +38,8 @@ plot.gym_decision_map <- function(x, main = NULL, xlab = x$x, ylab = x$y, ...) {
   }
   invisible(x)
 }
+
+decision_label <- function(x, name) observation_labels(x$env_id, name)
 
 decision_title <- function(x) {
   policy <- sub("(,| over).*", "", policy_text(x$policy))
@@ -230,7 +234,8 @@ autoplot.gym_decision_map <- function(object, ...) {
   plot <- ggplot2::ggplot(points, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_raster(ggplot2::aes(fill = .data$z)) +
     fill +
-    ggplot2::labs(title = decision_title(object), x = object$x, y = object$y) +
+    ggplot2::labs(title = decision_title(object), x = decision_label(object, object$x),
+                  y = decision_label(object, object$y)) +
     ggplot2::coord_cartesian(expand = FALSE)
   if (length(data$border)) {
     plot <- plot + ggplot2::geom_contour(ggplot2::aes(z = .data$z), breaks = data$border,

@@ -1,27 +1,73 @@
 #' Plot a rollout
 #'
-#' Shows how the returns of a rollout's episodes are distributed: their density, the
-#' median marked, and each episode as a tick on the axis. When all episodes have the
-#' same return there is no density, and the mark stands alone.
+#' Three pictures of a rollout: of all of its episodes how their returns are distributed, and
+#' of one of them what was observed and done, or how it looked.
+#'
+#' `"returns"` shows the density of the episodes' returns, the median marked, and each episode
+#' as a tick on the axis. When all episodes have the same return there is no density, and the
+#' mark stands alone.
+#'
+#' `"trajectory"` shows an episode's observations, each in a panel of its own, and below them its
+#' actions, against the number of steps taken. Where Gymnasium's documentation tells units and what
+#' actions mean, the labels do, too. Dashed lines are limits at which the documentation says that
+#' an episode ends (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn where
+#' the episode comes near; a solid line is its end. The observations are those that the actions were
+#' taken on: the one after the last step is not among them. Takes a rollout with `steps = TRUE`.
+#' What wrappers do to an observation is not known here: labels and limits are those of the
+#' environment itself.
+#'
+#' `"filmstrip"` shows frames of an episode side by side, in rows where that makes them
+#' larger, evenly apart, the first and the last among them. Above and below, what is blank in all
+#' of them is cut off. Takes a rollout with `frames = TRUE`, and the package png.
 #'
 #' @param x What [rollout()] returned.
-#' @param main The title; the default tells the environment and the policy.
-#' @param xlab,ylab The axes' labels.
-#' @param ... Further arguments of [plot()][graphics::plot.default()], such as `xlim`.
+#' @param type `"returns"`, the default, `"trajectory"` or `"filmstrip"`.
+#' @param main The title; `NULL`, the default, tells the environment and the policy, in a
+#'   filmstrip nothing.
+#' @param xlab,ylab The axes' labels, for `"returns"`.
+#' @param episode Which episode to show, a whole number; the default is the first.
+#' @param variables The parts of the observation to show in a trajectory: names of columns of the
+#'   table of steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, takes the first 8.
+#' @param n How many frames a filmstrip has at most, a whole number; the default is 8.
+#' @param ... For `"returns"` further arguments of [plot()][graphics::plot.default()], such as
+#'   `xlim`; the other types take none.
 #' @return `x`, invisibly.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
+#'   rollout that was played without the steps or frames that are to be shown.
 #' @references The density is that of [stats::density()] with its default bandwidth, within
 #'   the range of the returns, as in the figure of the post "Artificial Intelligence in R (I)".
+#' @seealso [animate()] for a moving picture.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' plot(rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1))
-plot.gym_rollout <- function(x, main = rollout_title(x),
-                             xlab = "return (reward summed over an episode)",
-                             ylab = "density", ...) {
+#'
+#' # The pole falls to the right: push the cart to the right.
+#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' played <- rollout("CartPole-v1", follow_pole, seed = 1, steps = TRUE, frames = TRUE)
+#' plot(played, type = "trajectory")
+#' plot(played, type = "filmstrip")
+plot.gym_rollout <- function(x, type = c("returns", "trajectory", "filmstrip"), main = NULL,
+                             xlab = NULL, ylab = NULL, episode = 1, variables = NULL, n = 8,
+                             ...) {
+  type <- check_choice(type[1L], c("returns", "trajectory", "filmstrip"), arg = "type")
+  if (type != "returns") {
+    check_dots_empty(...)
+  }
+  switch(type,
+    returns = plot_returns(x, main, xlab, ylab, ...),
+    trajectory = plot_trajectory(x, episode, variables, main),
+    filmstrip = plot_filmstrip(x, episode, n, main)
+  )
+  invisible(x)
+}
+
+plot_returns <- function(x, main, xlab, ylab, ...) {
   data <- rollout_plot_data(x)
   flat <- is.null(data$density)
   open_plot(
-    list(x = data$xlim, y = data$ylim, main = main, xlab = xlab,
-         ylab = if (flat) "" else ylab, yaxs = "i", yaxt = if (flat) "n" else "s"),
+    list(x = data$xlim, y = data$ylim, main = main %||% rollout_title(x),
+         xlab = xlab %||% returns_label, ylab = ylab %||% if (flat) "" else "density",
+         yaxs = "i", yaxt = if (flat) "n" else "s"),
     list(...)
   )
   if (!flat) {
@@ -29,8 +75,9 @@ plot.gym_rollout <- function(x, main = rollout_title(x),
   }
   graphics::rug(data$returns, col = okabe_ito$blue, quiet = TRUE)
   draw_median(data)
-  invisible(x)
 }
+
+returns_label <- "return (reward summed over an episode)"
 
 rollout_title <- function(x) {
   # Up to the first detail: "random" or "network 4-2-1".
@@ -74,9 +121,12 @@ draw_median <- function(data) {
   graphics::segments(
     data$median, 0, data$median, 0.92 * top, col = okabe_ito$vermillion, lwd = 2, lty = "dashed"
   )
-  label <- paste0("median ", number_text(data$median), " (n = ", length(data$returns), ")")
   # Centred in the middle of the plot, the nearer a side the further towards the middle.
   place <- (data$median - data$xlim[[1L]]) / diff(data$xlim)
-  graphics::text(data$median, 0.96 * top, label, adj = c(place, 0.5), xpd = NA,
+  graphics::text(data$median, 0.96 * top, median_label(data), adj = c(place, 0.5), xpd = NA,
                  col = okabe_ito$vermillion)
+}
+
+median_label <- function(data) {
+  paste0("median ", number_text(data$median), " (n = ", length(data$returns), ")")
 }

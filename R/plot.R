@@ -14,6 +14,12 @@ okabe_ito <- list(
   blue = "#0072B2", vermillion = "#D55E00", purple = "#CC79A7"
 )
 
+# Of trajectories: the limits of an episode, its end, and lines that share a panel.
+limit_colours <- c(failure = okabe_ito$vermillion, goal = okabe_ito$green)
+ending_colours <- c(terminated = okabe_ito$vermillion, truncated = "grey50")
+line_colours <- unlist(okabe_ito[c("blue", "orange", "green", "purple", "sky_blue", "vermillion")],
+                       use.names = FALSE)
+
 # A legend in one line above the plot, where no data are; smaller where the plot is
 # narrow. graphics::legend() gives each entry the width of the longest. Laid out in
 # inches, so that logarithmic axes do not matter.

@@ -330,6 +330,8 @@ parsed_body <- function(response, layouts = NULL, request = NULL) {
     NULL
   } else if (identical(response$type, tensors_type)) {
     tensors_answer(response$content, layouts, request)
+  } else if (identical(response$type, "image/png")) {
+    list(png = response$content)
   } else {
     answer <- from_json(rawToChar(response$content))
     if (is.list(answer)) answer

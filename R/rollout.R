@@ -18,6 +18,10 @@
 #' all lanes begin an episode together, and the next block begins when all have ended, so
 #' that short episodes are not favoured.
 #'
+#' Only with `frames = TRUE` one episode is played after the other, in an environment without
+#' lanes: other episodes, in CartPole, than the same seed plays side by side, as they are
+#' seeded otherwise there; elsewhere the same ones, if the policy draws nothing.
+#'
 #' # To begin an episode again
 #'
 #' A seed of the table begins the same episode again, by `env$reset(seed = )` of an
@@ -43,6 +47,9 @@
 #' @param steps Keep each step as well? `FALSE`, the default, or `TRUE`.
 #' @param client The client of the server where an environment named by its id is
 #'   made; the default is the session's own, [gym_client()].
+#' @param frames Keep pictures of the episodes as well? `FALSE`, the default, or `TRUE`, for
+#'   [animate()] and [plot(type = "filmstrip")][plot.gym_rollout()]: one before the first
+#'   step and one after each. Takes an environment that can be drawn, without lanes.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
@@ -58,6 +65,10 @@
 #'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
 #'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
 #'       `reward` (double), `terminated`, `truncated` (logical).}
+#'     \item{frames}{`NULL`, or with `frames = TRUE` a list with the frames of each episode, an
+#'       object of class `gym_frames`. They are kept as PNG files, a few kilobytes each:
+#'       `frames[[2]][[1]]` unpacks the first of the second episode, as [env_render()] gives
+#'       it (with package png).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{num_envs}{How many lanes share the seed of an episode, an integer; `NULL`
@@ -95,24 +106,26 @@
 #' env$reset(seed = lake$episodes$seed[2])
 #' env$close()
 rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, steps = FALSE,
-                    client = gym_client()) {
+                    client = gym_client(), frames = FALSE) {
   check_environment(env)
   check_count(episodes)
   check_count(max_steps, allow_null = TRUE)
   check_seed(seed)
   check_flag(steps)
+  check_flag(frames)
   call <- rlang::current_env()
   with_random_seed(seed, {
     # A policy that is made in the call draws its weights under the seed, too.
     check_policy(policy)
-    with_lanes(env, episodes, client, function(lanes) {
+    play <- function(lanes) {
       policy <- policy_bind(policy, lanes, call = call)
       record <- new_record(episodes)
       seeds <- draw_block_seeds(lanes, episodes)
       begin <- function(block, episodes) list(seeds = seeds[[block]], policy = policy)
       play_episodes(lanes, record, begin, max_steps, keep_steps = steps)
       new_rollout(record, policy, lanes, seed, steps)
-    })
+    }
+    with_lanes(env, episodes, client, play, frames)
   })
 }
 
@@ -145,6 +158,7 @@ new_rollout <- function(record, policy, lanes, seed, keep_steps) {
     list(
       episodes = episodes,
       steps = if (keep_steps) steps_table(record, episodes, lanes),
+      frames = if (!is.null(lanes$frame)) frames_of(record, lanes),
       policy = policy,
       env_id = environment_label(lanes),
       num_envs = lanes$num_envs,

@@ -78,6 +78,32 @@ class Chatty(Odd):
         return super().step(action)
 
 
+class Drawing(Odd):
+    """Draws a dot that moves on with each step, on grey, coloured or half transparent ground."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
+
+    def __init__(self, channels, render_mode=None):
+        super().__init__(spaces.Discrete(2))
+        self.render_mode = render_mode
+        self.channels = channels
+        self.steps = 0
+
+    def reset(self, *, seed=None, options=None):
+        self.steps = 0
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        self.steps += 1
+        observation, reward, _, truncated, info = super().step(action)
+        return observation, reward, self.steps == 5, truncated, info
+
+    def render(self):
+        frame = np.full((4, 6, self.channels), 100, dtype=np.uint8)
+        frame[1, self.steps] = np.array([10, 20, 30, 255])[: self.channels]
+        return frame
+
+
 def box(low, high, shape, dtype):
     return spaces.Box(low, high, shape, dtype)
 
@@ -186,3 +212,11 @@ for maker in (
 ):
     name = "".join(word.title() for word in maker.__name__.split("_"))
     gym.register(f"{name}-v0", entry_point=maker, disable_env_checker=True)
+
+for channels in (1, 3, 4):
+    gym.register(
+        f"Drawing{channels}-v0",
+        entry_point=Drawing,
+        kwargs={"channels": channels},
+        disable_env_checker=True,
+    )

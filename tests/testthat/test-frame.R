@@ -55,6 +55,26 @@ test_that("a frame knows plot() and as.raster()", {
   expect_true(any(drawn[, , 1] < 0.1))
 })
 
+test_that("grey and half transparent frames are shown, too", {
+  server <- local_odd_server()
+  shades <- c("1" = "#0A0A0A", "3" = "#0A141E", "4" = "#0A141EFF")
+  grounds <- c("1" = "#646464", "3" = "#646464", "4" = "#64646464")
+  for (channels in c("1", "3", "4")) {
+    env <- make_odd(paste0("Drawing", channels), server)
+    env$reset()
+    env$step(0)
+    frame <- env$render()
+    expect_identical(dim(frame), c(4L, 6L, as.integer(channels)))
+    raster <- as.matrix(as.raster(frame))
+    expect_identical(dim(raster), c(4L, 6L))
+    expect_identical(raster[2, 2], shades[[channels]])
+    expect_identical(raster[1, 1], grounds[[channels]])
+    grDevices::pdf(NULL)
+    expect_invisible(plot(frame))
+    grDevices::dev.off()
+  }
+})
+
 test_that("an environment that was not reset has no frame", {
   error <- expect_error(local_env()$render(), class = "gym_error_http_400")
   expect_identical(error$code, "reset_needed")

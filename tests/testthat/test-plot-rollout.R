@@ -44,3 +44,12 @@ test_that("the title names the environment and the policy", {
     rollout_title(rollout(env, policy_network())), "CartPole-v1, policy: network 4-2-1"
   )
 })
+
+test_that("a wrong type, or an argument of another type, is refused by name", {
+  played <- rollout_of(1:3)
+  expect_error(plot(played, type = "landscape"),
+               "one of \"returns\", \"trajectory\", \"filmstrip\", not \"landscape\"",
+               class = "gym_error_argument")
+  expect_error(plot(played, type = "trajectory", xlim = 1:2), "`xlim`",
+               class = "gym_error_argument")
+})

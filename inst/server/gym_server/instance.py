@@ -283,6 +283,7 @@ class Instance:
             "action_space": self._lane_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,
             "max_episode_steps": spec.max_episode_steps if spec else None,
+            "render_fps": plain((self._env.metadata or {}).get("render_fps")),
             "lanes": self._lanes,
             "num_envs": None,
             "vectorization_mode": None,

@@ -197,6 +197,7 @@ def test_all_about_an_instance(client, create):
         "env_id": "CartPole-v0",
         "reward_threshold": 195.0,
         "max_episode_steps": 200,
+        "render_fps": 50,
         "lanes": 1,
         "num_envs": None,
         "vectorization_mode": None,
@@ -216,6 +217,7 @@ def test_what_an_environment_does_not_have_is_null(client, faulty):
     about = client.get(faulty("Counting")).json
     assert about["reward_threshold"] is None
     assert about["max_episode_steps"] is None
+    assert about["render_fps"] is None
     assert about["render_mode"] is None
     assert about["seed"] is None
     assert about["needs_reset"] is True

@@ -236,6 +236,7 @@ def test_all_about_lanes(client, create):
         "seed": [1, None, 0],
         "max_episode_steps": 500,
         "reward_threshold": 475.0,
+        "render_fps": 50,
         "render_mode": "rgb_array",
         "steps": 0,
         "needs_reset": True,

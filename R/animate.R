@@ -1,0 +1,225 @@
+#' Make a moving picture of an episode
+#'
+#' Writes an episode as an animated GIF file: of a rollout one that was played with
+#' `frames = TRUE`, of a search or a policy a fresh one, which is played for it. Printed in an
+#' interactive session it opens in the viewer (RStudio's, else the browser), and in a
+#' document of knitr it is part of the page, in one made by LaTeX its [filmstrip][plot.gym_rollout()].
+#'
+#' The episode is shown at the environment's own pace. A GIF counts in hundredths of a second, and
+#' browsers take a delay of less than two for a slow one of ten: so there are at most 50
+#' pictures a second, of faster environments only every second frame, or fewer still.
+#'
+#' @param x A rollout, a search, or a policy as for [rollout()].
+#' @param file The file to write, its name ends in `.gif`. `NULL`, the default, is one among the
+#'   session's temporary files.
+#' @param fps How many steps of the environment make a second, a number; `NULL`, the default,
+#'   leaves it to the environment (50 in CartPole; 30 where it does not say).
+#' @param ... For methods.
+#' @param episode Which episode of the rollout to show, a whole number; the default is the first.
+#' @param width The picture's width in pixels, a whole number; `NULL`, the default, is that of
+#'   the environment's frames (600 in CartPole).
+#' @param every Show every frame, 1, every second one, 2, and so on, at the same pace; the last one
+#'   is always shown. `NULL`, the default, shows as many as the format can at that pace.
+#' @param seed A whole number that fixes the episode played, as in [rollout()].
+#' @param env,max_steps,client What to play in, as in [rollout()].
+#' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (after
+#'   how many steps each picture was taken, integers), `delays` (how long each is shown, in
+#'   hundredths of a second, integers; the last for a second), `size` (width and height in pixels)
+#'   and `stills`, the frames of a filmstrip.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, a rollout
+#'   without frames, an environment that cannot be drawn, or when the package magick is missing;
+#'   those of [rollout()] while it plays.
+#' @seealso [plot.gym_rollout()] for a filmstrip on paper.
+#' @export
+#' @examplesIf gym:::can_start_server() && requireNamespace("magick", quietly = TRUE)
+#' # The pole falls to the right: push the cart to the right.
+#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' played <- rollout("CartPole-v1", follow_pole, seed = 1, frames = TRUE)
+#' animate(played, width = 300)
+#'
+#' \donttest{
+#' # The policy that a search has found, in a fresh episode.
+#' file <- tempfile(fileext = ".gif")
+#' animate(search_random("CartPole-v0", seed = 1), file, seed = 1, every = 2)
+#' }
+animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
+
+#' @export
+animate.default <- function(x, file = NULL, fps = NULL, ...) {
+  abort_argument(x, "a rollout, a search or a policy", "x", rlang::current_env())
+}
+
+#' @rdname animate
+#' @export
+animate.gym_rollout <- function(x, file = NULL, fps = NULL, ..., episode = 1, width = NULL,
+                                every = NULL) {
+  check_dots_empty(...)
+  check_animation(file, fps, width, every)
+  new_animation(episode_frames(x, episode), file, fps, width, every)
+}
+
+#' @rdname animate
+#' @export
+animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
+                               every = NULL) {
+  check_dots_empty(...)
+  check_found(x)
+  animate(
+    x$policy, file, fps, env = x$env %||% x$env_id, seed = seed, max_steps = x$max_steps,
+    width = width, every = every, client = x$client
+  )
+}
+
+#' @rdname animate
+#' @export
+animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL, max_steps = NULL,
+                               width = NULL, every = NULL, client = gym_client()) {
+  check_dots_empty(...)
+  check_animation(file, fps, width, every)
+  played <- rollout(
+    env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE
+  )
+  new_animation(episode_frames(played, 1), file, fps, width, every)
+}
+
+#' @rdname animate
+#' @export
+animate.function <- animate.gym_policy
+
+# All that can be wrong is known before an episode is played.
+check_animation <- function(file, fps, width, every, call = rlang::caller_env()) {
+  check_number(fps, min = 0.1, allow_null = TRUE, call = call)
+  check_count(width, max = 65535, allow_null = TRUE, call = call)
+  check_count(every, allow_null = TRUE, call = call)
+  if (!is.null(file)) {
+    if (!rlang::is_string(file) || !grepl("[.]gif$", file, ignore.case = TRUE)) {
+      abort_argument(file, "the name of a file that ends in .gif, or NULL", "file", call)
+    }
+    if (!dir.exists(dirname(file))) {
+      abort_argument(file, "in a folder that exists", "file", call)
+    }
+  }
+  check_suggested("magick", "write an animation", call)
+}
+
+#' Take the frames of an episode out of a rollout
+#' @noRd
+episode_frames <- function(x, episode, call = rlang::caller_env()) {
+  check_count(episode, max = nrow(x$episodes), call = call)
+  if (is.null(x$frames)) {
+    gym_abort(
+      c("This rollout was played without frames.",
+        i = "`rollout(..., frames = TRUE)` keeps them."),
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
+  }
+  x$frames[[episode]]
+}
+
+new_animation <- function(frames, file, fps, width, every) {
+  plan <- animation_plan(length(frames), fps %||% frame_rate(frames), every)
+  # Whoever interrupts it keeps the file that was there before.
+  made <- tempfile(fileext = ".gif")
+  write_gif(unclass(frames)[plan$steps + 1L], made, plan$delays, width)
+  size <- gif_size(made)
+  if (!is.null(file)) {
+    copy_animation(made, file)
+  }
+  structure(
+    list(
+      file = file %||% made,
+      steps = plan$steps,
+      delays = plan$delays,
+      size = size,
+      stills = pick_stills(frames, 8L)
+    ),
+    class = "gym_animation"
+  )
+}
+
+# What an environment says of itself may be anything.
+frame_rate <- function(frames) {
+  fps <- attr(frames, "fps")
+  if (is_number(fps) && fps > 0) fps else 30
+}
+
+#' Plan which frames to show, and for how long
+#' @param n How many frames there are.
+#' @return A list: `steps`, after which the frames were taken, and `delays`, in hundredths of
+#'   a second. Their rounding does not add up.
+#' @noRd
+animation_plan <- function(n, fps, every = NULL) {
+  every <- every %||% max(1, ceiling(fps / fastest_fps))
+  steps <- unique(as.integer(c(seq(0, n - 1, by = every), n - 1)))
+  delays <- diff(round(100 * steps / fps))
+  list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest_fps), 65535)))
+}
+
+# Browsers slow down what is faster.
+fastest_fps <- 50
+
+copy_animation <- function(made, file, call = rlang::caller_env(2)) {
+  if (!suppressWarnings(file.copy(made, file, overwrite = TRUE))) {
+    abort_argument(file, "a file that can be written", "file", call)
+  }
+  unlink(made)
+}
+
+gif_size <- function(file) {
+  readBin(readBin(file, "raw", 10L)[7:10], "integer", 2L, size = 2L, signed = FALSE,
+          endian = "little")
+}
+
+# Showing it ------------------------------------------------------------------------
+
+#' @export
+print.gym_animation <- function(x, ...) {
+  cat(format(x), "\n", sep = "")
+  if (rlang::is_interactive()) {
+    show_file(x$file)
+  }
+  invisible(x)
+}
+
+#' @export
+format.gym_animation <- function(x, ...) {
+  kilobytes <- if (file.exists(x$file)) {
+    paste0(", ", number_text(ceiling(file.size(x$file) / 1024)), " kB")
+  }
+  paste0(
+    "<gym_animation: ", count_of(length(x$steps), "picture"), " of ",
+    paste(x$size, collapse = " x "), " pixels, ", format(sum(x$delays) / 100), " s",
+    kilobytes, ">\n  ", x$file
+  )
+}
+
+# RStudio's viewer shows only files among the session's temporary ones.
+show_file <- function(file) {
+  seen <- tempfile(fileext = paste0(".", tools::file_ext(file)))
+  file.copy(file, seen)
+  viewer <- getOption("gym.viewer") %||% getOption("viewer") %||% utils::browseURL
+  if (is.function(viewer)) {
+    viewer(seen)
+  }
+}
+
+# knitr's name for the file, in the folder of the document's figures. LaTeX knows no GIF.
+#' @exportS3Method knitr::knit_print
+knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
+  hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)
+  path <- function(ending) {
+    path <- knitr::fig_path(paste0("-", hash, ending), options, number = NULL)
+    dir.create(dirname(path), showWarnings = FALSE, recursive = TRUE)
+    path
+  }
+  if (knitr::is_latex_output()) {
+    shown <- path(".pdf")
+    size <- filmstrip_size(x$stills)
+    grDevices::pdf(shown, width = size[[1L]], height = size[[2L]])
+    tryCatch(draw_filmstrip(x$stills), finally = grDevices::dev.off())
+  } else {
+    shown <- path(".gif")
+    file.copy(x$file, shown, overwrite = TRUE)
+  }
+  knitr::knit_print(knitr::include_graphics(shown), options, ...)
+}

@@ -1,0 +1,92 @@
+# The frames of an episode, as rollout(frames = TRUE) keeps them: PNG files, as a frame
+# of CartPole takes 3 MB as numbers and 3 kB so.
+
+#' Make the frames of an episode
+#' @param files A list of PNG files, each a raw vector.
+#' @param fps How many of them make a second, `NULL` where the environment does not say.
+#' @return An object of class `gym_frames`, a list whose elements unpack when they are
+#'   taken out with `[[`.
+#' @noRd
+new_frames <- function(files, fps = NULL) {
+  structure(files, fps = fps, class = "gym_frames")
+}
+
+frames_of <- function(record, lanes) {
+  lapply(record$blocks, function(block) new_frames(block$frames, lanes$spec$render_fps))
+}
+
+#' @export
+`[.gym_frames` <- function(x, i) new_frames(unclass(x)[i], attr(x, "fps"))
+
+#' @export
+`[[.gym_frames` <- function(x, i) frame_from_png(unclass(x)[[i]])
+
+#' @export
+print.gym_frames <- function(x, ...) {
+  cat(format(x), "\n", sep = "")
+  invisible(x)
+}
+
+#' @export
+format.gym_frames <- function(x, ...) {
+  size <- if (length(x)) paste0(" of ", paste(png_size(unclass(x)[[1L]]), collapse = " x "))
+  fps <- attr(x, "fps")
+  pace <- if (!is.null(fps)) paste0(", ", number_text(fps), " a second")
+  paste0("<gym_frames: ", count_of(length(x), "frame"), size, if (length(x)) " pixels", pace, ">")
+}
+
+# Pictures from the server --------------------------------------------------------
+
+# Whether it can is known before anything is played.
+check_draws <- function(env, call) {
+  label <- environment_label(env)
+  if (!is.null(env$num_envs)) {
+    gym_abort(
+      c(paste0("Frames are kept of an environment without lanes, and this ", label, " has ",
+               count_of(env$num_envs, "lane"), "."),
+        i = paste0("Make it without `num_envs`, or name it by its id.")),
+      class = "gym_error_argument", argument = "env", value = env, call = call
+    )
+  }
+  draws <- inherits(env, "gym_env") &&
+    known_instance(env$client, env$instance_id, call = call)$draws
+  if (!draws) {
+    gym_abort(
+      c(paste0("There are no frames to keep: ", label, " cannot be drawn."),
+        i = "Leave `frames = TRUE` out; `steps = TRUE` keeps what it observes."),
+      class = "gym_error_argument", argument = "frames", value = TRUE, call = call
+    )
+  }
+}
+
+#' Fetch the current frame as a PNG file
+#' @return A raw vector.
+#' @noRd
+png_frame <- function(client, instance_id, call = rlang::caller_env()) {
+  get_answer(client, paste0(instance_route(instance_id), "render/"), call = call)$png
+}
+
+#' Unpack a frame
+#' @return An object of class `gym_frame`, as [env_render()] gives it.
+#' @noRd
+frame_from_png <- function(file) {
+  check_suggested("png", "unpack a frame")
+  values <- png::readPNG(file)
+  shape <- c(dim(values), 1L)[1:3]
+  new_frame(array(as.integer(round(255 * values)), shape))
+}
+
+# Width and height stand in the header of the file.
+png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")
+
+#' Make sure that a package is there which not everybody needs
+#' @noRd
+check_suggested <- function(package, purpose, call = rlang::caller_env()) {
+  if (!requireNamespace(package, quietly = TRUE)) {
+    gym_abort(
+      c(paste0("To ", purpose, " takes the package ", package, "."),
+        i = paste0("`install.packages(\"", package, "\")` installs it.")),
+      class = "gym_error_argument", call = call
+    )
+  }
+}

@@ -1,0 +1,166 @@
+# What a picture of an episode's trajectory shows: the same data for base graphics and
+# ggplot2.
+
+most_panels <- 8L
+# As many as there are colours to tell them apart.
+most_actions <- 6L
+
+#' Compute what a trajectory shows
+#' @param variables Names of columns, `NULL` for the observation's first.
+#' @return A list: `panels` (data frame with one row for each panel from the top: `panel`, its
+#'   label; `kind`, `"line"`, `"stairs"` for whole numbers, or `"choice"` for actions that are one
+#'   of few), `values` (data frame: `panel`, `name` (the column), `step`, `time` (steps taken
+#'   beforehand), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data
+#'   frame `value`, `label`, of the actions, `NULL` where they are not one of few), `actions`
+#'   (labels of the actions' columns, named by them), `length` and `ending`, `"terminated"` or
+#'   `"truncated"`.
+#' @noRd
+trajectory_plot_data <- function(x, episode = 1, variables = NULL, call = rlang::caller_env()) {
+  check_count(episode, max = nrow(x$episodes), call = call)
+  check_steps(x, call)
+  steps <- x$steps[x$steps$episode == episode, ]
+  shown <- trajectory_columns(steps, variables, call)
+  values <- lapply(c(shown$observed, shown$actions), function(name) steps[[name]])
+  names(values) <- c(shown$observed, shown$actions)
+  choices <- action_choices(x, values[shown$actions])
+  labels <- c(
+    observation_labels(x$env_id, shown$observed),
+    rep(action_title(x$env_id, shown$actions), length(shown$actions))
+  )
+  kinds <- vapply(values, function(value) if (all_whole(value)) "stairs" else "line", "")
+  kinds[shown$actions] <- if (!is.null(choices)) "choice" else kinds[shown$actions]
+  first <- !duplicated(labels)
+  n <- nrow(steps)
+  list(
+    panels = data.frame(panel = labels[first], kind = unname(kinds[first])),
+    values = data.frame(
+      panel = rep(labels, each = n), name = rep(names(values), each = n),
+      step = steps$step, time = steps$step - 1L,
+      value = as.numeric(unlist(lapply(values, as.numeric)))
+    ),
+    limits = trajectory_limits(x$env_id, shown$observed, labels),
+    choices = choices,
+    actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
+    length = n,
+    ending = if (steps$terminated[[n]]) "terminated" else "truncated"
+  )
+}
+
+check_steps <- function(x, call) {
+  if (is.null(x$steps)) {
+    gym_abort(
+      c("This rollout was played without its steps being kept.",
+        i = "`rollout(..., steps = TRUE)` keeps them."),
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
+  }
+}
+
+#' Choose the columns to show
+#' @return A list: `observed` and `actions`, names of columns.
+#' @noRd
+trajectory_columns <- function(steps, variables, call) {
+  names <- names(steps)
+  numbers <- vapply(steps, function(column) is.numeric(column) || is.logical(column), NA)
+  is_action <- grepl("^action(_|$)", names)
+  actions <- names[is_action & numbers]
+  possible <- setdiff(names[!is_action & numbers], c("episode", "step"))
+  if (is.null(variables)) {
+    possible <- setdiff(possible, c("reward", "terminated", "truncated"))
+    observed <- first_few(possible, most_panels, "numbers of the observation", "variables")
+  } else {
+    unknown <- setdiff(variables, possible)
+    if (!is.character(variables) || length(unknown)) {
+      must <- paste0(
+        "names of columns of the steps (", text_list(possible), ")"
+      )
+      abort_argument(variables, must, "variables", call)
+    }
+    observed <- unique(variables)
+  }
+  list(observed = observed, actions = first_few(actions, most_actions, "numbers of the action"))
+}
+
+first_few <- function(names, most, what, argument = NULL) {
+  if (length(names) <= most) {
+    return(names)
+  }
+  rlang::inform(
+    c(paste0("Showing the first ", most, " of ", length(names), " ", what, "."),
+      i = if (!is.null(argument)) paste0("`", argument, " = ` chooses others.")),
+    class = "gym_message_variables"
+  )
+  names[seq_len(most)]
+}
+
+text_list <- function(names, most = 10L) {
+  more <- if (length(names) > most) ", ..."
+  paste0(paste0("\"", utils::head(names, most), "\"", collapse = ", "), more)
+}
+
+# Actions ---------------------------------------------------------------------------
+
+# Of one whole number out of few; as an environment's documentation names them, where it
+# does.
+action_choices <- function(x, actions) {
+  value <- if (length(actions) == 1L) as.numeric(actions[[1L]])
+  if (is.null(value) || !all_whole(value)) {
+    return(NULL)
+  }
+  meaning <- action_meanings[[environment_family(x$env_id), exact = TRUE]]
+  # A function knows of no space.
+  space <- if (!is.function(x$policy)) x$policy$action_space
+  n <- space$n %||% length(meaning)
+  start <- space$start %||% 0L
+  if (length(meaning) > 1L && n == length(meaning) && all(value %in% (start + seq_len(n) - 1L))) {
+    data.frame(value = start + seq_len(n) - 1L, label = meaning)
+  } else if (diff(range(value)) < most_choices) {
+    value <- seq(min(value), max(value))
+    data.frame(value = value, label = as.character(value))
+  }
+}
+
+most_choices <- 10L
+
+all_whole <- function(value) all(is.finite(value)) && all(value == round(value))
+
+action_title <- function(env_id, names) {
+  if (length(names) != 1L) {
+    return("actions"[length(names) > 0L])
+  }
+  family <- environment_family(env_id)
+  part <- action_meanings[[family, exact = TRUE]]
+  unit <- action_units[[family, exact = TRUE]]
+  if (length(part) != 1L) {
+    return("action")
+  }
+  paste0("action: ", part, if (!is.null(unit)) paste0(" (", unit, ")"))
+}
+
+# Limits -----------------------------------------------------------------------------
+
+trajectory_limits <- function(env_id, observed, labels) {
+  limits <- episode_limits[[environment_family(env_id), exact = TRUE]]
+  rows <- lapply(intersect(observed, names(limits)), function(name) {
+    limit <- limits[[name]]
+    data.frame(
+      panel = labels[[match(name, observed)]], at = limit$at, kind = limit$kind, text = limit$text
+    )
+  })
+  none <- data.frame(
+    panel = character(), at = numeric(), kind = character(), text = character()
+  )
+  do.call(rbind, c(list(none), rows))
+}
+
+# A limit far from what happened would press it flat: of the room, a tenth must remain.
+near_limits <- function(at, value) {
+  seen <- range(value, finite = TRUE)
+  at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
+}
+
+trajectory_subtitle <- function(x, episode, data) {
+  row <- x$episodes[episode, ]
+  paste0("episode ", row$episode, ": return ", number_text(row$return), ", ", data$ending,
+         " after ", count_of(data$length, "step"))
+}

@@ -1,0 +1,143 @@
+test_that("the file has a picture for each frame, at the environment's own pace", {
+  skip_if_not_installed("magick")
+  played <- short_rollout()
+  file <- withr::local_tempfile(fileext = ".gif")
+  animation <- animate(played, file)
+  expect_s3_class(animation, "gym_animation")
+  expect_identical(animation$file, file)
+  expect_identical(animation$steps, 0:10)
+  # 50 a second, the last for a whole one.
+  expect_identical(animation$delays, c(rep(2L, 10), 100L))
+  expect_identical(animation$size, c(600L, 400L))
+  read <- magick::image_coalesce(magick::image_read(file))
+  expect_length(read, 11)
+  drawn <- function(image) as.integer(magick::image_data(image, "rgb"))
+  frame <- magick::image_read(unclass(played$frames[[1]])[[11]])
+  expect_identical(drawn(read[11]), drawn(frame))
+})
+
+test_that("width, every and fps do what they say, and a file that is there is replaced", {
+  skip_if_not_installed("magick")
+  played <- short_rollout()
+  file <- withr::local_tempfile(fileext = ".gif")
+  writeLines("old", file)
+  animation <- animate(played, file, fps = 10, width = 150, every = 4)
+  expect_identical(animation$steps, c(0L, 4L, 8L, 10L))
+  expect_identical(animation$delays, c(40L, 40L, 20L, 100L))
+  expect_identical(animation$size, c(150L, 100L))
+  expect_length(magick::image_read(file), 4)
+  expect_identical(gif_size(file), c(150L, 100L))
+})
+
+test_that("no picture is shorter than browsers allow, at the same pace", {
+  fast <- animation_plan(101, fps = 100)
+  expect_identical(fast$steps, as.integer(seq(0, 100, 2)))
+  expect_identical(unique(fast$delays[1:50]), 2L)
+  insisted <- animation_plan(101, fps = 100, every = 1)
+  expect_length(insisted$steps, 101)
+  expect_true(all(insisted$delays >= 2))
+  # 30 a second are no whole number of hundredths, but 3 of them make a tenth.
+  thirty <- animation_plan(31, fps = 30)
+  expect_identical(sum(thirty$delays[1:30]), 100L)
+  expect_identical(animation_plan(1, fps = 50), list(steps = 0L, delays = 100L))
+})
+
+test_that("a 200-step CartPole stays well under a megabyte", {
+  skip_if_not_installed("magick")
+  balance <- function(observation) as.integer(observation[, 3] + observation[, 4] > 0)
+  played <- rollout("CartPole-v0", balance, seed = 2, frames = TRUE, client = test_client())
+  expect_identical(played$episodes$length, 200L)
+  animation <- animate(played)
+  expect_length(animation$steps, 201)
+  expect_lt(file.size(animation$file), 5e5)
+})
+
+test_that("an episode can be chosen", {
+  skip_if_not_installed("magick")
+  played <- rollout("CartPole-v1", policy_random(), 2, seed = 1, frames = TRUE,
+                    client = test_client())
+  expect_length(animate(played, episode = 2, width = 60)$steps, played$episodes$length[2] + 1)
+  expect_error(animate(played, episode = 3), "`episode` must be", class = "gym_error_argument")
+})
+
+test_that("a search plays its policy in a fresh episode, and so do policies", {
+  skip_if_not_installed("magick")
+  client <- test_client()
+  search <- search_random("CartPole-v1", rounds = 2, episodes = 1, max_steps = 5, seed = 1,
+                          client = client)
+  animation <- animate(search, seed = 3, width = 60)
+  fresh <- rollout("CartPole-v1", search$policy, max_steps = 5, seed = 3, frames = TRUE,
+                   client = client)
+  expect_identical(animation$stills, pick_stills(fresh$frames[[1]], 8))
+  set.seed(1)
+  state <- .Random.seed
+  again <- animate(search$policy, env = "CartPole-v1", max_steps = 5, seed = 3, width = 60,
+                   client = client)
+  expect_identical(again$stills, animation$stills)
+  expect_identical(.Random.seed, state)
+  right <- function(observation) rep(1L, nrow(observation))
+  expect_identical(
+    animate(right, env = "CartPole-v1", seed = 1, max_steps = 3, width = 60, client = client)$steps,
+    0:3
+  )
+})
+
+test_that("what cannot be animated says why, before anything is played", {
+  skip_if_not_installed("magick")
+  plain <- rollout("CartPole-v1", policy_random(), seed = 1, client = test_client())
+  expect_error(animate(plain), "frames = TRUE", class = "gym_error_argument")
+  expect_error(animate(3), "a rollout, a search or a policy", class = "gym_error_argument")
+  bad <- function(..., message) {
+    expect_error(animate(policy_random(), ..., env = "CartPole-v1", client = no_client()), message,
+                 class = "gym_error_argument")
+  }
+  bad("cartpole.png", message = "ends in .gif")
+  bad(file.path(tempdir(), "not there", "a.gif"), message = "folder that exists")
+  bad(fps = 0, message = "`fps`")
+  bad(width = 0, message = "`width`")
+  bad(every = 0.5, message = "`every`")
+  bad(wdith = 3, message = "`wdith`")
+})
+
+test_that("it prints where it is, and opens where somebody looks", {
+  skip_if_not_installed("magick")
+  animation <- animate(short_rollout(max_steps = 3), width = 60)
+  seen <- NULL
+  withr::local_options(gym.viewer = NULL, viewer = function(url, ...) seen <<- url)
+  expect_output(print(animation), "4 pictures of 60 x 40 pixels, 1.06 s", fixed = TRUE)
+  expect_null(seen)
+  rlang::with_interactive(expect_output(print(animation), animation$file, fixed = TRUE))
+  expect_identical(tools::md5sum(seen)[[1]], tools::md5sum(animation$file)[[1]])
+  unlink(animation$file)
+  expect_output(print(animation), animation$file, fixed = TRUE)
+})
+
+knitted <- function(animation, to) {
+  folder <- withr::local_tempdir(.local_envir = parent.frame())
+  withr::local_dir(folder)
+  document <- new.env()
+  document$animation <- animation
+  old <- knitr::opts_knit$get("rmarkdown.pandoc.to")
+  knitr::opts_knit$set(rmarkdown.pandoc.to = to)
+  on.exit(knitr::opts_knit$set(rmarkdown.pandoc.to = old))
+  text <- knitr::knit(
+    text = c("```{r pole, out.width='50%'}", "animation", "animation", "```"), envir = document,
+    quiet = TRUE
+  )
+  list(text = text, files = file.path(folder, list.files(folder, recursive = TRUE)))
+}
+
+test_that("a page of knitr has the animation, and LaTeX its filmstrip", {
+  skip_if_not_installed("magick")
+  skip_if_not_installed("png")
+  skip_if_not_installed("knitr")
+  animation <- animate(short_rollout(max_steps = 3), width = 60)
+  page <- knitted(animation, "html")
+  expect_match(page$text, "figure/pole-[0-9a-f]{8}[.]gif")
+  expect_match(page$text, "50%")
+  expect_identical(tools::md5sum(page$files)[[1]], tools::md5sum(animation$file)[[1]])
+  paper <- knitted(animation, "latex")
+  expect_match(paper$text, "figure/pole-[0-9a-f]{8}")
+  expect_match(paper$files, "[.]pdf$")
+  expect_gt(file.size(paper$files), 1000)
+})

@@ -1,0 +1,75 @@
+frames_of_length <- function(n) new_frames(lapply(seq_len(n), function(i) as.raw(i)))
+
+test_that("stills are evenly apart, the first and the last among them", {
+  stills <- pick_stills(frames_of_length(201), 8)
+  expect_identical(stills$steps, c(0L, 29L, 57L, 86L, 114L, 143L, 171L, 200L))
+  expect_true(all(abs(diff(stills$steps) - 200 / 7) <= 1))
+  expect_identical(unlist(unclass(stills$frames)), as.raw(stills$steps + 1))
+  expect_identical(pick_stills(frames_of_length(3), 8)$steps, 0:2)
+  expect_identical(pick_stills(frames_of_length(30), 2)$steps, c(0L, 29L))
+  expect_identical(pick_stills(frames_of_length(30), 1)$steps, 0L)
+})
+
+test_that("blank borders are cut off, the same of all", {
+  blank <- array(255L, c(100, 200, 3))
+  one <- two <- blank
+  one[41:45, 21:30, 1] <- 0L
+  two[56:60, 91:100, 2] <- 0L
+  cropped <- crop_blank(list(one, two))
+  # A twentieth stays around what is drawn.
+  expect_identical(cropped[[1]], one[36:65, 11:110, ])
+  expect_identical(cropped[[2]], two[36:65, 11:110, ])
+  expect_identical(crop_blank(list(blank)), list(blank))
+  all_over <- blank
+  all_over[c(1, 100), c(1, 200), ] <- 0L
+  expect_identical(crop_blank(list(all_over)), list(all_over))
+})
+
+test_that("a smaller picture has the mean of each square", {
+  picture <- array(1:36, c(4, 3, 3))
+  small <- shrink(picture, 2L)
+  expect_identical(dim(small), c(2L, 1L, 3L))
+  expect_identical(small[2, 1, 3], as.integer(round(mean(picture[3:4, 1:2, 3]))))
+  expect_identical(shrink(picture, 1L), picture)
+})
+
+test_that("pictures are arranged so that they are large and fit", {
+  wide <- arrange_stills(8, 1.5, c(12, 1.3))
+  expect_identical(c(wide$columns, wide$rows), c(8, 1))
+  square <- arrange_stills(8, 1.5, c(7, 5))
+  expect_identical(square$columns * square$rows, 8)
+  for (page in list(c(7, 5), c(4, 3), c(2, 6))) {
+    for (n in c(1, 2, 7, 8, 30)) {
+      grid <- arrange_stills(n, 1.5, page)
+      expect_gte(grid$columns * grid$rows, n)
+      expect_true(grid$columns * grid$cell[1] <= page[1] + 1e-9)
+      expect_true(grid$rows * grid$cell[2] <= page[2] + 1e-9)
+    }
+  }
+})
+
+test_that("a filmstrip plots on any device, and leaves par alone", {
+  skip_if_not_installed("png")
+  played <- short_rollout()
+  local_pdf(width = 4, height = 3)
+  graphics::plot.new()
+  before <- plot_parameters()
+  expect_identical(expect_invisible(plot(played, type = "filmstrip")), played)
+  plot(played, type = "filmstrip", n = 30, main = "mine")
+  plot(played, type = "filmstrip", n = 1)
+  expect_identical(plot_parameters(), before)
+  file <- withr::local_tempfile(fileext = ".png")
+  grDevices::png(file, 300, 200)
+  plot(played, type = "filmstrip", n = 4)
+  grDevices::dev.off()
+  drawn <- png::readPNG(file)
+  # The poles.
+  expect_gt(mean(drawn[, , 1] - drawn[, , 3] > 0.2), 0.001)
+})
+
+test_that("a rollout without frames says how to get them", {
+  plain <- rollout("CartPole-v1", policy_random(), seed = 1, client = test_client())
+  expect_error(plot(plain, type = "filmstrip"), "frames = TRUE", class = "gym_error_argument")
+  expect_error(plot(short_rollout(), type = "filmstrip", n = 0), "`n`",
+               class = "gym_error_argument")
+})

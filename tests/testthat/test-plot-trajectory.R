@@ -1,0 +1,49 @@
+drawable <- function() {
+  numbers <- fake_environment(
+    observation_space = box_space(rep(-1, 3), rep(1, 3)),
+    action_space = box_space(c(-1, -1), c(1, 1))
+  )
+  one_step <- fake_environment(ends = function(seed, step, action) TRUE)
+  endless <- fake_environment(observation_space = box_space(-1, 1, 1L))
+  played <- lapply(list(fake_environment(), numbers, one_step, endless), rollout,
+                   policy_random(), seed = 1, steps = TRUE)
+  odd <- played[[1]]
+  odd$steps$obs_1 <- c(NaN, Inf, -Inf)[seq_len(nrow(odd$steps))]
+  odd$steps$obs_2[1] <- NA
+  c(played, list(odd))
+}
+
+test_that("any trajectory plots, returns itself and leaves par and R's generator alone", {
+  for (size in list(c(7, 5), c(4, 3))) {
+    local_pdf(width = size[1], height = size[2])
+    graphics::plot.new()
+    before <- plot_parameters()
+    set.seed(1)
+    state <- .Random.seed
+    for (played in drawable()) {
+      expect_silent(plot(played, type = "trajectory"))
+      expect_identical(expect_invisible(plot(played, type = "trajectory", main = "mine")), played)
+    }
+    expect_identical(.Random.seed, state)
+    expect_identical(plot_parameters(), before)
+  }
+})
+
+test_that("par is put back after an error, too", {
+  local_pdf(width = 0.4, height = 0.4)
+  before <- plot_parameters()
+  expect_error(plot(drawable()[[1]], type = "trajectory"))
+  expect_identical(plot_parameters(), before)
+})
+
+test_that("CartPole plots with all of its labels", {
+  local_pdf(width = 4, height = 3)
+  expect_silent(plot(short_rollout(), type = "trajectory"))
+})
+
+test_that("panels have their places, the last one a row of its own where one is free", {
+  expect_identical(arrange_panels(1), matrix(1L))
+  expect_identical(arrange_panels(2), matrix(1:2))
+  expect_identical(arrange_panels(4), matrix(c(1L, 3L, 2L, 4L), 2))
+  expect_identical(arrange_panels(5), matrix(c(1L, 3L, 5L, 2L, 4L, 5L), 3))
+})
