@@ -30,7 +30,7 @@
 #' @param target The mean return of a round that ends a search, a number. `NULL`, the
 #'   default, is the environment's own reward threshold; one that has none needs a target.
 #' @param seeds The seeds, different whole numbers; the default is 1 to 100. With CartPole
-#'   each takes about a quarter of a second.
+#'   each takes about a third of a second.
 #' @return An object of class `gym_searches`, which [print()], [summary()], [as.data.frame()]
 #'   and [plot()][plot.gym_searches()] know; a list with the elements
 #'   \describe{

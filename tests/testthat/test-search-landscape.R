@@ -35,10 +35,16 @@ test_that("all networks play the same episodes", {
 })
 
 test_that("a point's return is that of its network", {
-  env <- fake_environment(reward = function(seed, step, action) action * step)
+  env <- fake_environment(
+    reward = function(seed, step, action) action * 2^step,
+    ends = function(seed, step, action) step == 8L
+  )
   search <- found(env)
   landscape <- search_landscape(search, size = 3, episodes = 2, span = 2, seed = 5)
-  for (i in c(1, 6, 9)) {
+  # The two directions differ, or it would not matter which is which.
+  field <- matrix(landscape$grid$mean_return, 3)
+  expect_false(identical(field, t(field)))
+  for (i in 1:9) {
     point <- landscape$grid[i, ]
     policy <- search$policy
     policy$weights <- Map(
@@ -47,7 +53,7 @@ test_that("a point's return is that of its network", {
     )
     returns <- vapply(landscape$seeds, function(seed) {
       observation <- env$reset(seed = seed)
-      sum(vapply(1:3, function(step) {
+      sum(vapply(1:8, function(step) {
         out <- env$step(act(policy, observation))
         observation <<- out$observation
         out$reward
