@@ -4,17 +4,39 @@
 #' line, the target as a dashed line. Episodes of a round that have almost the same
 #' return are set side by side.
 #'
-#' @param x A search, as [search_random()] returns it.
+#' With another `type` it shows the network that was found, or plays the networks around it
+#' and shows their landscape, which takes some seconds.
+#'
+#' `autoplot()` draws the same with ggplot2, where that is installed.
+#'
+#' @param x,object A search, as [search_random()] returns it.
+#' @param type What to show: `"returns"`, the default; `"network"`, the best policy, as
+#'   [plot.gym_policy_network()]; or `"landscape"`, which plays [search_landscape()].
 #' @param main The title; the default says what was searched and what came of it.
 #' @param xlab,ylab The axes' labels.
-#' @param ... Further arguments of [plot()][graphics::plot.default()], such as `ylim`.
-#' @return `x`, invisibly.
+#' @param ... For the returns further arguments of [plot()][graphics::plot.default()], such as
+#'   `ylim`; for the others the arguments of these functions and their plots, such as
+#'   `size` and `seed` of the landscape.
+#' @return `x`, invisibly; for a landscape what [search_landscape()] returns, invisibly, so
+#'   that it need not be played again; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when no round was played to its end.
 #' @export
 #' @examplesIf gym:::can_start_server()
-#' plot(search_random("CartPole-v0", seed = 1))
-plot.gym_search <- function(x, main = search_title(x), xlab = "round",
-                            ylab = "return (reward summed over an episode)", ...) {
+#' search <- search_random("CartPole-v0", seed = 1)
+#' plot(search)
+#' plot(search, type = "network")
+plot.gym_search <- function(x, type = c("returns", "network", "landscape"), main = NULL,
+                            xlab = "round", ylab = "return (reward summed over an episode)", ...) {
+  type <- check_choice(type[1L], c("returns", "network", "landscape"), arg = "type")
+  if (type == "network") {
+    check_found(x)
+    plot(x$policy, main = main, ...)
+    return(invisible(x))
+  }
+  if (type == "landscape") {
+    return(plot_landscape(x, main = main, ...))
+  }
+  main <- main %||% search_title(x)
   data <- search_plot_data(x)
   open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n"), list(...))
   round_axis(data$means$round)
@@ -85,4 +107,35 @@ search_legend <- function(data) {
     pch = c(16L, 15L, NA)[shown],
     lty = c(NA, "solid", "dashed")[shown]
   )
+}
+
+#' @rdname plot.gym_search
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_search <- function(object, type = c("returns", "network", "landscape"), ...) {
+  type <- check_choice(type[1L], c("returns", "network", "landscape"), arg = "type")
+  if (type == "network") {
+    check_found(object)
+    return(autoplot.gym_policy_network(object$policy, ...))
+  }
+  if (type == "landscape") {
+    return(autoplot.gym_landscape(search_landscape(object, ...)))
+  }
+  data <- search_plot_data(object)
+  rounds <- unique(round(pretty(c(1, max(data$means$round)))))
+  plot <- ggplot2::ggplot(data$points, ggplot2::aes(.data$x, .data$return)) +
+    ggplot2::geom_point(colour = okabe_ito$sky_blue, alpha = 0.8) +
+    ggplot2::geom_line(ggplot2::aes(.data$round, .data$mean_return), data$means,
+                       colour = okabe_ito$blue, linewidth = 0.8) +
+    ggplot2::geom_point(ggplot2::aes(.data$round, .data$mean_return), data$means,
+                        colour = okabe_ito$blue, shape = 15) +
+    ggplot2::scale_x_continuous(breaks = rounds[rounds >= 1]) +
+    ggplot2::labs(title = search_title(object), x = "round",
+                  y = "return (reward summed over an episode)",
+                  subtitle = "points: episodes; line: mean of the round; dashed: target")
+  if (is.null(data$target)) {
+    plot
+  } else {
+    plot + ggplot2::geom_hline(yintercept = data$target, colour = okabe_ito$vermillion,
+                               linetype = "dashed", linewidth = 0.8)
+  }
 }

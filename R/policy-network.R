@@ -47,14 +47,16 @@
 #' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and
 #'   [search_random()]; a list with the elements `sizes` (integers), `activation`
 #'   (strings, one for each layer), `weights` (a list of matrices),
-#'   `observation_space` and `action_space` (spaces, `NULL` until it is played).
+#'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
+#'   string), all `NULL` until it is played.
 #' @section Errors: `gym_error_argument` when sizes, activations and weights do not
 #'   fit each other, or a package is missing; from [act()] when the observation
 #'   does not have as many numbers as there are inputs.
 #' @references The network and the way its weights are drawn are those of the post
 #'   "Artificial Intelligence in R (I)" (2018), whose code computes the activations
 #'   with the package sigmoid.
-#' @seealso [policy_random()]
+#' @seealso [plot()][plot.gym_policy_network()] draws a network, [decision_map()] what it
+#'   does; [policy_random()].
 #' @export
 #' @examples
 #' set.seed(1)
@@ -82,7 +84,8 @@ policy_network <- function(sizes = c(4, 2, 1), activation = c("tanh", "logistic"
       activation = activation,
       weights = weights,
       observation_space = NULL,
-      action_space = NULL
+      action_space = NULL,
+      env_id = NULL
     ),
     class = c("gym_policy_network", "gym_policy")
   )
@@ -249,6 +252,7 @@ policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env
   check_outputs(policy, env, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
+  policy["env_id"] <- list(env$spec$id)
   policy
 }
 

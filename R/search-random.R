@@ -88,7 +88,8 @@
 #'   `gym_error_connection` for instance.
 #' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
-#' @seealso [gym_search] for what to do with the result.
+#' @seealso [gym_search] for what to do with the result; [search_repeat()] for how long such
+#'   searches take.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
@@ -173,14 +174,14 @@ inform_interrupted <- function(finished, rounds) {
 
 # Of the error in the middle it keeps classes and fields, so that whoever waits for
 # a lost connection need not know that it was lost in a search.
-abort_search <- function(cnd, result, call) {
+abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds), "round")) {
   own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
            "use_cli_format")
   fields <- unclass(cnd)[setdiff(names(cnd), own)]
   rlang::exec(
     gym_abort,
     c(
-      paste0("The search ended early, after ", count_of(nrow(result$rounds), "round"), "."),
+      paste0("The search ended early, after ", played, "."),
       i = "What was played is the element `result` of this condition."
     ),
     class = c("gym_error_search", grep("^gym_error_", class(cnd), value = TRUE)),

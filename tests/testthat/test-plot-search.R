@@ -1,8 +1,3 @@
-local_device <- function(frame = parent.frame()) {
-  grDevices::pdf(NULL)
-  withr::defer(grDevices::dev.off(), envir = frame)
-}
-
 search_of <- function(returns, rounds, ...) {
   search_random(
     scripted_environment(returns), rounds = rounds, episodes = length(returns) / rounds, ...
@@ -79,4 +74,16 @@ test_that("the legend fits a narrow plot and keeps above the data", {
   expect_gte(placed$left + 1e-9, sides[1])
   expect_lte(placed$right - 1e-9, sides[2])
   expect_gt(placed$height - 0.5 * graphics::par("csi"), graphics::grconvertY(1, "npc", "inches"))
+})
+
+test_that("ggplot2 draws the same episodes, means and target", {
+  skip_if_not_installed("ggplot2")
+  search <- search_of(c(1, 5, 9, 2, 2, 2), rounds = 2, target = 20)
+  plot <- ggplot2::autoplot(search)
+  expect_identical(ggplot2::layer_data(plot, 1L)$y, search$episodes$return)
+  expect_identical(ggplot2::layer_data(plot, 2L)$y, search$rounds$mean_return)
+  expect_identical(ggplot2::layer_data(plot, 4L)$yintercept, 20)
+  local_device()
+  expect_silent(print(plot))
+  expect_silent(print(ggplot2::autoplot(search, type = "network")))
 })

@@ -1,0 +1,272 @@
+#' Map what a policy does
+#'
+#' Asks a policy what it does on a grid over two parts of the observation, the others held
+#' where they are put. [plot()][plot.gym_decision_map()] shows it, which
+#' `plot(policy, env, x = , y = )` does in one call. Nothing is played, unless
+#' `path = TRUE`.
+#'
+#' # What is shown
+#'
+#' - A network with one output and two actions: the output, brought to the range from 0 to
+#'   1, which is rounded to the action; the border between the actions is at one half.
+#' - Any other policy with discrete actions: the action that is taken. A function is asked
+#'   as in [act()].
+#' - Actions that are a Box: the action, or of several numbers the one named by `action`.
+#'
+#' # Ranges
+#'
+#' `xlim` and `ylim` where they are given. Otherwise CartPole's parts have the ranges in
+#' which an episode goes on, velocities those that balanced and falling poles reach; other
+#' parts have their bounds in the observation space, and those without bounds need a path,
+#' whose range is taken.
+#'
+#' @param policy The policy: a network, made by [policy_network()] or found by a search, or a
+#'   function of many observations as for [rollout()].
+#' @param env The environment, by which observations have names and actions a meaning: an id,
+#'   such as `"CartPole-v1"`, what [gym_wrap()] returns, or an environment made by
+#'   [gym_make()], which is not touched. `NULL`, the default, for a network that was played
+#'   already, or whose inputs may be named `obs_1`, `obs_2`, ...
+#' @param x,y The two parts of the observation to map: their names, such as
+#'   `"pole_angle"`, or numbers, the first being 1. Needed unless there are just two.
+#' @param at Where the other parts are held: a numeric vector with their names, such as
+#'   `c(cart_position = 1)`. Those not named, by default all, are held at 0, or where 0 is
+#'   out of their bounds in the middle.
+#' @param path Episodes to show on the map: what [rollout()] returned with `steps = TRUE`, or
+#'   a data frame of steps like its own; `TRUE` to play one episode of the policy in `env`;
+#'   `NULL`, the default, for none. On its way also the other parts change, which the map
+#'   holds still.
+#' @param xlim,ylim The ranges, numeric vectors of length 2, or `NULL`, the default.
+#' @param action Which number of an action that is a Box of several to map, a whole number
+#'   from 1, the default.
+#' @param size How many points the grid has in each direction, a whole number of at least 2;
+#'   the default is 101.
+#' @param seed A whole number that fixes the episode played with `path = TRUE` and leaves the
+#'   session's generator as it was, or `NULL`, the default, to draw from the session's
+#'   generator.
+#' @param client The client of the server that is asked about an environment named by its id;
+#'   the default is the session's own, [gym_client()].
+#' @return An object of class `gym_decision_map`, which [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_decision_map()] know; a list with the elements
+#'   \describe{
+#'     \item{grid}{A data frame with one row for each point: the two parts, under their
+#'       names, and `output` (double, from 0 to 1, where `kind` is `"output"`) or `action`
+#'       (integer or double). `as.data.frame()` gives it.}
+#'     \item{x, y}{The names of the two parts, strings.}
+#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"` or `"value"`.}
+#'     \item{at}{Where the other parts are held, a named numeric vector.}
+#'     \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
+#'     \item{actions}{The names of the actions, strings; of a Box the name of the number.}
+#'     \item{limits}{The bounds of an action that is a Box, otherwise `NULL`.}
+#'     \item{env_id, policy}{The environment's id, `NULL` where it is unknown, and the
+#'       policy.}
+#'   }
+#' @section Errors: `gym_error_argument` when there is nothing to map (a policy that draws its
+#'   actions, observations that are not at least two numbers, actions that are neither
+#'   discrete nor a Box), a name is none of the observation's, or a range is neither known
+#'   nor given.
+#' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees (0.2095)
+#'   in angle, see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
+#' @export
+#' @examples
+#' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
+#' map <- decision_map(follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3))
+#' map
+#' plot(map)
+#'
+#' @examplesIf gym:::can_start_server()
+#' policy <- search_random("CartPole-v0", seed = 1)$policy
+#' plot(policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity")
+#' map <- decision_map(policy, "CartPole-v0", "pole_angle", "pole_angular_velocity",
+#'                     path = TRUE, seed = 1)
+#' head(as.data.frame(map))
+decision_map <- function(policy, env = NULL, x = NULL, y = NULL, at = NULL, path = NULL,
+                         xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
+                         client = gym_client()) {
+  check_policy(policy)
+  check_mappable(policy)
+  check_limits(xlim)
+  check_limits(ylim)
+  check_count(action)
+  check_count(size, min = 2)
+  check_seed(seed)
+  place <- mapped_place(policy, env, client)
+  observed <- mapped_observation(place)
+  axes <- mapped_axes(observed, x, y)
+  if (isTRUE(path)) {
+    path <- play_path(policy, env, place, seed, client)
+  }
+  way <- if (!is.null(path)) path_points(path, observed$names[axes])
+  xlim <- xlim %||% mapped_range(observed, axes[[1L]], way$x, "xlim")
+  ylim <- ylim %||% mapped_range(observed, axes[[2L]], way$y, "ylim")
+  held <- held_at(observed, axes, at)
+  points <- expand.grid(
+    x = seq(xlim[[1L]], xlim[[2L]], length.out = size),
+    y = seq(ylim[[1L]], ylim[[2L]], length.out = size),
+    KEEP.OUT.ATTRS = FALSE
+  )
+  values <- matrix(held, nrow(points), length(held), byrow = TRUE)
+  values[, axes] <- as.matrix(points)
+  decided <- decide(place, values, action)
+  grid <- stats::setNames(points, observed$names[axes])
+  grid[[if (decided$kind == "output") "output" else "action"]] <- decided$values
+  structure(
+    list(
+      grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
+      kind = decided$kind, at = held[-axes], path = way, actions = decided$actions,
+      limits = decided$limits, env_id = place$env_id, policy = place$policy
+    ),
+    class = "gym_decision_map"
+  )
+}
+
+check_mappable <- function(policy, call = rlang::caller_env()) {
+  if (inherits(policy, "gym_policy_random")) {
+    gym_abort(
+      "There is nothing to map: a random policy draws its actions, whatever it observes.",
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+}
+
+check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  two <- is.numeric(x) && length(x) == 2L && all(is.finite(x))
+  if (!is.null(x) && !(two && x[[1L]] < x[[2L]])) {
+    abort_argument(x, "two numbers, the lower first, or NULL", arg, call)
+  }
+}
+
+# Where it is mapped --------------------------------------------------------------
+
+#' Find out where a policy decides
+#' @return A list: `policy`, bound where that is possible, `observation_space`,
+#'   `action_space`, `env_id`, each `NULL` where it is unknown.
+#' @noRd
+mapped_place <- function(policy, env, client, call = rlang::caller_env()) {
+  if (!is.null(env)) {
+    known <- known_spaces(env, client, call)
+    policy <- policy_bind(policy, known, call = call)
+    return(list(
+      policy = policy, observation_space = known$observation_space,
+      action_space = known$action_space, env_id = known$spec$id
+    ))
+  }
+  if (!inherits(policy, "gym_policy_network")) {
+    gym_abort(
+      c(paste0("What is observed and done is known of networks that were played, not of ",
+               policy_text(policy), "."),
+        i = "Name the environment, as in `plot(policy, \"CartPole-v1\", x = , y = )`."),
+      class = "gym_error_argument", argument = "env", value = env, call = call
+    )
+  }
+  c(list(policy = policy), policy[c("observation_space", "action_space", "env_id")])
+}
+
+#' Ask what is observed and done in an environment
+#'
+#' One that is named by its id is made for the question and closed.
+#' @return A list: `observation_space` and `action_space` of a lane, and `spec`, as
+#'   [policy_bind()] takes them.
+#' @noRd
+known_spaces <- function(env, client, call = rlang::caller_env()) {
+  check_environment(env, call = call)
+  if (is.character(env) || inherits(env, "gym_wrapped")) {
+    env <- gym_make(env, client = client)
+    on.exit(close_made(env, finished = FALSE))
+  }
+  list(
+    observation_space = env$single_observation_space %||% env$observation_space,
+    action_space = env$single_action_space %||% env$action_space,
+    spec = env$spec
+  )
+}
+
+bind_named <- function(policy, env, client, call = rlang::caller_env()) {
+  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
+}
+
+# What is done --------------------------------------------------------------------
+
+#' Ask what is done on each of many observations
+#' @param values A matrix with an observation in each row.
+#' @return A list: `kind`, `values`, `actions`, `limits`, as [decision_map()] tells.
+#' @noRd
+decide <- function(place, values, action, call = rlang::caller_env()) {
+  space <- place$action_space
+  outputs <- if (inherits(place$policy, "gym_policy_network")) {
+    network_outputs(place$policy, values, call)
+  }
+  if (inherits(space, "gym_space_box")) {
+    return(decide_value(place, values, outputs, action, call))
+  }
+  if (!is.null(space) && !inherits(space, "gym_space_discrete")) {
+    gym_abort(
+      paste0("A decision map shows actions that are discrete or a Box, not of ", format(space),
+             "."),
+      class = "gym_error_argument", argument = "policy", value = place$policy, call = call
+    )
+  }
+  n <- space$n %||% max(2L, ncol(outputs))
+  actions <- action_names(place$env_id, n, space$start %||% 0L)
+  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L) {
+    check_range(place$policy, call)
+    unit <- unit_outputs(outputs[, 1L], output_activation(place$policy))
+    return(list(kind = "output", values = unit, actions = actions))
+  }
+  chosen <- as.integer(policy_actions(place, values, outputs))
+  list(kind = "choice", values = chosen, actions = actions)
+}
+
+decide_value <- function(place, values, outputs, action, call) {
+  space <- place$action_space
+  n <- prod(space$shape)
+  check_count(action, max = n, call = call)
+  numbers <- lane_numbers(policy_actions(place, values, outputs))
+  limits <- c(space$low[[action]], space$high[[action]])
+  list(
+    kind = "value", values = as.numeric(numbers[, action]),
+    actions = action_parts(place$env_id, n)[[action]],
+    limits = if (all(is.finite(limits))) limits
+  )
+}
+
+# A function is asked as while it plays.
+policy_actions <- function(place, values, outputs) {
+  if (!is.null(outputs)) {
+    return(network_action(place$action_space, outputs, place$policy, one = FALSE))
+  }
+  shape <- place$observation_space$shape
+  observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))
+  lanes <- place[c("observation_space", "action_space")]
+  lanes$call <- rlang::caller_env()
+  act_lanes(place$policy, observation, seq_len(nrow(values)), lanes)
+}
+
+# What it says of itself ------------------------------------------------------------
+
+#' @export
+as.data.frame.gym_decision_map <- function(x, row.names = NULL, optional = FALSE, ...) x$grid
+
+#' @export
+print.gym_decision_map <- function(x, ...) {
+  size <- sqrt(nrow(x$grid))
+  cat(
+    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": ", x$x, " by ",
+           x$y, ", ", size, " x ", size, " points"),
+    paste0("Policy: ", policy_text(x$policy)),
+    held_text(x$at),
+    sep = "\n"
+  )
+  invisible(x)
+}
+
+held_text <- function(at) {
+  if (!length(at)) {
+    return(NULL)
+  }
+  few <- at[seq_len(min(length(at), 4L))]
+  more <- if (length(at) > 4L) paste(", and", length(at) - 4L, "more")
+  paste0("Held: ", paste(names(few), "=", number_text_each(few), collapse = ", "), more)
+}
+
+# One by one, as together they would get as many decimals as the longest needs.
+number_text_each <- function(x) vapply(unname(x), number_text, "")

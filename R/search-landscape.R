@@ -1,0 +1,250 @@
+#' Play the networks around the best one
+#'
+#' Computes the landscape of a search: the mean return over a plane through the weights of
+#' the best policy, which lies in the middle. Each point of the plane is a network, and all
+#' of them play the same few episodes. [plot()][plot.gym_landscape()] shows it, which
+#' `plot(search, type = "landscape")` does in one call, playing anew each time.
+#'
+#' # The plane
+#'
+#' It is spanned by two random directions. In each, the weights that go into a neuron are
+#' scaled to be together as long as those of the best network, as Li et al. (2018) do with
+#' filters: so that a step of 1 changes each neuron as much as its own weights. Where a
+#' neuron has two inputs or more, the second direction is made perpendicular to the first. (In
+#' their networks of millions of weights any two directions nearly are, in small ones they are
+#' not.) A point at `a` and `b` has the best weights plus `a` times the first and `b` times the
+#' second direction.
+#'
+#' # The same episodes
+#'
+#' All networks play episodes of the same seeds, so that neighbours differ by their
+#' weights and not by luck. For that each lane must have a seed of its own: an environment
+#' named by its id is made so. One that is given with lanes that share a seed (`"CartPole-v1"`
+#' with `num_envs`, made with its own vector implementation) begins each block of
+#' episodes in the same way, but the networks of a block play different ones; the
+#' element `common` of the result is `FALSE` then.
+#'
+#' @param search A search, as [search_random()] returns it. An environment that was given to it
+#'   as an object has to be open still.
+#' @param size How many points the grid has in each direction, an odd whole number of at
+#'   least 3; the default is 21, which is 441 networks.
+#' @param span How far the plane reaches to each side of the middle, a number above 0 in
+#'   lengths of the best weights; the default is 1.
+#' @param episodes How many episodes each network plays, a whole number of at least 1; the
+#'   default is 5.
+#' @param seed A whole number that fixes directions and episodes and leaves the session's
+#'   generator as it was, or `NULL`, the default, to draw from the session's generator.
+#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param client The client of the server where an environment named by its id is made; the
+#'   default is that of the search.
+#' @return An object of class `gym_landscape`, which [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_landscape()] know; a list with the elements
+#'   \describe{
+#'     \item{grid}{A data frame with one row for each point: `a`, `b` (doubles, the place)
+#'       and `mean_return` (double, `NA` where an interrupt came first). `as.data.frame()`
+#'       gives it.}
+#'     \item{best}{The mean return of the best policy in these episodes, a double.}
+#'     \item{directions}{The two directions, each a list of matrices as `weights` of a
+#'       [policy_network()].}
+#'     \item{policy, env_id, target}{The best policy and what it was found in.}
+#'     \item{episodes, seeds, common}{How many episodes each network played, an integer; their
+#'       seeds, integers; and whether they were the same for all, a logical.}
+#'     \item{elapsed, interrupted}{The seconds that it took, a double, and whether it was
+#'       interrupted, a logical: then the points played so far have a mean return.}
+#'   }
+#' @section Errors: `gym_error_argument` when the search has no policy because it was ended
+#'   in its first round; those of [rollout()] while it plays.
+#' @references H. Li, Z. Xu, G. Taylor, C. Studer, T. Goldstein (2018): Visualizing the Loss
+#'   Landscape of Neural Nets. *Advances in Neural Information Processing Systems* 31.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", seed = 1)
+#' landscape <- search_landscape(search, size = 5, episodes = 2, seed = 1)
+#' landscape
+#' plot(landscape)
+search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = NULL,
+                             progress = rlang::is_interactive(),
+                             client = search$client %||% gym_client()) {
+  if (!inherits(search, "gym_search")) {
+    abort_argument(search, "a search, as `search_random()` returns it", "search",
+                   rlang::current_env())
+  }
+  check_found(search)
+  check_odd(size)
+  check_positive(span)
+  check_count(episodes)
+  check_seed(seed)
+  check_flag(progress)
+  env <- search$env %||% search$env_id
+  with_seeded_lanes(env, as.numeric(size)^2 * episodes, client, function(lanes) {
+    with_random_seed(seed, {
+      directions <- draw_directions(search$policy$weights)
+      plane <- new_plane(search$policy, directions, size, span)
+      play_plane(lanes, plane, search, as.integer(episodes), progress)
+    })
+  })
+}
+
+check_odd <- function(size, call = rlang::caller_env()) {
+  check_count(size, min = 3, call = call)
+  if (size %% 2 == 0) {
+    abort_argument(size, "odd, so that the best policy lies in the middle", "size", call)
+  }
+}
+
+check_positive <- function(span, call = rlang::caller_env()) {
+  if (!is_number(span) || !is.finite(span) || span <= 0) {
+    abort_argument(span, "a number above 0", "span", call)
+  }
+}
+
+# The plane -----------------------------------------------------------------------
+
+#' Draw two directions through weights
+#' @return A list of two lists of matrices.
+#' @noRd
+draw_directions <- function(weights) {
+  draw <- function() lapply(weights, function(layer) layer * 0 + stats::rnorm(length(layer)))
+  first <- draw()
+  second <- Map(perpendicular, draw(), first)
+  list(Map(as_long_as, first, weights), Map(as_long_as, second, weights))
+}
+
+# Neuron by neuron, which are the rows. In one dimension there is no right angle.
+perpendicular <- function(layer, to) {
+  if (ncol(layer) < 2L) {
+    return(layer)
+  }
+  layer - to * (rowSums(layer * to) / rowSums(to^2))
+}
+
+as_long_as <- function(direction, layer) {
+  direction * (sqrt(rowSums(layer^2)) / sqrt(rowSums(direction^2)))
+}
+
+# A list: `grid`, the places, and `policies`, the network at each of them.
+new_plane <- function(policy, directions, size, span) {
+  steps <- span * seq(-1, 1, length.out = size)
+  # Exactly the best policy, whatever rounding makes of the middle.
+  steps[(size + 1) / 2] <- 0
+  grid <- expand.grid(a = steps, b = steps, KEEP.OUT.ATTRS = FALSE)
+  move <- function(a, b) {
+    policy$weights <- Map(
+      function(layer, first, second) layer + a * first + b * second,
+      policy$weights, directions[[1L]], directions[[2L]]
+    )
+    policy
+  }
+  list(grid = grid, policies = Map(move, grid$a, grid$b), directions = directions)
+}
+
+# Playing it ----------------------------------------------------------------------
+
+# So many that playing takes seconds; more gain little, as each lane is stepped alone.
+landscape_lanes <- 128L
+
+#' Call a function with lanes that each have a seed of their own, where that is possible
+#'
+#' Those of an environment that is given as an object are what they are.
+#' @noRd
+with_seeded_lanes <- function(env, episodes, client, use) {
+  call <- rlang::caller_env()
+  if (!is.character(env) && !inherits(env, "gym_wrapped")) {
+    return(use(lanes_of(env, call = call)))
+  }
+  n <- as.integer(min(episodes, landscape_lanes))
+  env <- make_if_can(env, n, "sync", "Disabled", client) %||% gym_make(env, client = client)
+  finished <- FALSE
+  on.exit(close_made(env, finished))
+  value <- use(lanes_of(env, call = call))
+  finished <- TRUE
+  value
+}
+
+#' Play the episodes of all points, side by side
+#' @return As [search_landscape()].
+#' @noRd
+play_plane <- function(lanes, plane, search, episodes, progress) {
+  started <- proc.time()[["elapsed"]]
+  points <- nrow(plane$grid)
+  show <- if (progress) plane_bar(points) else function(finished, best) NULL
+  record <- new_rounds(points, episodes, target = NULL, on_round = show)
+  record$open <- rep(episodes, points)
+  common <- is.null(lanes$num_envs)
+  seeds <- if (common) draw_environment_seeds(episodes) else lanes$draw_seeds()
+  begin <- function(block, numbers) {
+    point <- round_of(record, numbers)
+    list(
+      seeds = if (common) rep_len(seeds[(numbers - 1L) %% episodes + 1L], lanes$block) else seeds,
+      policy = candidates_of(plane$policies[unique(point)], match(point, unique(point)))
+    )
+  }
+  interrupted <- FALSE
+  tryCatch(
+    play_episodes(lanes, record, begin, search$max_steps),
+    interrupt = function(cnd) {
+      interrupted <<- TRUE
+      inform_plane_interrupted(count_finished(record), points)
+    }
+  )
+  finished <- seq_len(count_finished(record))
+  plane$grid$mean_return <- NA_real_
+  plane$grid$mean_return[finished] <- record$means[finished]
+  structure(
+    list(
+      grid = plane$grid, best = plane$grid$mean_return[[(points + 1L) / 2L]],
+      directions = plane$directions, policy = search$policy, env_id = search$env_id,
+      target = search$target, episodes = episodes, seeds = unique(seeds), common = common,
+      elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted
+    ),
+    class = "gym_landscape"
+  )
+}
+
+plane_bar <- function(points, frame = parent.frame()) {
+  bar <- cli::cli_progress_bar(
+    total = points,
+    format = "Network {cli::pb_current} of {cli::pb_total} {cli::pb_bar} {cli::pb_eta_str}",
+    .envir = frame
+  )
+  function(finished, best) cli::cli_progress_update(id = bar, set = finished, .envir = frame)
+}
+
+inform_plane_interrupted <- function(finished, points) {
+  cli::cli_inform(
+    c("!" = "Interrupted after {finished} of {points} network{?s}; the rest of the landscape is
+             empty."),
+    class = "gym_message_interrupted"
+  )
+}
+
+# What it says of itself ------------------------------------------------------------
+
+#' @export
+as.data.frame.gym_landscape <- function(x, row.names = NULL, optional = FALSE, ...) x$grid
+
+#' @export
+print.gym_landscape <- function(x, ...) {
+  played <- x$grid$mean_return[!is.na(x$grid$mean_return)]
+  n <- sqrt(nrow(x$grid))
+  cat(
+    paste0("Landscape around the best policy found in ", x$env_id, ": ", n, " x ", n,
+           " networks, ", count_of(x$episodes, "episode"), " each",
+           if (x$common) ", the same for all"),
+    landscape_returns_line(x, played),
+    if (length(played) && is.numeric(x$target) && is.finite(x$target)) {
+      paste0("Networks that reach the target of ", number_text(x$target), ": ",
+             percent_text(mean(played >= x$target)))
+    },
+    paste0(if (x$interrupted) "Interrupted after " else "Played in ", seconds_text(x$elapsed)),
+    sep = "\n"
+  )
+  invisible(x)
+}
+
+landscape_returns_line <- function(x, played) {
+  if (length(played)) {
+    paste0("Mean return: ", if (!is.na(x$best)) paste0("best policy ", number_text(x$best), ", "),
+           "all from ", number_text(min(played)), " to ", number_text(max(played)))
+  }
+}

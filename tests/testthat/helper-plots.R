@@ -1,0 +1,16 @@
+# For tests of plots: a device that keeps nothing, and what a plot must leave as it was.
+
+local_device <- function(width = 7, height = 5, frame = parent.frame()) {
+  grDevices::pdf(NULL, width = width, height = height)
+  withr::defer(grDevices::dev.off(), envir = frame)
+}
+
+expect_leaves_session_alone <- function(code) {
+  graphics::plot.new()
+  kept <- c("mar", "oma", "mgp", "las", "xpd", "cex", "mfrow", "col", "lwd")
+  before <- graphics::par(kept)
+  state <- globalenv()$.Random.seed
+  force(code)
+  testthat::expect_identical(graphics::par(kept), before)
+  testthat::expect_identical(globalenv()$.Random.seed, state)
+}

@@ -1,0 +1,23 @@
+test_that("actions are numbers with what they mean, where that is known", {
+  expect_identical(action_names("CartPole-v1", 2L), c("0: push left", "1: push right"))
+  expect_identical(action_names("Unknown-v3", 2L), c("0", "1"))
+  expect_identical(action_names(NULL, 2L, start = 5L), c("5", "6"))
+  expect_identical(action_parts("Pendulum-v1", 1L), "torque")
+  expect_identical(action_parts("Unknown-v3", 1L), "action")
+  expect_identical(action_parts("Unknown-v3", 2L), c("action_1", "action_2"))
+})
+
+test_that("another number of actions than the documented one has no meaning", {
+  expect_identical(action_names("CartPole-v1", 3L), c("0", "1", "2"))
+  expect_identical(action_parts("LunarLander-v3", 2L), c("action_1", "action_2"))
+})
+
+test_that("there are as many meanings as the real environments have actions", {
+  client <- test_client()
+  for (id in c("Acrobot-v1", "Blackjack-v1", "CartPole-v1", "CliffWalking-v1", "FrozenLake-v1",
+               "MountainCar-v0", "MountainCarContinuous-v0", "Pendulum-v1", "Taxi-v4")) {
+    space <- local_env(id, client = client)$action_space
+    meaning <- action_meanings[[environment_family(id)]]
+    expect_identical(length(meaning), as.integer(space_width(space)), info = id)
+  }
+})

@@ -1,0 +1,182 @@
+cartpole <- function(...) fake_environment(id = "CartPole-v1", ...)
+
+pole_map <- function(policy = policy_network(), env = cartpole(), ..., size = 5) {
+  decision_map(policy, env, "pole_angle", "pole_angular_velocity", ..., size = size)
+}
+
+# The observations of a map's points.
+map_observations <- function(map, names) {
+  points <- as.data.frame(map)
+  columns <- lapply(names, function(name) {
+    if (name %in% names(points)) points[[name]] else rep(map$at[[name]], nrow(points))
+  })
+  do.call(cbind, columns)
+}
+
+cartpole_parts <- c("cart_position", "cart_velocity", "pole_angle", "pole_angular_velocity")
+
+test_that("the output at each point is the network's, and rounds to its action", {
+  set.seed(1)
+  policy <- policy_bind(policy_network(), cartpole())
+  map <- pole_map(policy, at = c(cart_velocity = -0.7, cart_position = 2))
+  expect_identical(map$kind, "output")
+  expect_identical(nrow(map$grid), 25L)
+  expect_identical(map$at, c(cart_position = 2, cart_velocity = -0.7))
+  observations <- map_observations(map, cartpole_parts)
+  expect_identical(map$grid$output, network_outputs(policy, observations)[, 1])
+  expect_identical(as.integer(map$grid$output > 0.5), act(policy, observations))
+})
+
+test_that("outputs of tanh are brought to the range from 0 to 1", {
+  policy <- policy_network(c(4, 1), c("tanh", "tanh"), list(matrix(c(0, 0, 10, 0), 1)))
+  map <- pole_map(policy)
+  expect_equal(map$grid$output, (tanh(10 * map$grid$pole_angle) + 1) / 2)
+})
+
+test_that("of several outputs the action with the largest is mapped", {
+  env <- fake_environment(action_space = discrete_space(3L, start = 5L))
+  policy <- policy_bind(policy_network(c(4, 6, 3)), env)
+  map <- decision_map(policy, env, 1, 3, xlim = c(-9, 9), ylim = c(-9, 9), size = 9)
+  expect_identical(map$kind, "choice")
+  expect_identical(map$actions, c("5", "6", "7"))
+  observations <- map_observations(map, paste0("obs_", 1:4))
+  expect_identical(map$grid$action, act(policy, observations))
+})
+
+test_that("of a Box the value of the action is mapped, of several the one that is named", {
+  env <- fake_environment(action_space = box_space(c(-2, 0), c(2, 10)), id = "Other-v0")
+  policy <- policy_bind(policy_network(c(4, 3, 2)), env)
+  map <- decision_map(policy, env, "obs_1", "obs_2", action = 2, size = 4)
+  expect_identical(map$kind, "value")
+  expect_identical(map$limits, c(0, 10))
+  expect_identical(map$actions, "action_2")
+  expect_equal(map$grid$action, act(policy, map_observations(map, paste0("obs_", 1:4)))[, 2])
+  expect_error(decision_map(policy, env, 1, 2, action = 3), "`action`",
+               class = "gym_error_argument")
+})
+
+test_that("a function is asked about the same points", {
+  follow <- function(observation) as.integer(observation[, 3] > 0)
+  map <- pole_map(follow)
+  expect_identical(map$kind, "choice")
+  expect_identical(map$grid$action, as.integer(map$grid$pole_angle > 0))
+  image <- fake_environment(observation_space = box_space(-(1:6), 1:6, shape = c(2L, 3L)))
+  seen <- NULL
+  decision_map(function(observation) {
+    seen <<- observation
+    integer(nrow(observation))
+  }, image, 2, 4, size = 3)
+  expect_identical(dim(seen), c(9L, 2L, 3L))
+  # Row by row: the second number is in the first row, the fourth the first of the second.
+  expect_identical(unique(seen[, 1, 2]), c(-2, 0, 2))
+  expect_identical(unique(seen[, 2, 1]), c(-4, 0, 4))
+  expect_true(all(seen[, 1, c(1, 3)] == 0))
+})
+
+test_that("parts are named or numbered, and two need not be named", {
+  policy <- policy_network(c(2, 1))
+  env <- fake_environment(observation_space = box_space(c(-1, -2), c(1, 2)), id = "MountainCar-v0")
+  map <- decision_map(policy, env)
+  expect_identical(c(map$x, map$y), c("position", "velocity"))
+  expect_identical(decision_map(policy, env, 2, 1)$x, "velocity")
+  expect_error(pole_map(env = NULL), "`x` must be a part of the observation, not \"pole_angle\"",
+               class = "gym_error_argument")
+  bad <- function(..., message) {
+    expect_error(decision_map(policy_network(), cartpole(), ...), message, fixed = TRUE,
+                 class = "gym_error_argument")
+  }
+  bad(message = "`x` and `y` must name two parts")
+  bad("pole_angle", message = paste(cartpole_parts, collapse = ", "))
+  bad("pole_angle", "angle", message = "`y` must be a part of the observation, not \"angle\"")
+  bad(1, 5, message = "`y`")
+  bad(1, 1, message = "two different parts")
+  bad(1, 2, at = 3, message = "`at` must be a numeric vector with names")
+  bad(1, 2, at = c(cart_position = 1), message = "`at` names cart_position, which is on an axis")
+  bad(1, 2, at = c(nose = 1), message = "no part of the observation")
+  bad(1, 2, xlim = c(1, 0), message = "`xlim`")
+  bad(1, 2, size = 1, message = "`size`")
+  bad(1, 2, path = 3, message = "`path` must be a rollout with steps")
+  bad(1, 2, path = data.frame(a = 1), message = "`path` has no column")
+})
+
+test_that("other parts are held at 0, or in the middle where 0 is out of bounds", {
+  env <- fake_environment(observation_space = box_space(c(-1, 2, -Inf, -1), c(1, 4, Inf, 1)))
+  expect_identical(decision_map(policy_network(), env, 1, 4)$at, c(obs_2 = 3, obs_3 = 0))
+})
+
+test_that("ranges are given, usual, the bounds, or those of the path", {
+  ends <- function(map) unname(unlist(lapply(map$grid[1:2], range)))
+  expect_equal(ends(pole_map()), c(-0.2095, 0.2095, -2.5, 2.5))
+  expect_equal(ends(pole_map(xlim = c(0, 1))), c(0, 1, -2.5, 2.5))
+  env <- fake_environment(observation_space = box_space(c(-5, -Inf, -1, -1), c(7, Inf, 1, 1)))
+  path <- data.frame(obs_1 = c(1, 2), obs_2 = c(10, 30))
+  expect_equal(ends(decision_map(policy_network(), env, 1, 2, path = path)), c(-5, 7, 9, 31))
+  expect_error(decision_map(policy_network(), env, 1, 2), "range of obs_2 to show is unknown",
+               class = "gym_error_argument")
+  beyond <- data.frame(pole_angle = c(0, 1), pole_angular_velocity = c(0, 1))
+  expect_equal(ends(pole_map(path = beyond))[2], 1)
+})
+
+test_that("a path is that of the rollout's steps, episode by episode", {
+  env <- cartpole()
+  played <- rollout(env, policy_network(), episodes = 2, seed = 1, steps = TRUE)
+  map <- pole_map(env = env, path = played)
+  expect_identical(map$path$x, played$steps$pole_angle)
+  expect_identical(map$path$y, played$steps$pole_angular_velocity)
+  expect_identical(map$path$episode, played$steps$episode)
+  expect_error(pole_map(path = rollout(env, policy_network())), "no steps",
+               class = "gym_error_argument")
+})
+
+test_that("path = TRUE plays one episode under the seed, and nothing else is played", {
+  env <- cartpole()
+  set.seed(1)
+  policy <- policy_network()
+  state <- .Random.seed
+  map <- pole_map(policy, env, path = TRUE, seed = 3)
+  expect_identical(.Random.seed, state)
+  expect_length(env$seeds, 1)
+  expect_identical(map$path$x, rollout(env, policy, seed = 3, steps = TRUE)$steps$pole_angle)
+  quiet <- cartpole()
+  pole_map(policy, quiet)
+  expect_length(quiet$seeds, 0)
+  bound <- policy_bind(policy, quiet)
+  expect_error(pole_map(bound, env = NULL, path = TRUE), "the environment is needed",
+               class = "gym_error_argument")
+})
+
+test_that("a network that was played needs no environment, one of its own no names", {
+  bound <- policy_bind(policy_network(), cartpole())
+  expect_identical(pole_map(bound, env = NULL), pole_map(bound))
+  map <- decision_map(policy_network(), x = 1, y = "obs_2", xlim = 0:1, ylim = 0:1)
+  expect_identical(map$actions, c("0", "1"))
+})
+
+test_that("what cannot be mapped says why", {
+  bad <- function(..., message) {
+    expect_error(decision_map(...), message, fixed = TRUE, class = "gym_error_argument")
+  }
+  bad(policy_random(), cartpole(), message = "a random policy draws its actions")
+  bad(function(observation) 1, message = "What is observed and done is known of networks")
+  bad("CartPole-v1", message = "`policy` must be a policy")
+  one <- fake_environment(observation_space = box_space(-1, 1),
+                          action_space = box_space(-1, 1))
+  bad(policy_network(c(1, 1), c("tanh", "tanh")), one, 1, 1, message = "observes only one")
+  lake <- fake_environment(observation_space = discrete_space(16L), id = "FrozenLake-v1")
+  bad(policy_network(c(16, 2)), lake, message = "what is observed in FrozenLake-v1 is of")
+  several <- fake_environment(action_space = new_space(
+    list(name = "MultiBinary", shape = list(2L), dtype = "int8")
+  ))
+  bad(function(observation) observation, several, 1, 2,
+      message = "A decision map shows actions that are discrete or a Box, not of")
+})
+
+test_that("it says what it is in a few lines", {
+  expect_output(
+    print(pole_map()),
+    paste0("Decision map in CartPole-v1: pole_angle by pole_angular_velocity, 5 x 5 points\n",
+           "Policy: network 4-2-1, tanh, logistic, 10 weights\n",
+           "Held: cart_position = 0, cart_velocity = 0"),
+    fixed = TRUE
+  )
+})

@@ -1,0 +1,76 @@
+searches_of <- function(round, max_rounds = 10L) {
+  rows <- Map(function(seed, round) {
+    data.frame(
+      seed = seed, solved = !is.na(round), round = round,
+      rounds = if (is.na(round)) max_rounds else round, mean_return = 1, steps = 1L, elapsed = 0
+    )
+  }, seq_along(round), as.integer(round))
+  settings <- list(env_id = "Fake-v0", target = 1, policy = policy_network(), rounds = max_rounds,
+                   episodes = 5L)
+  new_searches(rows, settings, proc.time()[["elapsed"]], FALSE)
+}
+
+test_that("bars count the searches, the curve is geometric with the estimated chance", {
+  searches <- searches_of(c(1, 1, 3, 7, NA))
+  data <- luck_plot_data(searches)
+  expect_identical(searches$chance, 4 / (1 + 1 + 3 + 7 + 10))
+  solved <- data$bars[!data$bars$unsolved, ]
+  expect_identical(solved$round, 1:10)
+  expect_identical(solved$searches, c(2L, 0L, 1L, 0L, 0L, 0L, 1L, 0L, 0L, 0L))
+  expect_equal(solved$expected, 5 * stats::dgeom(0:9, searches$chance))
+  given_up <- data$bars[data$bars$unsolved, ]
+  expect_identical(given_up$searches, 1L)
+  expect_equal(given_up$expected, 5 * (1 - searches$chance)^10)
+  expect_gt(given_up$x, 11)
+  expect_equal(sum(data$bars$expected), 5)
+})
+
+test_that("where all were solved the bars end with the last", {
+  bars <- luck_plot_data(searches_of(c(1, 4, 2)))$bars
+  expect_identical(bars$round, 1:4)
+  expect_false(any(bars$unsolved))
+})
+
+test_that("the mark tells the chance of that many rounds or fewer, and what was seen", {
+  searches <- searches_of(c(1, 1, 3, 7, NA))
+  data <- luck_plot_data(searches, mark = 3)
+  expect_equal(data$lucky$expected, 1 - (1 - searches$chance)^3)
+  expect_identical(data$lucky$observed, 3 / 5)
+  expect_identical(which(data$bars$lucky), 1:3)
+  expect_match(data$mark_label[[1]], "within 3 rounds")
+  expect_match(luck_plot_data(searches, mark = 1)$mark_label[[1]], "in the first round")
+  none <- luck_plot_data(searches, mark = NULL)
+  expect_null(none$mark_label)
+  expect_false(any(none$bars$lucky))
+})
+
+test_that("any searches plot, return themselves and leave par and R's generator alone", {
+  local_device()
+  set.seed(1)
+  each <- list(searches_of(c(1, 1, 3, 7, NA)), searches_of(1), searches_of(c(300, NA), 400L))
+  for (searches in each) {
+    expect_leaves_session_alone(expect_identical(expect_invisible(plot(searches)), searches))
+  }
+  expect_silent(plot(searches, mark = NULL))
+  graphics::par(mfrow = c(2, 3))
+  expect_silent(plot(searches, main = "mine", xlab = "a"))
+})
+
+test_that("searches of which none was solved, and a bad mark, say so", {
+  local_device()
+  expect_error(plot(searches_of(c(NA, NA))), "no search was solved", class = "gym_error_argument")
+  expect_error(plot(searches_of(1), mark = 0), "`mark`", class = "gym_error_argument")
+})
+
+test_that("ggplot2 draws the same bars and curve", {
+  skip_if_not_installed("ggplot2")
+  searches <- searches_of(c(1, 1, 3, 7, NA))
+  plot <- ggplot2::autoplot(searches)
+  data <- luck_plot_data(searches)
+  bars <- ggplot2::layer_data(plot, 1L)
+  expect_identical(bars$y[order(bars$x)], as.numeric(data$bars$searches))
+  expect_equal(ggplot2::layer_data(plot, 2L)$y, data$bars$expected[!data$bars$unsolved])
+  local_device()
+  expect_silent(print(plot))
+  expect_silent(print(ggplot2::autoplot(searches_of(c(1, 2)))))
+})
