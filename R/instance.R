@@ -24,7 +24,11 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
   )
   close_abandoned(x)
-  post_once(x, "/v1/envs/", fields, call = call)$instance_id
+  instance_id <- post_once(x, "/v1/envs/", fields, call = call)$instance_id
+  if (identical(render_mode, "human")) {
+    show_instance(x, known_instance(x, instance_id, call), call)
+  }
+  instance_id
 }
 
 instance_route <- function(instance_id) {
@@ -132,6 +136,9 @@ info_from <- function(instance, answer) {
 }
 
 step_instance <- function(x, instance, action, render, lanes = NULL, call = rlang::caller_env()) {
+  if (render) {
+    show_instance(x, instance, call)
+  }
   fields <- c(render = if (render) "true" else "false")
   if (!is.null(lanes) || !is.null(instance$num_envs)) {
     return(step_lanes(x, instance, action, fields, lanes, call))

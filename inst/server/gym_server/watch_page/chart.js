@@ -67,11 +67,9 @@ function stroke(pen, points) {
 function range(values, goal) {
   const all = Number.isFinite(goal) ? [...values, goal] : values;
   let [low, high] = [Math.min(...all), Math.max(...all)];
-  // Returns are read against nothing at all, unless that is far away.
-  if (low > 0 && low < high * 0.7) low = 0;
-  if (high < 0 && high > low * 0.7) high = 0;
-  if (low === high) [low, high] = [low - 1, high + 1];
-  return [low, high];
+  // Returns are read against nothing at all.
+  [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+  return low === high ? [0, 1] : [low, high];
 }
 
 // Round numbers from at most `low` to at least `high`.
@@ -79,7 +77,6 @@ function ticks(low, high) {
   const rough = (high - low) / 3;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 2.5, 5, 10].map((times) => times * power).find((size) => size >= rough);
-  const marks = [];
-  for (let mark = Math.floor(low / step); mark * step < high + step; mark++) marks.push(mark * step);
-  return marks;
+  const [first, last] = [Math.floor(low / step), Math.ceil(high / step)];
+  return Array.from({ length: last - first + 1 }, (_, index) => (first + index) * step);
 }

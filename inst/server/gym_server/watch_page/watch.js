@@ -155,7 +155,7 @@ function showLanes({ lanes }) {
   $("of").textContent = `of ${number(lanes)}`;
 }
 
-let charted = "";
+let charted = null;
 function showReturns({ returns, lanes, reward_threshold: goal }) {
   const key = returns.join();
   if (key === charted) return;
@@ -198,10 +198,16 @@ function setLive({ state }) {
   }, STILL_AFTER);
 }
 
+const BADGES = {
+  waiting: "waiting for a reset",
+  faulty: "a fault",
+  closed: "closed",
+  gone: "server gone",
+};
+
 function tell(state, words, advice) {
   clearTimeout(quiet);
-  const badge = { waiting: "waiting for a reset", faulty: "a fault" }[state] || words.toLowerCase();
-  setState(state, badge);
+  setState(state, BADGES[state]);
   $("words").textContent = words;
   $("advice").textContent = advice;
   $("message").hidden = false;
@@ -292,13 +298,16 @@ document.addEventListener("keydown", (event) => {
 document.addEventListener("visibilitychange", askAnew);
 
 function redraw() {
-  if (!shown) return;
-  charted = "";
+  if (!shown) {
+    drawChart($("chart"), [], null);
+    return;
+  }
+  charted = null;
   showReturns(shown);
   if (shown.observation) observation.paint(shown.observation.names, shown.observation.values);
 }
+new ResizeObserver(redraw).observe($("chart"));
 window.addEventListener("resize", redraw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
-drawChart($("chart"), [], null);
 follow();
