@@ -23,9 +23,13 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     kwargs = if (length(kwargs)) to_json(kwargs),
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
   )
+  for_eyes <- identical(render_mode, "human")
+  if (for_eyes) {
+    check_viewer(call)
+  }
   close_abandoned(x)
   instance_id <- post_once(x, "/v1/envs/", fields, call = call)$instance_id
-  if (identical(render_mode, "human")) {
+  if (for_eyes) {
     show_instance(x, known_instance(x, instance_id, call), call)
   }
   instance_id

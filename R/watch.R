@@ -33,7 +33,8 @@
 #'
 #' `options(gym.viewer = )` has it otherwise, in scripts too: a function, such as
 #' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
-#' nothing.
+#' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
+#' until the page is there, at most 5 seconds, so that nobody misses the beginning.
 #'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.
@@ -56,25 +57,23 @@ env_watch <- function(x, instance_id) {
 show_instance <- function(x, instance, call = rlang::caller_env()) {
   if (is.null(instance$shown)) {
     open_watch(x, instance, call)
-    await_watcher(x, instance)
   }
 }
 
 open_watch <- function(x, instance, call = rlang::caller_env()) {
-  # First, so that a viewer that fails does so once.
-  instance$shown <- TRUE
   address <- paste0(x$remote_base, instance$route, "watch/")
-  viewer <- chosen_viewer(address, call)
-  if (is.function(viewer)) {
-    failed <- is.null(tryCatch(
-      {
-        viewer(address)
-        TRUE
-      },
-      error = function(cnd) NULL
-    ))
+  viewer <- check_viewer(call)
+  # A viewer that fails does so once.
+  instance$shown <- TRUE
+  if (isFALSE(viewer)) {
+    return(invisible(address))
   }
-  if (is.null(viewer) || (is.function(viewer) && failed)) {
+  if (is.function(viewer)) {
+    viewer(address)
+    await_watcher(x, instance)
+  } else if (open_by_default(address)) {
+    await_watcher(x, instance)
+  } else {
     rlang::inform(
       paste0("Watch ", instance$spec$id, " at ", address), class = "gym_message_watch"
     )
@@ -82,34 +81,43 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
   invisible(address)
 }
 
-# A function of the address, FALSE for nothing at all, NULL to print it.
-chosen_viewer <- function(address, call) {
+# What the option says: a function of the address, FALSE for nothing at all, NULL.
+check_viewer <- function(call) {
   viewer <- getOption("gym.viewer")
-  if (!is.null(viewer)) {
-    if (!is.function(viewer) && !isFALSE(viewer)) {
-      gym_abort(
-        paste0("The option `gym.viewer` must be a function of an address, or FALSE, not ",
-               describe_argument(viewer), "."),
-        class = "gym_error_argument", argument = "gym.viewer", value = viewer, call = call
-      )
-    }
-    return(viewer)
+  if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {
+    gym_abort(
+      paste0("The option `gym.viewer` must be a function of an address, or FALSE, not ",
+             describe_argument(viewer), "."),
+      class = "gym_error_argument", argument = "gym.viewer", value = viewer, call = call
+    )
   }
-  if (rlang::is_interactive()) {
-    # RStudio's takes addresses of this machine.
-    pane <- if (is_loopback(address)) getOption("viewer")
-    pane %||% utils::browseURL
+  viewer
+}
+
+# Whether it could be done: a machine may have no browser.
+open_by_default <- function(address) {
+  if (!rlang::is_interactive()) {
+    return(FALSE)
   }
+  # RStudio's pane takes addresses of this machine.
+  pane <- if (is_loopback(address)) getOption("viewer")
+  viewer <- pane %||% utils::browseURL
+  tryCatch(
+    {
+      viewer(address)
+      TRUE
+    },
+    error = function(cnd) FALSE
+  )
 }
 
 # A browser takes a moment to start, and a fast environment would be past all that there
 # is to see.
-await_watcher <- function(x, instance, patience = 5) {
-  if (!rlang::is_interactive() || isFALSE(getOption("gym.viewer"))) {
-    return(invisible())
-  }
-  deadline <- Sys.time() + patience
+await_watcher <- function(x, instance) {
+  deadline <- Sys.time() + watcher_patience
   while (Sys.time() < deadline && !isTRUE(get_answer(x, instance$route)$watched)) {
     Sys.sleep(0.1)
   }
 }
+
+watcher_patience <- 5
