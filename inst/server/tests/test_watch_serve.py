@@ -78,7 +78,7 @@ def test_a_watcher_that_never_reads_holds_nobody_up(server, pole):
     seen = look(server, pole)
     for count in range(1, 6):
         step(server, pole, 20)
-        while seen["step"] < 20 * count:
+        while seen["steps"] < 20 * count:
             seen = look(server, pole, seen["number"])
     deaf.close()
     thread.join()
