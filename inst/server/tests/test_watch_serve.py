@@ -1,6 +1,7 @@
 """Watchers as the real server has them: those that wait, that leave, that never read."""
 
 import json
+import socket
 import threading
 import time
 
@@ -80,8 +81,9 @@ def test_a_watcher_that_never_reads_holds_nobody_up(server, pole):
         step(server, pole, 20)
         while seen["steps"] < 20 * count:
             seen = look(server, pole, seen["number"])
-    deaf.close()
+    deaf.shutdown(socket.SHUT_RDWR)
     thread.join()
+    deaf.close()
 
 
 def test_a_watcher_that_left_stops_the_drawing(server, pole):
