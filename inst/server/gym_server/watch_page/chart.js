@@ -43,8 +43,10 @@ export function drawChart(canvas, returns, goal) {
     pen.setLineDash([5, 4]);
     stroke(pen, [[left, y(goal)], [right, y(goal)]]);
     pen.setLineDash([]);
-    const above = y(goal) - 9 > top;
-    pen.fillText(`solved: mean of ${number(goal)}`, right, y(goal) + (above ? -9 : 10));
+    const above = y(goal) - 20 > top;
+    // Where the first episodes are, which seldom come so far.
+    pen.textAlign = "left";
+    pen.fillText(`solved: mean of ${number(goal)}`, left + 4, y(goal) + (above ? -9 : 11));
   }
   pen.strokeStyle = colour("--accent-soft");
   pen.lineWidth = 1.5;

@@ -39,13 +39,16 @@ export class Observation {
     this.canvas.style.height = `${rows * tall + size}px`;
     const { pen, width, colour } = prepare(this.canvas);
     const wide = width / columns;
+    const longest = Math.max(0, ...names.map((name) => pen.measureText(name).width));
+    const nameWide = longest ? Math.min(7 * size, longest + 10) : 0;
     values.forEach((value, index) => {
       const place = {
         left: Math.floor(index / rows) * wide + 12,
         top: (index % rows) * tall + size / 2,
         wide: wide - 24,
         tall,
-        size,
+        nameWide,
+        valueWide: 4.4 * size,
       };
       this.paintOne(pen, colour, place, names[index], value, this.histories[index]);
     });
@@ -53,12 +56,12 @@ export class Observation {
     this.canvas.setAttribute("aria-label", `The observation: ${said.join(", ")}`);
   }
 
-  paintOne(pen, colour, { left, top, wide, tall, size }, name, value, history) {
+  paintOne(pen, colour, place, name, value, history) {
+    const { left, top, wide, tall, nameWide, valueWide } = place;
     const middle = top + tall / 2;
-    const nameWide = name ? Math.min(7 * size, Math.max(2.6 * size, pen.measureText(name).width + 8)) : 0;
     pen.textAlign = "left";
     pen.fillStyle = colour("--quiet");
-    pen.fillText(name, left, middle, nameWide - 6);
+    if (name) pen.fillText(name, left, middle, nameWide - 6);
     if (typeof value === "string" && !Number.isFinite(Number(value))) {
       pen.fillStyle = colour("--ink");
       pen.fillText(value || "(empty text)", left + nameWide, middle, wide - nameWide);
@@ -66,7 +69,6 @@ export class Observation {
     }
     const numbers = history.map(Number).filter(Number.isFinite);
     const [low, high] = [Math.min(...numbers), Math.max(...numbers)];
-    const valueWide = 4.4 * size;
     pen.textAlign = "right";
     pen.fillStyle = colour("--ink");
     pen.fillText(number(Number(value)), left + wide, middle, valueWide);

@@ -174,7 +174,7 @@ function showPace({ steps, fps }) {
   const seconds = (now - pace.now) / 1000;
   if (seconds > 1) pace = { steps, now, rate: (steps - pace.steps) / seconds };
   const rate = pace.rate === null ? "" : `${number(Math.round(pace.rate))} steps a second`;
-  const real = fps === null ? "" : `shown in real time (at most ${number(fps)} steps a second)`;
+  const real = fps === null ? "" : `real time (at most ${number(fps)})`;
   $("pace").textContent = [rate, real].filter(Boolean).join(" · ");
 }
 
