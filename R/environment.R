@@ -11,10 +11,11 @@
 #' @param seed Seed of the first reset that is given none, and of the sampling
 #'   of actions: a whole number of at least 0, `NULL` for a random one. For an
 #'   environment with lanes also one for each of them, see [env_reset()].
-#' @param render_mode `"rgb_array"` for pictures, or `"human"`, which is taken as
-#'   the same, as the server opens no window; `NULL`, the default, takes pictures
-#'   where the environment can draw them. They are drawn only when [env_render()]
-#'   asks for them.
+#' @param render_mode `"rgb_array"` for pictures, or `"human"` for an environment that
+#'   people want to see: the same pictures, and its page opens, on which it moves in real
+#'   time, see [env_watch()]. `NULL`, the default, takes pictures where the environment
+#'   can draw them. They are drawn only when [env_render()] asks for them or while
+#'   somebody watches.
 #' @param num_envs How many lanes the environment is to have, a whole number of at
 #'   least 1: copies that are reset and stepped together, each with a row of its own
 #'   in observations and actions, also when there is but one. The server sets a limit,
@@ -155,8 +156,9 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   numeric vector or array for Box; [space_sample()] has the table of all kinds.
 #'   With lanes one for each, in the form in which [env_reset()] gives observations:
 #'   a vector for Discrete, a matrix with a row a lane for a Box of one dimension.
-#' @param render Kept for classic scripts, and without effect: the server opens no
-#'   window. [env_render()] fetches a picture. `TRUE` or `FALSE`, the default.
+#' @param render Whether people want to see it: `TRUE` or `FALSE`, the default. The first
+#'   `TRUE` opens the environment's page, see [env_watch()], and while somebody watches
+#'   there each such step waits for real time. [env_render()] fetches a picture.
 #' @param lanes For an environment with lanes: the numbers of those that are to step,
 #'   counted from 1 and in increasing order; `action` and what is returned then have
 #'   rows for these alone. `NULL`, the default, steps all. Needs `"sync"`.

@@ -24,6 +24,7 @@
 #'     episode and returns the first observation, as [env_reset()],
 #'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()],
 #'   * `$render(lane = 1)`: the current frame, as [env_render()],
+#'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
@@ -110,6 +111,10 @@ gym_env <- R6Class(
     render = function(lane = 1) {
       private$check_open()
       env_render(self$client, self$instance_id, lane)
+    },
+    watch = function() {
+      private$check_open()
+      env_watch(self$client, self$instance_id)
     },
     close = function() {
       if (!private$closed) {

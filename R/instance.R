@@ -23,8 +23,16 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     kwargs = if (length(kwargs)) to_json(kwargs),
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
   )
+  for_eyes <- identical(render_mode, "human")
+  if (for_eyes) {
+    check_viewer(call)
+  }
   close_abandoned(x)
-  post_once(x, "/v1/envs/", fields, call = call)$instance_id
+  instance_id <- post_once(x, "/v1/envs/", fields, call = call)$instance_id
+  if (for_eyes) {
+    show_instance(x, known_instance(x, instance_id, call), call)
+  }
+  instance_id
 }
 
 instance_route <- function(instance_id) {
@@ -134,6 +142,9 @@ info_from <- function(instance, answer) {
 }
 
 step_instance <- function(x, instance, action, render, lanes = NULL, call = rlang::caller_env()) {
+  if (render) {
+    show_instance(x, instance, call)
+  }
   fields <- c(render = if (render) "true" else "false")
   if (!is.null(lanes) || !is.null(instance$num_envs)) {
     return(step_lanes(x, instance, action, fields, lanes, call))

@@ -1,4 +1,5 @@
 test_that("the classic calls play an episode", {
+  withr::local_options(gym.viewer = FALSE)
   client <- test_client()
   id <- env_create(client, "CartPole-v0")
   expect_match(id, "^[0-9a-f]{8}$")

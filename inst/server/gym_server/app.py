@@ -15,7 +15,10 @@ from werkzeug.datastructures import MIMEAccept
 from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 
-from gym_server import wire
+from gym_server import (
+    watch_routes,  # noqa: F401, declares them
+    wire,
+)
 from gym_server.errors import answer_to
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
@@ -114,6 +117,10 @@ class GymApp(Flask):
         start_response(f"{answer.status} {HTTPStatus(answer.status).phrase}", headers)
         return (answer.body,)
 
+    def end_watching(self) -> None:
+        """Send all watchers away, who would wait for more than the server's last moment."""
+        self._instances.end_watching()
+
     def close(self) -> None:
         """Close every environment and monitor."""
         self._instances.close_all()
@@ -166,7 +173,15 @@ class _Handler:
         def perform() -> Answer:
             try:
                 fields = wire.read(body, route.fields)
-                call = Call(self._services, request.variables, body, fields, wants_tensors)
+                call = Call(
+                    self._services,
+                    request.variables,
+                    body,
+                    fields,
+                    wants_tensors,
+                    request.path,
+                    request.accept,
+                )
                 return wire.answer(route.handler(call), request_id)
             except Exception as error:
                 return _failure(error, request_id)

@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stop=stop,
         )
     )
-    server = Server(app, listener, max_body_bytes)
+    server = Server(app, listener, max_body_bytes, on_stop=app.end_watching)
     stop.server = server
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:

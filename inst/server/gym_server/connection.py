@@ -24,6 +24,9 @@ from gym_server.errors import GymServerError, answer_to
 _IDLE_SECONDS = 3600.0
 _REST_SECONDS = 60.0
 
+# The header of answers that are worth nothing later.
+_NOT_KEPT = ("Cache-Control", "no-store")
+
 _RECEIVE_BYTES = 2**16
 _LARGEST_HEAD_BYTES = 2**16
 
@@ -53,6 +56,8 @@ class Connection:
         self._last_environ: dict = {}
         self._stopping = False
         self._answering = False
+        # Whether what is sent is of this moment only.
+        self._passing = False
 
     def serve(self) -> None:
         """Answer until the client leaves, is silent for too long, or the server stops."""
@@ -83,6 +88,7 @@ class Connection:
         if not keep:
             head.append("Connection: close")
         head.append("\r\n")
+        self._passing = _NOT_KEPT in headers
         # In one piece: a body that follows its header is held back until that is acknowledged.
         self._socket.sendall("\r\n".join(head).encode("latin-1") + body)
         return keep
@@ -123,9 +129,14 @@ class Connection:
         """Make ``serve()`` end when the requests that have arrived are answered.
 
         Args:
-            half_sent: whether to give up a request of which only a part has arrived.
+            half_sent: whether to give up a request of which only a part has arrived, and an
+                answer that nobody would keep and its client does not read.
         """
         self._stopping = True
+        if self._answering and self._passing and half_sent:
+            # A watcher that does not read what it asked for.
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
         if not self._answering and (half_sent or not self._reader.began):
             with contextlib.suppress(OSError):
                 self._socket.shutdown(socket.SHUT_RD)

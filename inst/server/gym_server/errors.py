@@ -50,6 +50,11 @@ def unknown_instance(instance_id: str) -> GymServerError:
     return GymServerError("unknown_instance", f"Instance_id {instance_id} unknown")
 
 
+def shutting_down() -> GymServerError:
+    """The server takes nothing more."""
+    return GymServerError("shutting_down", "The server is stopping")
+
+
 def missing_parameter(name: str) -> GymServerError:
     """A required field is absent or empty (the classic server's words)."""
     return GymServerError(

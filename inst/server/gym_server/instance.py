@@ -16,7 +16,10 @@ from gym_server.errors import GymServerError, invalid_parameter, unknown_instanc
 from gym_server.frames import RenderThread, picture
 from gym_server.monitor import Monitor
 from gym_server.monitor_directory import MonitorRoot
+from gym_server.observed import entries
 from gym_server.plain import plain
+from gym_server.screen import Screen
+from gym_server.tally import LaneTally, Tally
 from gym_server.wrappers import draws_when_stepped
 
 
@@ -30,6 +33,8 @@ class Instance:
     # Given when the instance is listed.
     instance_id = ""
     _lanes = 1
+    # None where there are no lanes.
+    _num_envs: int | None = None
 
     def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
         """Take over an environment.
@@ -50,13 +55,19 @@ class Instance:
         self._draws_when_stepped = self._find_out_whether_it_draws()
         self._lock = threading.Lock()
         self._held = _Held(self)
-        self._closed = False
+        self.closed = False
         self._monitor: Monitor | None = None
         self._seed_for_reset = choices.seed
         self._was_reset = False
         self._done = False
         self._steps = 0
-        self._episode_steps = 0
+        self._tally = self._make_tally()
+        self._observation: object = None
+        # How often the environment has begun to move, and who wants to hear of the next time.
+        self.moves = 0
+        self.on_move: Callable[[], None] | None = None
+        self.screen = Screen(self, self._lock, (env.metadata or {}).get("render_fps"))
+        self._for_eyes = choices.render_mode == "human"
         self._made = self._used = time.monotonic()
         if choices.seed is not None:
             self._seed_actions(choices.seed)
@@ -67,6 +78,9 @@ class Instance:
 
     def _find_out_whether_it_draws(self) -> bool:
         return draws_when_stepped(self._env)
+
+    def _make_tally(self) -> Tally | LaneTally:
+        return Tally()
 
     def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
         # One generator serves all lanes.
@@ -111,6 +125,8 @@ class Instance:
         _refuse_mask("reset_mask", mask)
         if isinstance(seed, tuple):
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
+        if self._for_eyes:
+            self.screen.pace()
         with self._held:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed
@@ -122,19 +138,28 @@ class Instance:
                 self.action_space.seed(seed)
             self._was_reset = True
             self._done = False
-            self._episode_steps = 0
+            self._tally.begin()
+            self._observation = observation
             return {
                 "observation": ask(self._encode, observation, tensors),
                 "info": ask(plain, info) if info else {},
             }
 
-    def step(self, action: object, tensors: bool = False, mask: np.ndarray | None = None) -> dict:
+    def step(
+        self,
+        action: object,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+        for_eyes: bool = False,
+    ) -> dict:
         """Take one step.
 
         Args:
             action: the JSON value of a member of the action space, or the member as ``Parts``.
             tensors: whether the observation is wanted as tensors.
             mask: for environments with lanes only.
+            for_eyes: whether people want to see it: not faster than in real time, then, while
+                somebody watches.
 
         Returns:
             ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
@@ -145,6 +170,8 @@ class Instance:
                 before the environment moves; ``environment_error``.
         """
         _refuse_mask("step_mask", mask)
+        if for_eyes or self._for_eyes:
+            self.screen.pace()
         with self._held:
             if not self._was_reset:
                 raise reset_needed("step()")
@@ -158,12 +185,14 @@ class Instance:
         step = self._monitor.step if self._monitor else self._env.step
         observation, reward, terminated, truncated, info = self._move(step, action)
         terminated, truncated = bool(terminated), bool(truncated)
+        reward = float(reward)
         self._steps += 1
-        self._episode_steps += 1
         self._done = terminated or truncated
+        self._tally.step(reward, self._done)
+        self._observation = observation
         return {
             "observation": self._encode(observation, tensors),
-            "reward": float(reward),
+            "reward": reward,
             "done": self._done,
             "terminated": terminated,
             "truncated": truncated,
@@ -172,6 +201,10 @@ class Instance:
         }
 
     def _move(self, move: Callable, *args: object) -> tuple:
+        self.moves += 1
+        if self.on_move is not None:
+            call, self.on_move = self.on_move, None
+            call()
         if self._draws_when_stepped:
             return self._renderer.run(move, *args)
         return move(*args)
@@ -205,17 +238,24 @@ class Instance:
         Raises:
             GymServerError: ``cannot_render``, ``reset_needed``, ``invalid_parameter``.
         """
+        self.check_lane(lane)
+        with self._held:
+            return self._picture(lane)
+
+    def check_lane(self, lane: int) -> None:
+        """Raise ``invalid_parameter`` for a lane that there is not."""
         if lane >= self._lanes:
             last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
             raise invalid_parameter("lane", lane, f"{last} for this environment")
-        with self._held:
-            if self._env.render_mode != "rgb_array":
-                raise GymServerError(
-                    "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
-                )
-            if not self._was_reset:
-                raise reset_needed("render()")
-            frame = ask(self._draw, lane)
+
+    def _picture(self, lane: int) -> np.ndarray:
+        if self._env.render_mode != "rgb_array":
+            raise GymServerError(
+                "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
+            )
+        if not self._was_reset:
+            raise reset_needed("render()")
+        frame = ask(self._draw, lane)
         try:
             return picture(frame)
         except ValueError as error:
@@ -257,7 +297,8 @@ class Instance:
     def close(self) -> None:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""
         with self._held:
-            self._closed = True
+            self.closed = True
+            self.screen.end(unknown_instance(self.instance_id))
             try:
                 if self._monitor is not None:
                     self._finish_monitor()
@@ -285,7 +326,7 @@ class Instance:
             "max_episode_steps": spec.max_episode_steps if spec else None,
             "render_fps": plain((self._env.metadata or {}).get("render_fps")),
             "lanes": self._lanes,
-            "num_envs": None,
+            "num_envs": self._num_envs,
             "vectorization_mode": None,
             "autoreset_mode": None,
             "render_mode": self._choices.render_mode or self._env.render_mode,
@@ -295,10 +336,44 @@ class Instance:
             "age_seconds": now - self._made,
             "idle_seconds": now - self._used,
             "steps": self._steps,
-            "episode_steps": self._episode_steps,
+            "episode_steps": self._tally.of(0).step,
             "needs_reset": self._done or not self._was_reset,
             "monitor": monitor.about() if monitor else None,
+            "watched": self.screen.is_watched,
         }
+
+    def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a lane; whoever calls it holds the lock.
+
+        Returns:
+            JSON values, among them the observation where there is no picture and the reason
+            why there is none; the picture or None.
+        """
+        spec = self._env.spec
+        standing = self._tally.of(lane)
+        facts = {
+            "env_id": self.env_id,
+            "lane": lane,
+            "lanes": self._num_envs,
+            "state": "ended" if standing.ended else "running",
+            "episode": standing.episode,
+            "step": standing.step,
+            "return": standing.episode_return,
+            "returns": list(self._tally.returns),
+            "reward_threshold": spec.reward_threshold if spec else None,
+            "steps": self._steps,
+            "fps": self.screen.fps if self._for_eyes else None,
+        }
+        if not self._was_reset:
+            return {**facts, "state": "not_reset"}, None
+        try:
+            return facts, self._picture(lane)
+        except GymServerError as refusal:
+            reason = {"why_no_picture": refusal.message, "hint": refusal.hint}
+            return {**facts, **reason, "observation": entries(self._observed(lane))}, None
+
+    def _observed(self, lane: int) -> object:
+        return self._observation
 
 
 class _Held:
@@ -310,7 +385,7 @@ class _Held:
 
     def __enter__(self) -> None:
         self._lock.acquire()
-        if self._instance._closed:
+        if self._instance.closed:
             self._lock.release()
             raise unknown_instance(self._instance.instance_id)
         self._instance._used = time.monotonic()

@@ -13,7 +13,7 @@ from gymnasium.vector import VectorEnv
 
 from gym_server import creation, registry, vectorization, wrappers
 from gym_server.choices import Choices
-from gym_server.errors import GymServerError, unknown_instance
+from gym_server.errors import GymServerError, shutting_down, unknown_instance
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.vector_instance import VectorInstance
@@ -57,7 +57,7 @@ class Instances:
             instance = make(choices, undo)
             with self._lock:
                 if self._stopping:
-                    raise GymServerError("shutting_down", "The server is stopping")
+                    raise shutting_down()
                 instance.instance_id = self._new_id()
                 self._instances[instance.instance_id] = instance
             undo.pop_all()
@@ -112,6 +112,13 @@ class Instances:
             raise unknown_instance(instance_id)
         instance.close()
         log.info("Closed instance %s", instance_id)
+
+    def end_watching(self) -> None:
+        """Send all watchers away: the server is about to stop."""
+        with self._lock:
+            instances = list(self._instances.values())
+        for instance in instances:
+            instance.screen.end(shutting_down())
 
     def close_all(self) -> None:
         """Close every instance and take no more."""

@@ -151,6 +151,10 @@ class SyncLanes(SyncVectorEnv):
         """Draw one lane."""
         return self.envs[lane].render()
 
+    def observation_of(self, lane: int) -> object:
+        """Return what one lane was last seen to be."""
+        return self._env_obs[lane]
+
 
 # What Gymnasium keeps of each lane, beside its observation.
 _FLAGS = ("_rewards", "_terminations", "_truncations", "_autoreset_envs")

@@ -48,6 +48,8 @@ class Call:
         body: the request's JSON object, or the query of a GET.
         fields: the values of the fields that the route declares; None for absent ones.
         tensors: whether the client wants tensors where the route has them.
+        url: the path as it was asked for.
+        accept: what the client says it takes.
     """
 
     services: Services
@@ -55,6 +57,8 @@ class Call:
     body: dict
     fields: dict
     tensors: bool = False
+    url: str = ""
+    accept: str = ""
 
     @property
     def instance(self) -> Instance:
@@ -100,20 +104,20 @@ class Route:
 
 ROUTES: list[Route] = []
 
-_INSTANCE = "/v1/envs/<instance_id>/"
+INSTANCE = "/v1/envs/<instance_id>/"
 
 
-def _route(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Handler], Handler]:
+def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Handler], Handler]:
     """Declare a handler as a route; ``how`` are the later attributes of Route."""
 
-    def declare(handler: Handler) -> Handler:
+    def as_route(handler: Handler) -> Handler:
         ROUTES.append(Route(method, path, fields, handler, **how))
         return handler
 
-    return declare
+    return as_route
 
 
-@_route(
+@declare(
     "POST",
     "/v1/envs/",
     Field("env_id", wire.ANY_ID, "What to create, such as CartPole-v1.", required=True),
@@ -123,7 +127,12 @@ def _route(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Hand
         "Seeds the action space, and the first reset without a seed; with num_envs also a list "
         "of one a lane.",
     ),
-    Field("render_mode", wire.TEXT, "rgb_array (the default where it is supported) or human."),
+    Field(
+        "render_mode",
+        wire.TEXT,
+        "rgb_array (the default where it is supported), or human: the same, but while somebody "
+        "watches it moves in real time.",
+    ),
     Field("kwargs", wire.OBJECT, "Handed to the environment."),
     Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field("num_envs", lane_fields.NUM_ENVS, "How many lanes; absent for a single environment."),
@@ -147,21 +156,21 @@ def env_create(call: Call) -> dict:
     return {"instance_id": call.services.instances.create(choices)}
 
 
-@_route("GET", "/v1/envs/", answer="all_envs: env_id by instance_id")
+@declare("GET", "/v1/envs/", answer="all_envs: env_id by instance_id")
 def env_list_all(call: Call) -> dict:
     """List the environments."""
     return {"all_envs": call.services.instances.env_ids()}
 
 
-@_route("GET", _INSTANCE, answer="all about the environment; needs_reset also after done")
+@declare("GET", INSTANCE, answer="all about the environment; needs_reset also after done")
 def env_about(call: Call) -> dict:
     """Tell all about an environment."""
     return call.instance.about()
 
 
-@_route(
+@declare(
     "POST",
-    _INSTANCE + "reset/",
+    INSTANCE + "reset/",
     Field(
         "seed",
         lane_fields.SEED,
@@ -181,16 +190,21 @@ def env_reset(call: Call) -> dict:
     )
 
 
-@_route(
+@declare(
     "POST",
-    _INSTANCE + "step/",
+    INSTANCE + "step/",
     Field(
         "action",
         wire.ANYTHING,
         "A member of the action space; with lanes a list of one for each lane that steps.",
         required=True,
     ),
-    Field("render", wire.BOOLEAN, "Classic; a frame is drawn when somebody asks for it."),
+    Field(
+        "render",
+        wire.BOOLEAN,
+        "Whether people want to see it: while somebody watches, the step waits until real time "
+        "has come so far.",
+    ),
     Field("step_mask", lane_fields.MASK, "Which lanes step; absent for all of them."),
     answer="observation, reward, done, terminated, truncated, info; with lanes one row for each "
     "that stepped, and final_obs and final_lanes where lanes ended and were reset at once",
@@ -201,28 +215,30 @@ def env_reset(call: Call) -> dict:
 def env_step(call: Call) -> dict:
     """Take one step."""
     fields = call.fields
-    return call.instance.step(fields["action"], call.tensors, fields["step_mask"])
+    return call.instance.step(
+        fields["action"], call.tensors, fields["step_mask"], fields["render"] or False
+    )
 
 
-@_route("GET", _INSTANCE + "action_space/", answer="info: the space")
+@declare("GET", INSTANCE + "action_space/", answer="info: the space")
 def env_action_space_info(call: Call) -> dict:
     """Describe the action space."""
     return {"info": call.instance.action_space_info}
 
 
-@_route("GET", _INSTANCE + "observation_space/", answer="info: the space")
+@declare("GET", INSTANCE + "observation_space/", answer="info: the space")
 def env_observation_space_info(call: Call) -> dict:
     """Describe the observation space."""
     return {"info": call.instance.observation_space_info}
 
 
-@_route("GET", _INSTANCE + "action_space/sample/", answer="action")
+@declare("GET", INSTANCE + "action_space/sample/", answer="action")
 def env_action_space_sample(call: Call) -> dict:
     """Draw an action."""
     return {"action": call.instance.sample_action()}
 
 
-@_route("GET", _INSTANCE + "action_space/contains/<x>/", answer="member: true or false")
+@declare("GET", INSTANCE + "action_space/contains/<x>/", answer="member: true or false")
 def env_action_space_contains(call: Call) -> dict:
     """Tell whether a value is an action."""
     value = wire.parse_path_value(call.path["x"])
@@ -232,21 +248,21 @@ def env_action_space_contains(call: Call) -> dict:
 _VALUE = Field("value", wire.ANYTHING, "Is it a member? Without it: is the description right?")
 
 
-@_route("POST", _INSTANCE + "action_space/contains/", _VALUE, answer="member: true or false")
+@declare("POST", INSTANCE + "action_space/contains/", _VALUE, answer="member: true or false")
 def env_action_space_contains_posted(call: Call) -> dict:
     """Tell whether a value is an action, or a description the action space's."""
     return {"member": call.instance.action_contains(call.body)}
 
 
-@_route("POST", _INSTANCE + "observation_space/contains/", _VALUE, answer="member: true or false")
+@declare("POST", INSTANCE + "observation_space/contains/", _VALUE, answer="member: true or false")
 def env_observation_space_contains(call: Call) -> dict:
     """Tell whether a value is an observation, or a description the observation space's."""
     return {"member": call.instance.observation_contains(call.body)}
 
 
-@_route(
+@declare(
     "GET",
-    _INSTANCE + "render/",
+    INSTANCE + "render/",
     Field("lane", lane_fields.LANE, "Which lane, from 0; absent for the first."),
     answer="the current frame",
     content_type="image/png",
@@ -260,9 +276,9 @@ def env_render(call: Call) -> Content:
     return Content(png(frame), "image/png")
 
 
-@_route(
+@declare(
     "POST",
-    _INSTANCE + "monitor/start/",
+    INSTANCE + "monitor/start/",
     Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
     Field("force", wire.BOOLEAN, "Delete what an earlier monitor wrote there."),
     Field("resume", wire.BOOLEAN, "Go on counting where the earlier monitor ended."),
@@ -280,19 +296,19 @@ def env_monitor_start(call: Call) -> None:
     )
 
 
-@_route("POST", _INSTANCE + "monitor/close/")
+@declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
     """Finish the monitor's files."""
     call.instance.close_monitor()
 
 
-@_route("POST", _INSTANCE + "close/", once=True)
+@declare("POST", INSTANCE + "close/", once=True)
 def env_close(call: Call) -> None:
     """Close an environment."""
     call.services.instances.close(call.path["instance_id"])
 
 
-@_route(
+@declare(
     "POST",
     "/v1/upload/",
     Field("training_dir", wire.TEXT, "A monitor's directory.", required=True),
@@ -309,14 +325,14 @@ def upload(call: Call) -> None:
     )
 
 
-@_route("POST", "/v1/shutdown/", answer="message")
+@declare("POST", "/v1/shutdown/", answer="message")
 def shutdown(call: Call) -> dict:
     """Answer the requests under way and stop the server."""
     call.services.stop()
     return {"message": "Server shutting down"}
 
 
-@_route(
+@declare(
     "GET",
     "/v1/registry/",
     Field("search", wire.TEXT, "A part of the id; when it is part of none, the nearest ids."),
@@ -327,7 +343,7 @@ def env_registry(call: Call) -> dict:
     return {"environments": call.services.instances.registered(call.fields["search"])}
 
 
-@_route("GET", "/v1/health/", answer="status, instances, versions, pid")
+@declare("GET", "/v1/health/", answer="status, instances, versions, pid")
 def health(call: Call) -> dict:
     """Tell that the server is well, and its versions."""
     return {
@@ -343,7 +359,7 @@ def health(call: Call) -> dict:
     }
 
 
-@_route("GET", "/v1/openapi.json/", answer="this document")
+@declare("GET", "/v1/openapi.json/", answer="this document")
 def openapi_document(call: Call) -> dict:
     """Describe the protocol for machines."""
     return openapi.document(ROUTES)

@@ -67,15 +67,23 @@ def bind(host: str, port: int) -> socket.socket:
 class Server:
     """A server on a bound socket."""
 
-    def __init__(self, app: Callable, listener: socket.socket, max_body_bytes: int) -> None:
+    def __init__(
+        self,
+        app: Callable,
+        listener: socket.socket,
+        max_body_bytes: int,
+        on_stop: Callable[[], None] = lambda: None,
+    ) -> None:
         """Serve nothing yet: ``run()`` does.
 
         Args:
             app: a WSGI application.
             listener: a listening socket, as ``bind()`` returns it.
             max_body_bytes: the size of the largest request body.
+            on_stop: called when the stop has come and requests are still under way.
         """
         self._app = app
+        self._on_stop = on_stop
         self._listener = listener
         self._max_body_bytes = max_body_bytes
         host, self.port = listener.getsockname()[:2]
@@ -118,6 +126,7 @@ class Server:
         self._listener.close()
         self._wake.close()
         self._waker.close()
+        self._on_stop()
         return self._drain(grace)
 
     def _drain(self, grace: float) -> bool:

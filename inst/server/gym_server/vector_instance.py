@@ -16,7 +16,9 @@ from gym_server.errors import GymServerError, wrong_length
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance, reset_needed
 from gym_server.lanes import AsyncLanes, SyncLanes
+from gym_server.observed import lane_of
 from gym_server.plain import plain
+from gym_server.tally import LaneTally
 from gym_server.wrappers import draws_when_stepped
 
 # What draws all lanes at once may have no more than these.
@@ -27,6 +29,7 @@ class VectorInstance(Instance):
     """A vector environment; see ``Instance`` for what is the same."""
 
     _env: VectorEnv
+    _tally: LaneTally
 
     def __init__(self, env: VectorEnv, mode: str, choices: Choices, renderer: RenderThread) -> None:
         """Take over a vector environment.
@@ -42,7 +45,7 @@ class VectorInstance(Instance):
         """
         self._mode = mode
         self._autoreset_mode = env.metadata["autoreset_mode"]
-        self._lanes = env.num_envs
+        self._lanes = self._num_envs = env.num_envs
         # The lanes that ended, where nobody resets them.
         self._ended = np.zeros(env.num_envs, dtype=bool)
         super().__init__(env, choices, renderer)
@@ -62,6 +65,9 @@ class VectorInstance(Instance):
 
     def _find_out_whether_it_draws(self) -> bool:
         return isinstance(self._env, SyncLanes) and draws_when_stepped(self._env.envs[0])
+
+    def _make_tally(self) -> LaneTally:
+        return LaneTally(self._lanes, self._autoreset_mode)
 
     @cached_property
     def action_space_info(self) -> dict:
@@ -98,6 +104,8 @@ class VectorInstance(Instance):
             GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
                 before the first reset); ``environment_error``.
         """
+        if self._for_eyes:
+            self.screen.pace()
         with self._held:
             self._check_seed(seed)
             self._check_options(options)
@@ -116,6 +124,8 @@ class VectorInstance(Instance):
                 # One generator serves all lanes.
                 self._seed_actions(seed)
             self._ended[slice(None) if mask is None else mask] = False
+            self._tally.begin(mask)
+            self._observation = observation
             return {
                 "observation": ask(self._encode, observation, tensors),
                 "info": ask(plain, info) if info else {},
@@ -168,13 +178,20 @@ class VectorInstance(Instance):
 
     # Step -----------------------------------------------------------------------------------
 
-    def step(self, action: object, tensors: bool = False, mask: np.ndarray | None = None) -> dict:
+    def step(
+        self,
+        action: object,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+        for_eyes: bool = False,
+    ) -> dict:
         """Take one step in every lane, or in those of a mask.
 
         Args:
             action: a list of one JSON value for each lane that steps, or a batch as ``Parts``.
             tensors: whether the answer is wanted as tensors.
             mask: a boolean a lane; None for all of them.
+            for_eyes: as for a single environment.
 
         Returns:
             As for a single environment, with one row for each lane that stepped: arrays where
@@ -187,6 +204,8 @@ class VectorInstance(Instance):
                 ``reset_needed`` also for a lane that ended and is not reset by itself;
                 ``invalid_parameter``, ``not_supported``.
         """
+        if for_eyes or self._for_eyes:
+            self.screen.pace()
         with self._held:
             if not self._was_reset:
                 raise reset_needed("step()")
@@ -239,12 +258,15 @@ class VectorInstance(Instance):
         else:
             moved = self._move(self._env.step_lanes, lanes, batch)
         observation, reward, terminated, truncated, info = moved
+        reward = _reward(reward)
+        self._tally.step(reward, terminated | truncated, lanes)
+        self._observation = observation
         if self._autoreset_mode is AutoresetMode.DISABLED:
             self._ended[slice(None) if lanes is None else lanes] = terminated | truncated
         final = self._take_final(info, tensors) if info else {}
         result = {
             "observation": self._encode(observation, tensors),
-            "reward": _reward(reward),
+            "reward": reward,
             "terminated": np.asarray(terminated, dtype=bool),
             "truncated": np.asarray(truncated, dtype=bool),
             "info": plain(info) if info else {},
@@ -308,6 +330,12 @@ class VectorInstance(Instance):
             )
         return self._renderer.run(self._env.render)[lane]
 
+    def _observed(self, lane: int) -> object:
+        if isinstance(self._env, SyncLanes):
+            # The last batch may have held only some of the lanes.
+            return self._env.observation_of(lane)
+        return lane_of(self._lane_observation_space, self._observation, lane)
+
     def _close_env(self) -> None:
         if isinstance(self._env, AsyncLanes):
             self._env.close()
@@ -326,7 +354,6 @@ class VectorInstance(Instance):
         """Return all that is known of the instance, without waiting for its environment."""
         return {
             **super().about(),
-            "num_envs": self._lanes,
             "vectorization_mode": self._mode,
             "autoreset_mode": self._autoreset_mode.value,
             "episode_steps": None,

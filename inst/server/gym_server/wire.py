@@ -284,10 +284,12 @@ class Answer(NamedTuple):
 
 
 class Content(NamedTuple):
-    """A result that is no JSON."""
+    """A result that is bytes already."""
 
     data: bytes
     content_type: str
+    status: int = 200
+    headers: tuple[tuple[str, str], ...] = ()
 
 
 def answer(
@@ -302,7 +304,7 @@ def answer(
         status: the HTTP status of a JSON answer.
     """
     if isinstance(result, Content):
-        return Answer(200, *result)
+        return Answer(result.status, result.data, result.content_type, result.headers)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default type here.

@@ -210,6 +210,7 @@ def test_all_about_an_instance(client, create):
         "episode_steps": 1,
         "needs_reset": False,
         "monitor": None,
+        "watched": False,
     }
 
 

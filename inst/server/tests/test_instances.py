@@ -60,7 +60,7 @@ def test_who_waits_for_an_instance_that_closes_learns_that_it_is_gone(
     with instance._lock:
         waiting = in_background(f"{url}/step/", {"action": 0})
         time.sleep(0.2)
-        instance._closed = True
+        instance.closed = True
     assert waiting().json["message"] == f"Instance_id {instance.instance_id} unknown"
     assert instance.about()["steps"] == 0
 

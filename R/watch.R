@@ -1,0 +1,123 @@
+# The page on which a server shows an environment, and how people get to it.
+
+#' Watch an environment
+#'
+#' Opens the page on which the server shows an environment live: its picture, the
+#' episode, the step, the return so far and the returns of the last 100 episodes. An
+#' environment that draws no pictures shows its observations. The page is part of
+#' the server; as many people can watch as like to, and each can pause it or slow it down
+#' for themselves.
+#'
+#' An environment made with `render_mode = "human"` opens its page by itself, and so does
+#' the first [env_step()] with `render = TRUE`.
+#'
+#' # How fast it moves
+#'
+#' An environment that is stepped goes as fast as it is stepped, and people see samples
+#' of what goes by, at most 30 a second. One made with `render_mode = "human"`, or
+#' stepped with `render = TRUE`, is shown in real time, as in Gymnasium's own human
+#' mode: while somebody watches each step waits until the environment's clock (CartPole's
+#' ticks 50 times a second) has come so far. Unwatched it runs at full speed. The pace is
+#' the environment's own: pausing the page, or slowing it down, does not change it.
+#'
+#' Pictures are drawn only while somebody watches, and take at most a fifth of the
+#' environment's time (half of it in real time).
+#'
+#' # Where it opens
+#'
+#' In an interactive session the page opens in RStudio's viewer, else in the browser. In a
+#' script the address is printed, once an environment, as a message of class
+#' `gym_message_watch`, so that
+#' `withCallingHandlers(..., gym_message_watch = function(m) invokeRestart("muffleMessage"))`
+#' or [suppressMessages()] keeps it away.
+#'
+#' `options(gym.viewer = )` has it otherwise, in scripts too: a function, such as
+#' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
+#' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
+#' until the page is there, at most 5 seconds, so that nobody misses the beginning.
+#'
+#' @inheritParams env_reset
+#' @return The page's address, a string, invisibly.
+#' @section Errors: `gym_error_http_400` for an unknown instance;
+#'   `gym_error_argument` when the option `gym.viewer` is neither a function nor `FALSE`;
+#'   `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", seed = 1)
+#' address <- env_watch(env$client, env$instance_id)
+#' address
+#' env$reset()
+#' for (i in 1:10) env$step(i %% 2)
+#' env$close()
+env_watch <- function(x, instance_id) {
+  open_watch(x, known_instance(x, instance_id))
+}
+
+# For an environment that people want to see, when they see it for the first time.
+show_instance <- function(x, instance, call = rlang::caller_env()) {
+  if (is.null(instance$shown)) {
+    open_watch(x, instance, call)
+  }
+}
+
+open_watch <- function(x, instance, call = rlang::caller_env()) {
+  address <- paste0(x$remote_base, instance$route, "watch/")
+  viewer <- check_viewer(call)
+  # A viewer that fails does so once.
+  instance$shown <- TRUE
+  if (isFALSE(viewer)) {
+    return(invisible(address))
+  }
+  if (is.function(viewer)) {
+    viewer(address)
+    await_watcher(x, instance)
+  } else if (open_by_default(address)) {
+    await_watcher(x, instance)
+  } else {
+    rlang::inform(
+      paste0("Watch ", instance$spec$id, " at ", address), class = "gym_message_watch"
+    )
+  }
+  invisible(address)
+}
+
+# What the option says: a function of the address, FALSE for nothing at all, NULL.
+check_viewer <- function(call) {
+  viewer <- getOption("gym.viewer")
+  if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {
+    gym_abort(
+      paste0("The option `gym.viewer` must be a function of an address, or FALSE, not ",
+             describe_argument(viewer), "."),
+      class = "gym_error_argument", argument = "gym.viewer", value = viewer, call = call
+    )
+  }
+  viewer
+}
+
+# Whether it could be done: a machine may have no browser.
+open_by_default <- function(address) {
+  if (!rlang::is_interactive()) {
+    return(FALSE)
+  }
+  # RStudio's pane takes addresses of this machine.
+  pane <- if (is_loopback(address)) getOption("viewer")
+  viewer <- pane %||% utils::browseURL
+  tryCatch(
+    {
+      viewer(address)
+      TRUE
+    },
+    error = function(cnd) FALSE
+  )
+}
+
+# A browser takes a moment to start, and a fast environment would be past all that there
+# is to see.
+await_watcher <- function(x, instance) {
+  deadline <- Sys.time() + watcher_patience
+  while (Sys.time() < deadline && !isTRUE(get_answer(x, instance$route)$watched)) {
+    Sys.sleep(0.1)
+  }
+}
+
+watcher_patience <- 5

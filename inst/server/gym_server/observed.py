@@ -1,0 +1,72 @@
+"""An observation as a list of numbers and texts with names, for eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from gymnasium.spaces import Dict, Space, Tuple
+
+# More of them nobody can look at.
+_MOST = 64
+_LONGEST_TEXT = 200
+
+
+def lane_of(space: Space, batch: object, lane: int) -> object:
+    """Return the observation of one lane out of a batch.
+
+    Args:
+        space: of one lane.
+        batch: as Gymnasium's vector environments have it.
+        lane: its number, from 0.
+    """
+    match space:
+        case Dict():
+            return {key: lane_of(part, batch[key], lane) for key, part in space.spaces.items()}
+        case Tuple():
+            parts = zip(space.spaces, batch, strict=True)
+            return tuple(lane_of(part, items, lane) for part, items in parts)
+        case _:
+            return batch[lane]
+
+
+def entries(observation: object) -> dict:
+    """Return the numbers and texts of an observation, whatever holds them.
+
+    Returns:
+        ``{"names", "values", "size"}``: at most 64 of each, and how many there are in all.  A
+        name is the place, such as ``camera[0]``, and "" for an observation of one value.
+    """
+    names: list[str] = []
+    values: list[float | int | str] = []
+    size = 0
+    for name, leaf in _leaves("", observation):
+        array = np.asarray(leaf)
+        size += array.size
+        room = _MOST - len(values)
+        if room > 0:
+            shown = array.reshape(-1)[:room]
+            names += [name] if array.ndim == 0 else [f"{name}[{i}]" for i in range(len(shown))]
+            values += [_value(item) for item in shown.tolist()]
+    return {"names": names, "values": values, "size": size}
+
+
+def _leaves(name: str, value: object) -> Iterator[tuple[str, object]]:
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _leaves(f"{name}.{key}" if name else str(key), part)
+    elif isinstance(value, tuple) and hasattr(value, "_asdict"):
+        # A graph.
+        yield from _leaves(name, value._asdict())
+    elif isinstance(value, (tuple, list)):
+        for index, part in enumerate(value):
+            yield from _leaves(f"{name}[{index}]", part)
+    elif value is not None:
+        yield name, value
+
+
+def _value(item: object) -> float | int | str:
+    if isinstance(item, (bool, int, float)):
+        return item
+    text = str(item)
+    return text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…"

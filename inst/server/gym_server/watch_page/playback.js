@@ -1,0 +1,69 @@
+// How this view is shown: live, or a short clip slowly and then on from the present.
+
+const CLIP_SECONDS = 2;
+
+export class Playback {
+  constructor(show) {
+    this.show = show;
+    this.slowness = 1;
+    this.paused = false;
+    this.drop();
+  }
+
+  // Whether more is wanted: not while a clip that is complete is still being shown.
+  get wants() {
+    return !this.paused && !this.complete;
+  }
+
+  setSlowness(slowness) {
+    this.slowness = slowness;
+    this.drop();
+  }
+
+  setPaused(paused) {
+    this.paused = paused;
+    // The latest wins: what came meanwhile is past.
+    this.drop();
+  }
+
+  drop() {
+    clearTimeout(this.timer);
+    this.timer = null;
+    this.clip = [];
+    this.complete = false;
+  }
+
+  arrive(shot) {
+    if (this.paused) return;
+    if (this.slowness === 1) {
+      this.show(shot);
+      return;
+    }
+    const now = performance.now();
+    if (!this.clip.length && this.timer === null) {
+      this.filmed = this.played = now;
+      this.clip.push({ shot, at: now });
+      this.playNext();
+      return;
+    }
+    this.clip.push({ shot, at: now });
+    this.complete = now - this.filmed > CLIP_SECONDS * 1000;
+    if (this.timer === null) this.playNext();
+  }
+
+  playNext() {
+    const next = this.clip[0];
+    if (!next) {
+      // All that was filmed is shown.
+      this.timer = null;
+      if (this.complete || performance.now() - this.filmed > CLIP_SECONDS * 1000) this.drop();
+      return;
+    }
+    const due = this.played + (next.at - this.filmed) * this.slowness;
+    this.timer = setTimeout(() => {
+      this.clip.shift();
+      this.show(next.shot);
+      this.playNext();
+    }, Math.max(0, due - performance.now()));
+  }
+}

@@ -1,0 +1,313 @@
+// Follows one environment: asks for what is new, and shows it.
+
+import { number } from "./canvas.js";
+import { drawChart } from "./chart.js";
+import { Observation } from "./observation.js";
+import { Playback } from "./playback.js";
+
+const $ = (id) => document.getElementById(id);
+// The page's own address, whether or not it was asked for with its last slash.
+const HERE = new URL(location.pathname.replace(/\/?$/, "/"), location.href);
+const GONE_PAUSE = 1000;
+const PRESENCE_PAUSE = 700;
+const STILL_AFTER = 1500;
+
+const observation = new Observation($("observation"));
+const playback = new Playback(show);
+let lane = 0;
+let after = null;
+let shown = null;
+let question = null;
+let wake = () => {};
+let quiet = null;
+let pace = null;
+
+// Asking ------------------------------------------------------------------------------------
+
+async function follow() {
+  for (;;) {
+    try {
+      if (playback.wants && !document.hidden) {
+        await askForNews();
+      } else {
+        // Still there, but nothing needs to be drawn.
+        await ask("presence/");
+        if (document.body.dataset.state === "gone") returnFromGone();
+        await sleep(PRESENCE_PAUSE);
+      }
+    } catch (problem) {
+      if (problem.name === "AbortError") continue;
+      if (problem.code === "unknown_instance") {
+        await tellClosed();
+        return;
+      }
+      if (problem.code === "invalid_parameter" && lane > 0) {
+        setLane(0);
+        continue;
+      }
+      after = null;
+      if (problem.status === 500) tell("faulty", "This cannot be shown", problem.message);
+      else tell("gone", "The server is gone", "This page goes on by itself when it is back.");
+      await sleep(GONE_PAUSE);
+    }
+  }
+}
+
+async function askForNews() {
+  const query = new URLSearchParams({ lane });
+  if (after !== null) query.set("after", after);
+  const asked = lane;
+  const shot = await ask(`state/?${query}`);
+  if (asked !== lane || playback.paused) return;
+  if (shot.state === "busy") {
+    setState("busy", "busy: a step takes long");
+    return;
+  }
+  const isNew = shot.number !== after;
+  after = shot.number;
+  if (isNew) playback.arrive(shot);
+}
+
+async function ask(path) {
+  question = new AbortController();
+  const answer = await fetch(new URL(path, HERE), { cache: "no-store", signal: question.signal });
+  const content = await answer.json();
+  if (!answer.ok) throw Object.assign(new Error(content.message), content, { status: answer.status });
+  return content;
+}
+
+function sleep(milliseconds) {
+  return new Promise((resolve) => {
+    const timer = setTimeout(resolve, milliseconds);
+    wake = () => {
+      clearTimeout(timer);
+      resolve();
+    };
+  });
+}
+
+function askAnew() {
+  if (question) question.abort();
+  wake();
+}
+
+// Showing -----------------------------------------------------------------------------------
+
+async function show(shot) {
+  shown = shot;
+  hideMessage();
+  $("env").textContent = shot.env_id;
+  document.title = `${shot.env_id} · episode ${shot.episode}`;
+  showLanes(shot);
+  $("episode").textContent = shot.episode ? number(shot.episode) : "–";
+  $("step").textContent = shot.episode ? number(shot.step) : "–";
+  $("return").textContent = shot.episode ? number(shot.return) : "–";
+  showReturns(shot);
+  showPace(shot);
+  $("observation").hidden = !shot.observation;
+  $("why").hidden = !shot.observation;
+  $("scene").classList.toggle("observing", Boolean(shot.observation));
+  $("picture").hidden = !shot.frame;
+  if (shot.state === "not_reset") {
+    tell("waiting", "Not reset yet", "There is something to see when its first episode begins.");
+    return;
+  }
+  setLive(shot);
+  if (shot.observation) showObservation(shot);
+  if (shot.frame) await showPicture(shot);
+}
+
+async function showPicture(shot) {
+  const bytes = Uint8Array.from(atob(shot.frame), (letter) => letter.charCodeAt(0));
+  const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+  // A later one may have been quicker.
+  if (shown !== shot) return;
+  const canvas = $("picture");
+  if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
+    canvas.width = bitmap.width;
+    canvas.height = bitmap.height;
+  }
+  canvas.classList.toggle("coarse", bitmap.width * 2 < canvas.clientWidth);
+  const pen = canvas.getContext("2d");
+  pen.clearRect(0, 0, canvas.width, canvas.height);
+  pen.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  const where = shot.lanes === null ? "" : `, lane ${shot.lane + 1}`;
+  canvas.setAttribute(
+    "aria-label", `${shot.env_id}${where}, episode ${shot.episode}, step ${shot.step}`
+  );
+}
+
+function showObservation({ observation: seen, why_no_picture: why, hint }) {
+  const shownOf =
+    seen.size > seen.values.length
+      ? `its observation, ${seen.values.length} of ${number(seen.size)} numbers`
+      : "its observation";
+  const advice = hint ? ` (${hint})` : "";
+  $("why").textContent = `No picture: ${why}${advice}. Here is ${shownOf}.`;
+  observation.draw(seen);
+}
+
+function showLanes({ lanes }) {
+  $("lanes").hidden = lanes === null;
+  if (lanes === null) return;
+  $("lane").max = lanes;
+  $("of").textContent = `of ${number(lanes)}`;
+}
+
+let charted = null;
+function showReturns({ returns, lanes, reward_threshold: goal }) {
+  const key = returns.join();
+  if (key === charted) return;
+  charted = key;
+  const whose = lanes === null ? "" : " of all lanes";
+  const many = returns.length === 1 ? "the last episode" : `the last ${returns.length} episodes`;
+  $("caption").textContent = `Returns of ${returns.length ? many : "the last episodes"}${whose}`;
+  const mean = returns.map(Number).reduce((sum, value) => sum + value, 0) / returns.length;
+  $("mean").textContent = returns.length ? `mean ${number(mean)}` : "";
+  drawChart($("chart"), returns, goal);
+}
+
+function showPace({ steps, fps }) {
+  const now = performance.now();
+  if (!pace || steps < pace.steps) pace = { steps, now, rate: null };
+  const seconds = (now - pace.now) / 1000;
+  if (seconds > 1) pace = { steps, now, rate: (steps - pace.steps) / seconds };
+  const rate = pace.rate === null ? "" : `${number(Math.round(pace.rate))} steps a second`;
+  const real = fps === null ? "" : `real time (at most ${number(fps)})`;
+  $("pace").textContent = [rate, real].filter(Boolean).join(" · ");
+}
+
+// Saying ------------------------------------------------------------------------------------
+
+function setState(state, words) {
+  document.body.dataset.state = state;
+  if ($("state").textContent !== words) $("state").textContent = words;
+}
+
+function setLive({ state }) {
+  clearTimeout(quiet);
+  if (playback.paused) return;
+  setState("live", "live");
+  const still = state === "ended" ? "episode ended" : "standing still";
+  quiet = setTimeout(() => {
+    if (document.body.dataset.state !== "live" || playback.paused) return;
+    setState("still", still);
+    $("pace").textContent = "Nobody steps it at the moment";
+    pace = null;
+  }, STILL_AFTER);
+}
+
+const BADGES = {
+  waiting: "waiting for a reset",
+  faulty: "a fault",
+  closed: "closed",
+  gone: "server gone",
+};
+
+function tell(state, words, advice) {
+  clearTimeout(quiet);
+  setState(state, BADGES[state]);
+  $("words").textContent = words;
+  $("advice").textContent = advice;
+  $("message").hidden = false;
+  if (state !== "closed") $("others").replaceChildren();
+}
+
+function returnFromGone() {
+  hideMessage();
+  setState(playback.paused ? "paused" : "live", playback.paused ? "paused" : "live");
+}
+
+function hideMessage() {
+  $("message").hidden = true;
+}
+
+async function tellClosed() {
+  tell("closed", "This environment is closed", "");
+  $("pause").disabled = true;
+  $("pace").textContent = "";
+  if (!shown) $("env").textContent = "Closed";
+  for (;;) {
+    try {
+      const open = Object.entries((await ask("../../")).all_envs);
+      const links = open.map(([id, name]) => {
+        const link = Object.assign(document.createElement("a"), { textContent: `${name} (${id})` });
+        link.href = new URL(`../../${encodeURIComponent(id)}/watch/`, HERE);
+        const item = document.createElement("li");
+        item.append(link);
+        return item;
+      });
+      $("advice").textContent = open.length
+        ? "Others on this server:"
+        : "There is no other on this server at the moment.";
+      if (links.length !== $("others").children.length || links.some((item, i) =>
+        item.textContent !== $("others").children[i].textContent)) {
+        $("others").replaceChildren(...links);
+      }
+    } catch {
+      $("advice").textContent = "Its server is gone, too.";
+      $("others").replaceChildren();
+    }
+    await sleep(2 * GONE_PAUSE);
+  }
+}
+
+// Being told --------------------------------------------------------------------------------
+
+function setPaused(paused) {
+  playback.setPaused(paused);
+  $("pause").setAttribute("aria-pressed", paused);
+  $("pause").textContent = paused ? "Go on" : "Pause";
+  clearTimeout(quiet);
+  pace = null;
+  if (document.body.dataset.state !== "gone") {
+    setState(paused ? "paused" : "live", paused ? "paused" : "live");
+  }
+  askAnew();
+}
+
+function setLane(number) {
+  lane = number;
+  after = null;
+  $("lane").value = number + 1;
+  observation.forget();
+  playback.drop();
+  askAnew();
+}
+
+$("pause").addEventListener("click", () => setPaused(!playback.paused));
+
+$("speeds").addEventListener("change", (event) => {
+  playback.setSlowness(Number(event.target.value));
+  wake();
+});
+
+$("lane").addEventListener("change", () => {
+  const wanted = Math.min(Math.max(1, Math.round(Number($("lane").value) || 1)), $("lane").max);
+  setLane(wanted - 1);
+});
+
+document.addEventListener("keydown", (event) => {
+  const own = event.target.closest("button, a, input[type=number]");
+  if (event.code !== "Space" || own || event.ctrlKey || event.altKey || event.metaKey) return;
+  event.preventDefault();
+  if (!$("pause").disabled) setPaused(!playback.paused);
+});
+
+document.addEventListener("visibilitychange", askAnew);
+
+function redraw() {
+  if (!shown) {
+    drawChart($("chart"), [], null);
+    return;
+  }
+  charted = null;
+  showReturns(shown);
+  if (shown.observation) observation.paint(shown.observation.names, shown.observation.values);
+}
+new ResizeObserver(redraw).observe($("chart"));
+window.addEventListener("resize", redraw);
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+
+follow();

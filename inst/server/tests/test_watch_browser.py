@@ -1,0 +1,303 @@
+"""The watch page in a real browser, while R searches and Python plays."""
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import threading
+import time
+
+import pytest
+
+selenium = pytest.importorskip("selenium", reason="selenium is not installed (the extra 'dev')")
+
+from selenium import webdriver  # noqa: E402
+from selenium.webdriver.chrome.service import Service  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+from selenium.webdriver.common.keys import Keys  # noqa: E402
+
+_MINUS, _DASH = "\u2212", "\u2013"
+
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def _found(names):
+    return next(filter(None, map(shutil.which, names)), None)
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Start a browser without a window."""
+    binary, driver = _found(_BROWSERS), shutil.which("chromedriver")
+    if binary is None or driver is None:
+        pytest.skip("there is no Chromium with its chromedriver on the PATH")
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(options=options, service=Service(driver))
+    browser.set_window_size(1100, 700)
+    yield browser
+    browser.quit()
+
+
+@pytest.fixture
+def browser(chromium):
+    """Give a browser that shows nothing, and end with one."""
+    chromium.get("about:blank")
+    chromium.get_log("browser")
+    yield chromium
+    for window in chromium.window_handles[1:]:
+        chromium.switch_to.window(window)
+        chromium.close()
+    chromium.switch_to.window(chromium.window_handles[0])
+    chromium.get("about:blank")
+
+
+@pytest.fixture
+def server(serve):
+    return serve()
+
+
+@pytest.fixture
+def play(server):
+    """Play on in the background until the test is over."""
+    threads, over = [], threading.Event()
+
+    def play(url, pause=0.0, render=False):
+        def run():
+            connection = server.connect()
+
+            def call(method, path, **fields):
+                body = json.dumps(fields) if method == "POST" else None
+                connection.request(method, url + path, body)
+                return json.loads(connection.getresponse().read())
+
+            # Until the server or the environment is gone.
+            with contextlib.suppress(Exception), contextlib.closing(connection):
+                call("POST", "/reset/", seed=1)
+                while not over.wait(pause):
+                    action = call("GET", "/action_space/sample")["action"]
+                    out = call("POST", "/step/", action=action, render=render)
+                    if out["done"] is True:
+                        call("POST", "/reset/")
+
+        threads.append(threading.Thread(target=run))
+        threads[-1].start()
+
+    yield play
+    over.set()
+    for thread in threads:
+        thread.join()
+
+
+@pytest.fixture
+def look(browser, server):
+    """Open an environment's page."""
+    return lambda url: browser.get(f"http://127.0.0.1:{server.port}{url}/watch/")
+
+
+def text(browser, name):
+    return browser.find_element(By.ID, name).text
+
+
+def number(browser, name):
+    words = text(browser, name).replace(",", "").replace(_MINUS, "-")
+    return float(words) if words.strip(_DASH) else 0.0
+
+
+def picture(browser):
+    return browser.execute_script("return document.getElementById('picture').toDataURL()")
+
+
+def pictures(browser, seconds=1.5):
+    """Return the different pictures that are shown for a while."""
+    seen, end = set(), time.monotonic() + seconds
+    while time.monotonic() < end:
+        seen.add(picture(browser))
+    return seen
+
+
+def complaints(browser):
+    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def drawn(server, url):
+    """Return how often an environment was drawn; asking for it draws it, too, if it moved."""
+    return server.get(f"{url}/watch/state/")[1]["number"]
+
+
+# A search from R -----------------------------------------------------------------------------
+
+_SEARCH = """
+library(gym)
+options(gym.viewer = function(address) cat(address, "\\n", sep = "", file = stdout()))
+env <- gym_make("CartPole-v0", render_mode = "human")
+search_random(env, rounds = 500, target = Inf, seed = 1, progress = FALSE)
+"""
+
+
+def _r_has_the_package():
+    rscript = shutil.which("Rscript")
+    if rscript is None:
+        return False
+    asked = [rscript, "-e", "cat('env_watch' %in% getNamespaceExports('gym'))"]
+    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout == "TRUE"
+
+
+@pytest.fixture
+def search(server):
+    """Search from R, for people to see, in the test's server; return the page's address."""
+    if not _r_has_the_package():
+        pytest.skip("there is no R with this package")
+    process = subprocess.Popen(
+        ["Rscript", "-e", _SEARCH],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "GYM_SERVER_URL": f"http://127.0.0.1:{server.port}"},
+        text=True,
+    )
+    yield process.stdout.readline().strip()
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, eventually):
+    assert search.endswith("/watch/")
+    url = search.removeprefix(f"http://127.0.0.1:{server.port}").removesuffix("/watch/")
+    browser.get(search)
+    eventually(lambda: text(browser, "env") == "CartPole-v0")
+    # The picture changes, and the counters count.
+    eventually(lambda: number(browser, "step") > 0)
+    assert len(pictures(browser)) > 5
+    episode = number(browser, "episode")
+    eventually(lambda: number(browser, "episode") > episode + 1, seconds=30)
+    eventually(lambda: "mean" in text(browser, "mean"))
+    assert text(browser, "state") == "live"
+    assert "real time" in text(browser, "pace")
+
+    # Pause freezes this view, and nothing else.
+    steps = server.get(url)[1]["steps"]
+    browser.find_element(By.TAG_NAME, "body").send_keys(Keys.SPACE)
+    eventually(lambda: text(browser, "state") == "paused")
+    assert len(pictures(browser)) == 1
+    assert server.get(url)[1]["steps"] > steps
+    browser.find_element(By.ID, "pause").click()
+    assert len(pictures(browser)) > 5
+    assert complaints(browser) == []
+
+    # Who leaves is drawn no more for, and the search goes on at its full speed.
+    browser.get("about:blank")
+    time.sleep(1)
+    number_then = drawn(server, url)
+    time.sleep(1)
+    assert drawn(server, url) == number_then + 1
+    # That was a look, too.
+    time.sleep(2.5)
+    steps = server.get(url)[1]["steps"]
+    time.sleep(2)
+    assert server.get(url)[1]["steps"] > steps + 150
+
+
+# What Python plays ---------------------------------------------------------------------------
+
+
+def test_two_people_watch_and_only_one_of_them_pauses(browser, server, play, look, eventually):
+    url = server.create("MountainCar-v0")
+    play(url, pause=0.01)
+    look(url)
+    first = browser.current_window_handle
+    browser.switch_to.new_window("window")
+    look(url)
+    eventually(lambda: number(browser, "step") > 0)
+    browser.find_element(By.ID, "pause").click()
+    eventually(lambda: text(browser, "state") == "paused")
+    assert len(pictures(browser)) == 1
+    browser.switch_to.window(first)
+    assert len(pictures(browser)) > 5
+
+
+@pytest.mark.parametrize("speed", ["2", "4"])
+def test_slow_motion_goes_on_and_catches_up(browser, server, play, look, eventually, speed):
+    url = server.create("CartPole-v1")
+    play(url, pause=0.02)
+    look(url)
+    eventually(lambda: number(browser, "step") > 0)
+    choice = browser.find_element(By.CSS_SELECTOR, f"input[value='{speed}']")
+    browser.execute_script("arguments[0].click()", choice)
+    assert len(pictures(browser, 3)) > 5
+    # Two seconds take four, or eight; then it is the present's turn.
+    steps = server.get(url)[1]["steps"]
+    shown = "return document.getElementById('episode').textContent"
+    episode = server.get(f"{url}/watch/state/")[1]["episode"]
+    assert steps > 0
+    eventually(lambda: float(browser.execute_script(shown)) > episode, seconds=30)
+
+
+def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, eventually):
+    url = server.create("faulty_envs:Counting-v0")
+    play(url, pause=0.02)
+    look(url)
+    eventually(lambda: "draws no pictures" in text(browser, "why"))
+    canvas = browser.find_element(By.ID, "observation")
+    assert canvas.is_displayed()
+    assert not browser.find_element(By.ID, "picture").is_displayed()
+    said = canvas.get_attribute("aria-label")
+    eventually(lambda: canvas.get_attribute("aria-label") != said)
+    assert complaints(browser) == []
+
+
+def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
+    url = server.create("CartPole-v1", num_envs=3, vectorization_mode="sync")
+    server.post(f"{url}/reset/", {"seed": 1})
+    look(url)
+    eventually(lambda: text(browser, "of") == "of 3")
+    eventually(lambda: browser.find_element(By.ID, "picture").is_displayed())
+    time.sleep(0.5)
+    first = picture(browser)
+    lane = browser.find_element(By.ID, "lane")
+    lane.clear()
+    lane.send_keys("3" + Keys.ENTER)
+    eventually(lambda: picture(browser) != first)
+    label = browser.find_element(By.ID, "picture").get_attribute("aria-label")
+    assert "lane 3" in label
+    assert "of all lanes" in text(browser, "caption")
+
+
+def test_what_is_not_there_is_said_in_words(browser, server, look, eventually):
+    url = server.create("CartPole-v1")
+    look(url)
+    eventually(lambda: text(browser, "words") == "Not reset yet")
+    server.post(f"{url}/reset/")
+    eventually(lambda: not browser.find_element(By.ID, "message").is_displayed())
+    eventually(lambda: text(browser, "state") == "standing still")
+    other = server.create("MountainCar-v0")
+    server.post(f"{url}/close/")
+    eventually(lambda: text(browser, "words") == "This environment is closed")
+    eventually(lambda: "MountainCar-v0" in text(browser, "others"))
+    browser.find_element(By.CSS_SELECTOR, "#others a").click()
+    eventually(lambda: browser.current_url.endswith(f"{other}/watch/"))
+    look("/v1/envs/00000000")
+    eventually(lambda: text(browser, "words") == "This environment is closed")
+
+
+def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, look, server, eventually):
+    url = server.create("CartPole-v1")
+    server.post(f"{url}/reset/")
+    look(url)
+    eventually(lambda: text(browser, "env") == "CartPole-v1")
+    server.stop()
+    eventually(lambda: text(browser, "words") == "The server is gone")
+    serve("--port", str(server.port))
+    # A new one does not know it.
+    eventually(lambda: text(browser, "words") == "This environment is closed")
+
+
+def test_every_control_has_a_name(browser, server, look):
+    look(server.create("CartPole-v1", num_envs=2))
+    for control in browser.find_elements(By.CSS_SELECTOR, "button, input, canvas"):
+        if control.is_displayed():
+            assert control.accessible_name

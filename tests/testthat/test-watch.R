@@ -1,0 +1,126 @@
+# A viewer that notes the addresses that it is given; the page is there at once.
+local_viewer <- function(frame = parent.frame()) {
+  seen <- new.env(parent = emptyenv())
+  seen$addresses <- character()
+  withr::local_options(
+    gym.viewer = function(address) {
+      seen$addresses <- c(seen$addresses, address)
+      be_there(address)
+    },
+    .local_envir = frame
+  )
+  seen
+}
+
+be_there <- function(address) curl::curl_fetch_memory(paste0(address, "presence/"))
+
+# The page, as a browser asks for it.
+fetch_page <- function(address) {
+  handle <- curl::new_handle()
+  curl::handle_setheaders(handle, Accept = "text/html")
+  curl::curl_fetch_memory(address, handle)
+}
+
+test_that("env_watch() gives the address of a page", {
+  seen <- local_viewer()
+  env <- local_env()
+  address <- expect_invisible(env_watch(env$client, env$instance_id))
+  expect_identical(
+    address, paste0(env$client$remote_base, "/v1/envs/", env$instance_id, "/watch/")
+  )
+  expect_identical(env$watch(), address)
+  expect_identical(seen$addresses, rep(address, 2))
+  page <- fetch_page(address)
+  expect_identical(page$status_code, 200L)
+  expect_match(page$type, "text/html")
+})
+
+test_that("an environment that is not there cannot be watched", {
+  seen <- local_viewer()
+  expect_error(env_watch(test_client(), "00000000"), class = "gym_error_http_400")
+  env <- local_env()
+  env$close()
+  expect_error(env$watch(), class = "gym_error_argument")
+  expect_length(seen$addresses, 0)
+})
+
+test_that("the first step with render = TRUE opens the page, and no other", {
+  seen <- local_viewer()
+  client <- test_client()
+  instance_id <- env_create(client, "CartPole-v1")
+  withr::defer(env_close(client, instance_id))
+  env_reset(client, instance_id)
+  env_step(client, instance_id, 1)
+  expect_length(seen$addresses, 0)
+  for (i in 1:3) env_step(client, instance_id, 1, render = TRUE)
+  expect_length(seen$addresses, 1)
+  expect_match(seen$addresses, instance_id)
+})
+
+test_that("an environment made for people opens its page when it is made", {
+  seen <- local_viewer()
+  env <- local_env(render_mode = "human")
+  expect_match(seen$addresses, env$instance_id)
+  env$reset()
+  env_step(env$client, env$instance_id, 1, render = TRUE)
+  lanes <- local_env(render_mode = "human", num_envs = 2)
+  expect_length(seen$addresses, 2)
+  local_env(render_mode = "rgb_array")
+  expect_length(seen$addresses, 2)
+})
+
+test_that("a script prints the address, once an environment", {
+  withr::local_options(gym.viewer = NULL, rlang_interactive = FALSE)
+  expect_message(env <- local_env(render_mode = "human"), class = "gym_message_watch")
+  env$reset()
+  expect_no_message(env_step(env$client, env$instance_id, 1, render = TRUE))
+  expect_message(env$watch(), "Watch CartPole-v1 at http.*/watch/$", class = "gym_message_watch")
+})
+
+test_that("an interactive session opens the pane where there is one, else the browser", {
+  opened <- character()
+  open_as <- function(name) {
+    function(url) {
+      opened <<- c(opened, name)
+      be_there(url)
+    }
+  }
+  withr::local_options(
+    gym.viewer = NULL, rlang_interactive = TRUE,
+    viewer = open_as("pane"), browser = open_as("browser")
+  )
+  env <- local_env()
+  expect_no_message(env$watch())
+  withr::local_options(viewer = NULL)
+  expect_no_message(env$watch())
+  expect_identical(opened, c("pane", "browser"))
+  # A machine without a browser.
+  withr::local_options(browser = function(url) stop("no display"))
+  expect_message(env$watch(), class = "gym_message_watch")
+})
+
+test_that("the option gym.viewer may ask for silence, and must make sense", {
+  withr::local_options(gym.viewer = FALSE, rlang_interactive = TRUE)
+  expect_no_message(env <- local_env(render_mode = "human"))
+  expect_no_message(address <- env$watch())
+  expect_match(address, env$instance_id)
+  before <- env_list_all(env$client)
+  withr::local_options(gym.viewer = "firefox")
+  error <- expect_error(env$watch(), "gym.viewer", class = "gym_error_argument")
+  expect_error(gym_make("CartPole-v1", render_mode = "human"), class = "gym_error_argument")
+  expect_identical(env_list_all(env$client), before)
+})
+
+test_that("the call knows when the page is there", {
+  client <- test_client()
+  asked <- 0
+  withr::local_options(gym.viewer = function(address) {
+    # What the page does first.
+    get_request(client, sub(client$remote_base, "", paste0(address, "state/"), fixed = TRUE))
+    asked <<- asked + 1
+  })
+  env <- local_env(client = client)
+  env$watch()
+  expect_identical(asked, 1)
+  expect_true(get_answer(client, paste0("/v1/envs/", env$instance_id))$watched)
+})
