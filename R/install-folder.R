@@ -21,7 +21,7 @@ next_folder <- function() {
 }
 
 # A folder that no other session takes, should it make one at the same time.
-make_folder <- function() {
+make_folder <- function(call) {
   repeat {
     folder <- next_folder()
     if (dir.create(folder, recursive = TRUE, showWarnings = FALSE)) {
@@ -29,15 +29,27 @@ make_folder <- function() {
       return(folder)
     }
     if (!dir.exists(folder)) {
-      abort_install(
-        c(
-          paste0("The folder ", folder, " cannot be made."),
-          i = "It must be possible to write there, and the disk must have room.",
-          i = "The environment variable R_USER_CACHE_DIR names another place for it."
-        ),
-        call = NULL
-      )
+      abort_folder(folder, call)
     }
+  }
+}
+
+abort_folder <- function(folder, call) {
+  abort_install(
+    c(
+      paste0("The folder ", folder, " cannot be made."),
+      i = "It must be possible to write there, and the disk must have room.",
+      i = "The environment variable R_USER_CACHE_DIR names another place for it."
+    ),
+    call = call
+  )
+}
+
+# At the end: what is not whole goes, and the mark that this session made.
+leave_folder <- function(folder, whole) {
+  unlink(file.path(folder, "used-by", as.character(Sys.getpid())))
+  if (!whole) {
+    remove_folder(folder)
   }
 }
 
@@ -94,7 +106,7 @@ read_marker <- function(folder) {
   list(extras = words("Extras"), site = fields[["Site"]], packages = words("Packages"))
 }
 
-write_marker <- function(folder, extras) {
+write_marker <- function(folder, extras, call) {
   site <- if (is_windows()) {
     file.path("venv", "Lib", "site-packages")
   } else {
@@ -114,7 +126,8 @@ write_marker <- function(folder, extras) {
   path <- tempfile("marker-", folder)
   writeLines(paste0(names(fields), ": ", fields), path)
   if (!file.rename(path, file.path(folder, "installed"))) {
-    abort_install(paste0("The file ", file.path(folder, "installed"), " cannot be written."))
+    abort_install(paste0("The file ", file.path(folder, "installed"), " cannot be written."),
+                  call = call)
   }
 }
 

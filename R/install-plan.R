@@ -42,14 +42,12 @@ has_managed_python <- function() {
 
 # A Python on this machine that an environment can be made from, NULL when there is none. With
 # uv it need not have venv and pip, which Debian leaves out.
-find_base_python <- function(with_venv) {
+find_base_python <- function(with_venv, versions = lock_pythons) {
   Find(function(python) {
     about <- probe_python(python)
-    isTRUE(about$fits) && (about$venv || !with_venv)
-  }, setdiff_installed(python_candidates()))
+    isTRUE(about$fits) && about$version %in% versions && (about$venv || !with_venv)
+  }, Filter(Negate(is_installed_python), python_candidates()))
 }
-
-setdiff_installed <- function(pythons) pythons[!is_installed_python(pythons)]
 
 # What a Python is: its version, whether the lock files are for it, and whether it can make
 # environments; NULL for what does not run.

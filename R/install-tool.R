@@ -62,13 +62,13 @@ write_log <- function(lines) {
       silent = TRUE)
 }
 
-abort_tool <- function(what, output, call) {
+abort_tool <- function(what, output, call, more = NULL) {
   words <- utils::tail(trimws(output[nzchar(trimws(output))]), 6L)
   abort_install(
     c(
       paste0(what, "."),
       x = if (length(words)) paste(words, collapse = "\n"),
-      stats::setNames(install_advice(output), rep("i", length(install_advice(output)))),
+      bullets(c(install_advice(output), more)),
       i = paste0("All that was said is in ", install_log(), "."),
       i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
     ),
@@ -76,6 +76,8 @@ abort_tool <- function(what, output, call) {
     call = call
   )
 }
+
+bullets <- function(texts) stats::setNames(texts, rep("i", length(texts)))
 
 # What to do about a failure, by the words of uv, pip and the system. The first that fits.
 install_advice <- function(output) {

@@ -13,18 +13,18 @@ turn_patience <- 60
 
 #' Evaluate an expression when it is this session's turn
 #' @noRd
-in_turn <- function(code) {
-  wait_for_turn()
+in_turn <- function(code, call = rlang::caller_env()) {
+  wait_for_turn(call)
   on.exit(end_turn())
   force(code)
 }
 
-wait_for_turn <- function() {
+wait_for_turn <- function(call) {
   said <- FALSE
   dir.create(install_root(), recursive = TRUE, showWarnings = FALSE)
   while (!dir.create(turn_folder(), showWarnings = FALSE)) {
     if (!dir.exists(install_root())) {
-      abort_cache_folder()
+      abort_folder(install_root(), call)
     }
     if (turn_is_void()) {
       unlink(turn_folder(), recursive = TRUE)
