@@ -82,8 +82,7 @@ bundle_python <- function(dir, uv, call) {
     place <- file.path(dir, "making", "python")
     output <- run_tool(
       uv, c("python", "install", managed_python_version, "--install-dir", place),
-      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), UV_PYTHON_INSTALL_BIN = "0",
-              UV_PYTHON_INSTALL_REGISTRY = "0")
+      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), only_there)
     )
     found <- list.files(place, paste0("^cpython-", managed_python_version), full.names = TRUE)
     if (!failed(output) && length(found)) {
@@ -175,10 +174,8 @@ abort_bundle <- function(problem, mend, call) {
 bundle_plan <- function(dir, extras, call) {
   bundle <- read_bundle(dir, call)
   check_bundle(bundle, extras, call)
-  uv <- find_uv(call)
-  if (is.null(uv) && !is.null(bundle$uv)) {
-    uv <- bundle_uv(bundle)
-  }
+  # Another uv would bring another Python than the one whose archive is there.
+  uv <- bundle_uv(bundle) %||% find_uv(call)
   python <- if (is.null(uv) || !bundle$brings_python) {
     find_base_python(with_venv = is.null(uv), versions = bundle$python) %||% abort_bundle(
       paste0("The bundle is for Python ", bundle$python, " and brings none."),
@@ -221,11 +218,12 @@ check_bundle <- function(bundle, extras, call) {
 
 # A stick or a share may not let programs run.
 bundle_uv <- function(bundle) {
-  uv <- brought_uv()
-  if (!file.exists(uv)) {
-    dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
-    file.copy(bundle$uv, uv)
-    Sys.chmod(uv, "755")
+  if (is.null(bundle$uv)) {
+    return(NULL)
   }
+  uv <- file.path(install_root(), "uv", "bundle", uv_name())
+  dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
+  file.copy(bundle$uv, uv, overwrite = TRUE)
+  Sys.chmod(uv, "755")
   if (uv_works(uv)) uv
 }

@@ -79,10 +79,12 @@ other_than_managed <- function(plan, output, call) {
 
 # Beside the environments, so that it goes when they go, and on Windows does not roam.
 managed_python_place <- function() {
-  if (!nzchar(Sys.getenv("UV_PYTHON_INSTALL_DIR"))) {
-    c(UV_PYTHON_INSTALL_DIR = managed_python_folder())
-  }
+  place <- Sys.getenv("UV_PYTHON_INSTALL_DIR")
+  c(UV_PYTHON_INSTALL_DIR = if (nzchar(place)) place else managed_python_folder(), only_there)
 }
+
+# No command on the PATH, no entry in the registry.
+only_there <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0")
 
 bundled_python_place <- function(bundle) {
   if (!is.null(bundle)) {

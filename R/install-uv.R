@@ -143,8 +143,15 @@ download_uv <- function(url, archive, call) {
   )
 }
 
+# Opened as "rb", as R would unpack it otherwise and tell the hash of what is in it.
+file_sha256 <- function(path) {
+  bytes <- file(path, "rb")
+  on.exit(close(bytes))
+  hex(openssl::sha256(bytes))
+}
+
 check_uv_archive <- function(archive, expected, call) {
-  found <- as.character(openssl::sha256(file(archive)))
+  found <- file_sha256(archive)
   if (!identical(found, expected)) {
     abort_install(
       c(
