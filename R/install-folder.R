@@ -123,11 +123,18 @@ write_marker <- function(folder, extras, call) {
     End = "yes"
   )
   # Whole at once, or not at all.
-  path <- tempfile("marker-", folder)
-  writeLines(paste0(names(fields), ": ", fields), path)
-  if (!file.rename(path, file.path(folder, "installed"))) {
-    abort_install(paste0("The file ", file.path(folder, "installed"), " cannot be written."),
-                  call = call)
+  path <- file.path(folder, "installed")
+  part <- paste0(path, "-")
+  try(suppressWarnings({
+    writeLines(paste0(names(fields), ": ", fields), part)
+    file.rename(part, path)
+  }), silent = TRUE)
+  if (is.null(read_marker(folder))) {
+    abort_install(
+      c(paste0("The file ", path, " cannot be written."),
+        i = "Is the disk full? `gym_server_install()` begins anew."),
+      call = call
+    )
   }
 }
 
@@ -135,9 +142,10 @@ write_marker <- function(folder, extras, call) {
 use_folder <- function(folder) {
   marks <- file.path(folder, "used-by")
   dir.create(marks, showWarnings = FALSE)
-  suppressWarnings(
+  # Another user's environment needs no mark, and a full disk has worse troubles.
+  try(suppressWarnings(
     writeLines(Sys.info()[["nodename"]], file.path(marks, as.character(Sys.getpid())))
-  )
+  ), silent = TRUE)
 }
 
 # Before a server starts, so that no other session removes what it runs from.

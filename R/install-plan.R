@@ -29,7 +29,7 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
 
 # About, for Linux with an Intel processor, of the releases named in R/install-uv.R.
 managed_python_megabytes <- c(download = 35, disk = 110)
-uv_megabytes <- c(download = 25, disk = 60)
+uv_megabytes <- c(download = 20, disk = 40)
 
 managed_python_version <- "3.12"
 

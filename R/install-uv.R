@@ -115,7 +115,7 @@ bring_uv <- function(call) {
     "UV_DOWNLOAD_URL",
     paste0("https://github.com/astral-sh/uv/releases/download/", uv_release$version)
   )
-  cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 25 MB)."))
+  cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
   download_uv(paste0(sub("/+$", "", base), "/", basename(archive)), archive, call)
   check_uv_archive(archive, uv_release$checksums[[target]], call)
   unpack_uv(archive, uv, call)

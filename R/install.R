@@ -52,8 +52,12 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   }
   python <- in_turn({
     there <- installed_server()
-    # Another session may have done it meanwhile.
-    if (has_all(there, wanted)) there$python else install_environment(plan, call)
+    if (has_all(there, wanted)) {
+      cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
+      there$python
+    } else {
+      install_environment(plan, call)
+    }
   })
   tell_what_comes_first(python)
   invisible(python)
