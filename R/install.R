@@ -89,7 +89,7 @@ confirm_install <- function(plan) {
     sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
-  isTRUE(utils::askYesNo(paste0(paste(what, collapse = "\n"), "\nInstall them?")))
+  ask_yes_no(paste0(paste(what, collapse = "\n"), "\nInstall them?"))
 }
 
 describe_plan <- function(plan) {
@@ -159,3 +159,5 @@ tell_what_comes_first <- function(python) {
     ))
   }
 }
+
+ask_yes_no <- function(question) isTRUE(utils::askYesNo(question))
