@@ -70,8 +70,5 @@ test_that("an interrupt ends the tool", {
   )
   setTimeLimit()
   # Until it is reaped its number is taken.
-  expect_true(wait_until(function() {
-    gc()
-    !process_runs(as.integer(readLines(pid)))
-  }))
+  expect_true(wait_until(function() !process_runs(as.integer(readLines(pid)))))
 })
