@@ -1,0 +1,169 @@
+#' Install what the server needs
+#'
+#' Makes a Python environment for the server that comes with this package, so that nobody needs
+#' to know Python. It holds exact versions that were tried together, each file checked by its
+#' hash; nothing is compiled, and no other Python on the machine is changed.
+#'
+#' [uv](https://docs.astral.sh/uv/) does the work where it is found: the program that the
+#' environment variable `GYM_UV` or `RETICULATE_UV` names, one on the `PATH`, in `~/.local/bin`
+#' or the one that reticulate brought. It also brings a Python of its own; where the network
+#' does not let that through, a Python 3.10 to 3.13 on the machine is taken. Without uv such a
+#' Python's `venv` and pip do it, and without both uv is downloaded first, a release that this
+#' package names, checked by its hash.
+#'
+#' The environment lies in `tools::R_user_dir("gym", "cache")`. [gym_client()] finds it there.
+#' Extras that were installed before are kept. A call that finds everything there checks it,
+#' says so and changes nothing; what was damaged is made anew.
+#'
+#' Environment variables change where things come from and go, set by [Sys.setenv()] or in
+#' `~/.Renviron`: `R_USER_CACHE_DIR` is the place of the cache folder; `HTTPS_PROXY` the
+#' network's proxy; `SSL_CERT_FILE` the file of its certificates; `UV_PYTHON_INSTALL_MIRROR`
+#' where uv gets its Pythons, and `UV_DOWNLOAD_URL` where uv itself is downloaded from. uv and
+#' pip go by their own settings, such as those of an institution's mirror.
+#'
+#' @param extras What to install beside the server, a character vector with any of
+#'   `"toy-text"`, `"box2d"`, `"mujoco"`, `"atari"` and `"video"`; the default is none. The
+#'   environments of classic control and toy text need none.
+#' @param ... Must be empty.
+#' @param offline A folder that [gym_server_bundle()] filled on another machine, a string: the
+#'   network is not used. `NULL`, the default, installs from the network.
+#' @param ask Whether to ask first, telling what, how many megabytes and where; by default
+#'   `TRUE` in an interactive session. In a script the call is consent.
+#' @return The path of the environment's Python, a string, invisibly; `NULL`, invisibly, when
+#'   the answer was no.
+#' @section Errors: `gym_error_install` when it did not succeed, with what to do; whatever was
+#'   installed before is still there. `gym_error_argument`.
+#' @seealso [gym_server_bundle()], [gym_client()]
+#' @export
+#' @examples
+#' # Asks in an interactive session:
+#' if (interactive()) gym_server_install()
+gym_server_install <- function(extras = character(), ..., offline = NULL,
+                               ask = rlang::is_interactive()) {
+  check_extras(extras)
+  check_no_dots(...)
+  check_string(offline, allow_null = TRUE)
+  check_flag(ask)
+  call <- rlang::current_env()
+  check_named_python(call)
+  wanted <- wanted_extras(extras)
+  there <- installed_server()
+  if (has_all(there, wanted)) {
+    cli::cli_inform(c(v = "The server is installed in {.path {there$folder}}."))
+    return(invisible(there$python))
+  }
+  plan <- if (is.null(offline)) install_plan(wanted, call) else bundle_plan(offline, wanted, call)
+  if (ask && !confirm_install(plan)) {
+    return(invisible())
+  }
+  python <- in_turn({
+    there <- installed_server()
+    if (has_all(there, wanted)) {
+      cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
+      there$python
+    } else {
+      install_environment(plan, call)
+    }
+  })
+  tell_what_comes_first(python)
+  invisible(python)
+}
+
+check_no_dots <- function(..., call = rlang::caller_env()) {
+  if (...length()) {
+    gym_abort(
+      "`...` must be empty: `offline` and `ask` need their names.",
+      class = "gym_error_argument",
+      call = call
+    )
+  }
+}
+
+wanted_extras <- function(extras) {
+  server_extras[server_extras %in% c(extras, earlier_extras())]
+}
+
+# Whether an environment has the extras, and its server can really be imported.
+has_all <- function(there, extras) {
+  !is.null(there) && all(extras %in% there$extras) && !failed(try_environment(there$python, extras))
+}
+
+confirm_install <- function(plan) {
+  what <- c(
+    "The server that plays the environments needs Python packages on this machine.",
+    paste0("What:  ", describe_plan(plan)),
+    sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
+    paste0("Where: ", install_root())
+  )
+  ask_yes_no(paste0(paste(what, collapse = "\n"), "\nInstall them?"))
+}
+
+describe_plan <- function(plan) {
+  uv <- paste0(if (plan$how == "download") paste("downloading uv", uv_release$version),
+               if (plan$how == "uv") paste("with", plan$tool))
+  python <- if (!is.null(plan$base_python)) {
+    paste(" for", plan$base_python)
+  } else if (plan$how != "python") {
+    paste(" and bringing Python", managed_python_version)
+  }
+  paste0(
+    describe_packages(plan$extras), ", ",
+    if (plan$how == "python") paste("with pip, for", plan$tool) else paste0(uv, python)
+  )
+}
+
+describe_packages <- function(extras) {
+  paste0("Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
+}
+
+describe_download <- function(plan) {
+  if (!is.null(plan$bundle)) {
+    return(paste0("from ", plan$bundle$dir, ", without a network"))
+  }
+  sprintf("about %.0f MB to download", plan$megabytes[["download"]])
+}
+
+# GYM_PYTHON comes before what is installed: with one that cannot run the server, the best
+# installation would be of no use.
+check_named_python <- function(call) {
+  named <- Sys.getenv("GYM_PYTHON")
+  if (!nzchar(named)) {
+    return(invisible())
+  }
+  about <- probe_python(path.expand(named))
+  if (isTRUE(about$fits)) {
+    return(invisible())
+  }
+  what <- if (is.null(about)) "which does not run" else paste0("which is Python ", about$version)
+  abort_install(
+    c(
+      paste0("The variable GYM_PYTHON names ", named, ", ", what, "."),
+      i = "The server needs 64-bit Python 3.10 to 3.13, and the Python named there comes first.",
+      i = paste("`Sys.unsetenv(\"GYM_PYTHON\")`, and the same in ~/.Renviron; then",
+                "`gym_server_install()` again.")
+    ),
+    call = call
+  )
+}
+
+# What would keep this session from using what was installed.
+tell_what_comes_first <- function(python) {
+  named <- Sys.getenv("GYM_PYTHON")
+  if (nzchar(named) && !identical(path.expand(named), python)) {
+    cli::cli_inform(c(
+      "!" = "The variable GYM_PYTHON is set, and the Python that it names comes first.",
+      " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} has this session use what was installed."
+    ))
+  }
+  running <- Filter(function(server) {
+    is_installed_python(server$python) && server$python != python && server$process$is_alive()
+  }, the_session$servers)
+  if (length(running)) {
+    cli::cli_inform(c(
+      "!" = "This session's server still runs from what was installed before.",
+      " " = "{.code gym_server_stop()} ends it; the next {.code gym_make()} starts one anew."
+    ))
+  }
+}
+
+ask_yes_no <- function(question) isTRUE(utils::askYesNo(question))
