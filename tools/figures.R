@@ -1,4 +1,5 @@
-# Makes the moving picture and the filmstrip of README in man/figures: CartPole, solved.
+# Draws the pictures of the README into man/figures, from vignettes/results.rds, which
+# tools/vignette-results.R makes.
 #
 #   tools/in-env Rscript tools/figures.R
 #
@@ -6,19 +7,26 @@
 
 library(gym)
 
-search <- search_random("CartPole-v0", seed = 2027)
-print(search)
-played <- rollout("CartPole-v0", search$policy, seed = 1, steps = TRUE, frames = TRUE)
-print(played)
-stopifnot(played$episodes$return == 200)
+results <- readRDS("vignettes/results.rds")
+policy <- results$search$policy
 
+draw <- function(name, object, ..., width = 7, height = 5) {
+  file <- file.path("man/figures", name)
+  grDevices::png(file, width = width, height = height, units = "in", res = 120)
+  plot(object, ...)
+  grDevices::dev.off()
+  cat(file, ": ", round(file.size(file) / 1000), " kB\n", sep = "")
+}
+
+draw("search.png", results$search)
+draw("network.png", policy)
+draw("decision.png", results$map)
+draw("landscape.png", results$landscape)
+draw("luck.png", results$searches)
+
+played <- rollout("CartPole-v0", policy, seed = 1, steps = TRUE, frames = TRUE)
+stopifnot(played$episodes$return == 200)
+draw("trajectory.png", played, type = "trajectory")
+draw("filmstrip.png", played, type = "filmstrip", height = 1.5)
 # Every second frame is smooth enough, at the same pace.
 print(animate(played, "man/figures/cartpole.gif", width = 300, every = 2))
-
-grDevices::png("man/figures/filmstrip.png", width = 7, height = 1.5, units = "in", res = 150)
-plot(played, type = "filmstrip")
-grDevices::dev.off()
-
-grDevices::png("man/figures/trajectory.png", width = 7, height = 5, units = "in", res = 100)
-plot(played, type = "trajectory")
-grDevices::dev.off()

@@ -1,9 +1,9 @@
 # Computes what the vignette shows and keeps it in vignettes/results.rds, so that
-# the vignette builds without a server. Also the figures of 100 seeds.
+# the vignette builds without a server. tools/figures.R draws the README's pictures from it.
 #
 #   tools/in-env Rscript tools/vignette-results.R
 #
-# Takes a minute or two.
+# Takes some three minutes, most of them for the searches of 500 seeds.
 
 library(gym)
 
@@ -15,18 +15,17 @@ results$random <- rollout("CartPole-v0", policy_random(), episodes = 2000, seed 
 results$follow <- rollout("CartPole-v0", follow_pole, episodes = 200, seed = 2018)
 results$search <- search_random("CartPole-v0", seed = 2027)
 results$summary <- summary(results$search, seed = 1)
-results$episode <- rollout("CartPole-v0", results$search$policy, seed = 1, steps = TRUE)
-
-seeds <- 1:100
-searches <- lapply(seeds, function(seed) {
-  search <- search_random("CartPole-v0", seed = seed)
-  data.frame(
-    seed = seed, solved = search$solved, round = search$round,
-    rounds = nrow(search$rounds), episodes = nrow(search$episodes),
-    steps = sum(search$rounds$steps)
-  )
-})
-results$searches <- do.call(rbind, searches)
+results$episode <- rollout(
+  "CartPole-v0", results$search$policy, seed = 1, steps = TRUE, frames = TRUE
+)
+# A megabyte; tools/figures.R makes the moving picture of them.
+results$episode$frames <- NULL
+results$map <- decision_map(
+  results$search$policy, "CartPole-v0", "pole_angle", "pole_angular_velocity",
+  path = results$episode
+)
+results$landscape <- search_landscape(results$search, seed = 1)
+results$searches <- search_repeat("CartPole-v0", seeds = 1:500)
 
 env <- gym_make("CartPole-v0")
 observation <- env$reset(seed = 1)
@@ -60,11 +59,7 @@ results$summary$search <- results$search
 
 saveRDS(results, "vignettes/results.rds", compress = "xz", version = 3)
 
-solved <- results$searches[results$searches$solved, ]
-cat(sprintf(
-  "%d of %d seeds solved within 50 rounds; mean round %.1f, median %.0f\n",
-  nrow(solved), length(seeds), mean(solved$round), stats::median(solved$round)
-))
+print(summary(results$searches))
 cat(sprintf(
   "random policy: mean return %.2f, median %.1f over %d episodes\n",
   mean(results$random$episodes$return), stats::median(results$random$episodes$return),
