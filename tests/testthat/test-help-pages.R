@@ -1,0 +1,42 @@
+# The source tree has man/ and _pkgdown.yml beside tests/.
+source_tree <- function(...) {
+  path <- file.path(test_path(), "../..", ...)
+  skip_if_not(file.exists(path), "not a source tree")
+  path
+}
+
+help_pages <- function() {
+  pages <- lapply(list.files(source_tree("man"), "[.]Rd$", full.names = TRUE), tools::parse_Rd)
+  Filter(function(page) !"internal" %in% rd_texts(page, "\\keyword"), pages)
+}
+
+rd_texts <- function(page, tag) {
+  found <- Filter(function(part) identical(attr(part, "Rd_tag"), tag), page)
+  trimws(vapply(found, function(part) paste(unlist(part), collapse = ""), ""))
+}
+
+test_that("every help page has an example that runs", {
+  for (page in help_pages()) {
+    name <- rd_texts(page, "\\name")
+    examples <- rd_texts(page, "\\examples")
+    expect_length(examples, 1L)
+    expect_true(any(nzchar(examples)), info = name)
+    expect_no_match(examples, "dontrun|donttest", info = name)
+  }
+})
+
+test_that("the reference on the web names every help page", {
+  skip_if_not_installed("yaml")
+  reference <- yaml::read_yaml(source_tree("_pkgdown.yml"))$reference
+  entries <- unlist(lapply(reference, `[[`, "contents"))
+  starts <- sub("starts_with\\(\"(.*)\"\\)", "\\1", grep("^starts_with", entries, value = TRUE))
+  topics <- setdiff(entries, grep("^starts_with", entries, value = TRUE))
+  for (page in help_pages()) {
+    aliases <- rd_texts(page, "\\alias")
+    ways <- sum(aliases %in% topics) +
+      sum(vapply(starts, function(start) any(startsWith(aliases, start)), NA))
+    expect_true(ways > 0L, info = rd_texts(page, "\\name"))
+  }
+  exported <- getNamespaceExports("gym")
+  expect_setequal(intersect(topics, exported), setdiff(topics, c("gym_search")))
+})
