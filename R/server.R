@@ -8,18 +8,24 @@
 #' it, to one on this machine, which is started at the first call and stops with
 #' the session.
 #'
+#' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start` when no server could be started.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' gym_client()
 gym_client <- function() {
+  session_client()
+}
+
+# `install` as start_server() takes it.
+session_client <- function(install = TRUE, call = rlang::caller_env()) {
   url <- Sys.getenv("GYM_SERVER_URL")
   if (nzchar(url)) {
-    return(named_client(url))
+    return(named_client(url, call))
   }
-  if (is.null(the_session$client) || !is_running(the_session$client)) {
-    the_session$client <- gym_server_start()
+  if (is.null(the_session$client) || !is_running(the_session$client$remote_base)) {
+    the_session$client <- start_server(install = install, call = call)
   }
   the_session$client
 }
@@ -35,15 +41,15 @@ named_client <- function(url, call = rlang::caller_env()) {
     )
   }
   if (!identical(the_session$named_url, url)) {
-    the_session$named_client <- create_GymClient(url)
+    the_session$named_client <- new_client(url)
     the_session$named_url <- url
   }
   the_session$named_client
 }
 
 # In a forked child the parent's server is as good as its own.
-is_running <- function(client) {
-  server <- the_session$servers[[client$remote_base]]
+is_running <- function(base) {
+  server <- the_session$servers[[base]]
   !is.null(server) && (Sys.getpid() != the_session$pid || server$process$is_alive())
 }
 
@@ -56,8 +62,14 @@ is_running <- function(client) {
 #' Python is looked for in `python`; in the environment variable `GYM_PYTHON`; in
 #' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); on the `PATH`.
 #' The first that can run the server is taken. Where `python` or `GYM_PYTHON`
-#' names one, no other is tried.
+#' names one, no other is tried. [gym_sitrep()] shows what comes of it.
 #'
+#' @section Where there is no Python:
+#' Without a Python that can run the server an interactive session offers once to
+#' install one, by [gym_server_install()], and goes on with what was asked for. A
+#' script stops and says so, or, with the environment variable `GYM_INSTALL=1`,
+#' installs it without asking. Where `python` or `GYM_PYTHON` names a Python nothing
+#' is installed.
 #' @param port The port to listen on, a whole number; `NULL`, the default, takes
 #'   a free one.
 #' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
@@ -80,21 +92,41 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
+  start_server(port, python, list(...), timeout)
+}
+
+#' Start a server with the first Python that can run it
+#' @param install May a Python environment be installed, or offered, when no Python can?
+#' @return A client for the server.
+#' @noRd
+start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60,
+                         install = TRUE, call = rlang::caller_env()) {
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
-    server_options(list(...))
+    server_options(options, call)
   )
-  candidates <- python_candidates(python)
   refusals <- character()
-  for (candidate in candidates) {
-    server <- launch_server(candidate, arguments, timeout)
+  for (candidate in python_candidates(python)) {
+    server <- launch_server(candidate, arguments, timeout, call)
     if (is.list(server)) {
-      the_session$servers[[server$url]] <- server
-      return(create_GymClient(server$url))
+      return(register_server(server))
     }
-    refusals <- c(refusals, server)
+    refusals[[candidate]] <- server
   }
-  abort_no_python(python, candidates, refusals)
+  installed <- if (install && is.null(named_python(python))) offered_python()
+  if (!is.null(installed)) {
+    server <- launch_server(installed, arguments, timeout, call)
+    if (is.list(server)) {
+      return(register_server(server))
+    }
+    refusals[[installed]] <- server
+  }
+  abort_no_python(python, refusals, call)
+}
+
+register_server <- function(server) {
+  the_session$servers[[server$url]] <- server
+  new_client(server$url)
 }
 
 # As `-m gym_server`, but without the working directory among the places of modules,
@@ -147,7 +179,9 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   words <- log_tail(log)
   own <- grep(server_words, words, value = TRUE)
   if (length(own)) {
-    abort_server_start("The server ended before it took connections.", own, call)
+    abort_server_start(
+      "The server ended before it took connections.", own, call, port_hint(own[[1L]])
+    )
   }
   if (length(words)) utils::tail(words, 1L) else "it ended without a word"
 }
@@ -155,6 +189,16 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
 # How the server itself begins when it cannot start as it was asked to; whatever else
 # is said comes from a Python that cannot run it, or from what only looks like one.
 server_words <- "^(gym_server:|gym-http-server: error)"
+
+# Who has the port that the server could not have, when that was why it ended.
+port_hint <- function(words) {
+  parts <- regmatches(words, regexec("port ([0-9]+) on ([^ ]+) cannot be used", words))[[1L]]
+  if (length(parts)) {
+    host <- sub("^0[.]0[.]0[.]0$", "127.0.0.1", parts[[3L]])
+    port_holder(paste0("http://", if (grepl(":", host)) paste0("[", host, "]") else host, ":",
+                       parts[[2L]]))
+  }
+}
 
 server_environment <- function() {
   search_path <- c(system.file("server", package = "gym"), Sys.getenv("PYTHONPATH"))
@@ -221,9 +265,9 @@ log_tail <- function(log, n = 20L) {
   utils::tail(readLines(log, warn = FALSE), n)
 }
 
-abort_server_start <- function(message, log_lines, call) {
+abort_server_start <- function(message, log_lines, call, hint = NULL) {
   gym_abort(
-    c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n")),
+    c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n"), i = hint),
     class = "gym_error_server_start",
     log = log_lines,
     call = call
@@ -312,10 +356,10 @@ stop_session_servers <- function(session) {
   }
 }
 
-# For the examples: whether the session has a server or can have one.
+# For the examples: whether the session has a server or can have one, as things are.
 can_start_server <- function() {
   tryCatch(
-    inherits(gym_client(), "GymClient"),
+    inherits(session_client(install = FALSE), "GymClient"),
     gym_error_server_start = function(cnd) FALSE
   )
 }

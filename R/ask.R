@@ -1,0 +1,35 @@
+# Questions to whoever sits at the session.
+
+#' Ask a question that is answered by yes or no
+#'
+#' Only where [rlang::is_interactive()]. It is asked once: a question asked again and again
+#' would swallow, line after line, a script that is pasted into the console.
+#' @param default What just pressing Enter means.
+#' @return `TRUE` or `FALSE`; `FALSE` when a dialog was cancelled.
+#' @noRd
+ask_yes_no <- function(question, default, call = rlang::caller_env()) {
+  if (is.function(getOption("askYesNo"))) {
+    # R and RStudio on Windows ask by a dialog, which no pasted line can answer.
+    return(isTRUE(utils::askYesNo(question, default = default)))
+  }
+  choices <- if (default) "(Yes/no)" else "(yes/No)"
+  answer <- tolower(trimws(read_answer_line(paste0(question, " ", choices, " "))))
+  if (!nzchar(answer)) {
+    return(default)
+  }
+  choice <- pmatch(answer, c("yes", "no"))
+  if (is.na(choice)) {
+    gym_abort(
+      c(
+        paste0("Neither yes nor no: ", describe_value(answer), "."),
+        i = "Was that the next line of a script? Run this call by itself, answer, then the rest."
+      ),
+      class = "gym_error_argument",
+      call = call
+    )
+  }
+  choice == 1L
+}
+
+# On a line of its own so that tests can answer.
+read_answer_line <- function(prompt) readline(prompt)
