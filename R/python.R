@@ -63,11 +63,16 @@ python_candidates <- function(python = NULL) {
   places <- file.path(rep(active[nzchar(active)], each = length(folder)), folder)
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
   # Windows' WindowsApps holds a stand-in that opens the Store.
-  places <- c(places, grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE))
+  path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
+  found <- c(pythons_in(places), installed_server()$python, pythons_in(path))
+  # An environment's Python may be a link to one that lies elsewhere and lacks its packages.
+  found[!duplicated(paste(normalizePath(dirname(found)), normalizePath(found)))]
+}
+
+pythons_in <- function(places) {
   commands <- paste0(c("python3", "python"), if (is_windows()) ".exe")
-  found <- file.path(rep(places, each = length(commands)), commands)
-  found <- found[file.access(found, 1L) == 0L]
-  found[!duplicated(normalizePath(found))]
+  found <- file.path(rep(places, each = length(commands)), rep(commands, length(places)))
+  found[file.access(found, 1L) == 0L]
 }
 
 is_windows <- function() .Platform$OS.type == "windows"

@@ -60,7 +60,8 @@ is_running <- function(base) {
 #' is killed.
 #'
 #' Python is looked for in `python`; in the environment variable `GYM_PYTHON`; in
-#' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); on the `PATH`.
+#' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); where
+#' [gym_server_install()] has put it; on the `PATH`.
 #' The first that can run the server is taken. Where `python` or `GYM_PYTHON`
 #' names one, no other is tried. [gym_sitrep()] shows what comes of it.
 #'
@@ -157,6 +158,7 @@ server_options <- function(options, call = rlang::caller_env()) {
 # or a string that says why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- tempfile("gym-server-", fileext = ".log")
+  use_python(python)
   # processx draws a name from R's generator.
   process <- keep_random_state(tryCatch(
     processx::process$new(

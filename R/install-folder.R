@@ -1,0 +1,197 @@
+# Where the server's Python environments lie. Each installation makes a folder of its own, and
+# nothing that was installed is changed afterwards: a server that another session runs loses
+# nothing, and an interrupted installation leaves what was there before.
+#
+#   <cache>/gym/<lock's hash>-<number>/venv         the environment
+#                                     /installed    the marker, written last: what is in it
+#                                     /used-by/PID  the R sessions that use it or are making it
+
+install_root <- function() tools::R_user_dir("gym", "cache")
+
+install_folders <- function() {
+  folders <- list.files(install_root(), "^[0-9a-f]{12}-[0-9]+$", full.names = TRUE)
+  folders[order(folder_number(folders), decreasing = TRUE)]
+}
+
+folder_number <- function(folders) as.integer(sub(".*-", "", basename(folders)))
+
+next_folder <- function() {
+  number <- max(0L, folder_number(install_folders())) + 1L
+  file.path(install_root(), paste0(lock_hash(), "-", number))
+}
+
+# A folder that no other session takes, should it make one at the same time.
+make_folder <- function() {
+  repeat {
+    folder <- next_folder()
+    if (dir.create(folder, recursive = TRUE, showWarnings = FALSE)) {
+      use_folder(folder)
+      return(folder)
+    }
+    if (!dir.exists(folder)) {
+      abort_install(
+        c(
+          paste0("The folder ", folder, " cannot be made."),
+          i = "It must be possible to write there, and the disk must have room.",
+          i = "The environment variable R_USER_CACHE_DIR names another place for it."
+        ),
+        call = NULL
+      )
+    }
+  }
+}
+
+environment_python <- function(folder) {
+  file.path(folder, "venv", if (is_windows()) "Scripts/python.exe" else "bin/python")
+}
+
+#' Find the installed environment
+#'
+#' An environment is whole when its marker is there, which is written last, and holds what the
+#' marker names: a Python or package that somebody deleted is noticed.
+#' @return `NULL`, or a list: `python`, the path of its Python; `folder`, its folder; `extras`,
+#'   the extras that it holds.
+#' @noRd
+installed_server <- function() {
+  hash <- lock_hash()
+  for (folder in install_folders()) {
+    marker <- if (startsWith(basename(folder), hash)) read_marker(folder)
+    if (!is.null(marker) && environment_is_whole(folder, marker)) {
+      return(list(
+        python = environment_python(folder), folder = folder, extras = marker$extras
+      ))
+    }
+  }
+  NULL
+}
+
+environment_is_whole <- function(folder, marker) {
+  file.exists(environment_python(folder)) &&
+    all(marker$packages %in% list.files(file.path(folder, marker$site)))
+}
+
+# The extras that were installed last, also for an earlier lock.
+earlier_extras <- function() {
+  for (folder in install_folders()) {
+    marker <- read_marker(folder)
+    if (!is.null(marker)) {
+      return(intersect(marker$extras, server_extras))
+    }
+  }
+  character()
+}
+
+read_marker <- function(folder) {
+  path <- file.path(folder, "installed")
+  if (!file.exists(path)) {
+    return(NULL)
+  }
+  fields <- tryCatch(read.dcf(path)[1L, ], error = function(cnd) NULL)
+  if (!all(c("Extras", "Site", "Packages", "End") %in% names(fields))) {
+    return(NULL)
+  }
+  words <- function(field) strsplit(fields[[field]], "[[:space:]]+")[[1L]]
+  list(extras = words("Extras"), site = fields[["Site"]], packages = words("Packages"))
+}
+
+write_marker <- function(folder, extras) {
+  site <- if (is_windows()) {
+    file.path("venv", "Lib", "site-packages")
+  } else {
+    version <- list.files(file.path(folder, "venv", "lib"), "^python")[[1L]]
+    file.path("venv", "lib", version, "site-packages")
+  }
+  packages <- list.files(file.path(folder, site))
+  # Names with blanks would be taken for two.
+  packages <- packages[!grepl("[[:space:]]", packages)]
+  fields <- c(
+    Extras = paste(extras, collapse = " "),
+    Site = site,
+    Packages = paste(packages, collapse = " "),
+    End = "yes"
+  )
+  # Whole at once, or not at all.
+  path <- tempfile("marker-", folder)
+  writeLines(paste0(names(fields), ": ", fields), path)
+  if (!file.rename(path, file.path(folder, "installed"))) {
+    abort_install(paste0("The file ", file.path(folder, "installed"), " cannot be written."))
+  }
+}
+
+# Note that this session uses a folder.
+use_folder <- function(folder) {
+  marks <- file.path(folder, "used-by")
+  dir.create(marks, showWarnings = FALSE)
+  suppressWarnings(
+    writeLines(Sys.info()[["nodename"]], file.path(marks, as.character(Sys.getpid())))
+  )
+}
+
+# Before a server starts, so that no other session removes what it runs from.
+use_python <- function(python) {
+  if (is_installed_python(python)) {
+    use_folder(folder_of(python))
+  }
+}
+
+is_installed_python <- function(python) {
+  startsWith(python, paste0(install_root(), "/"))
+}
+
+folder_of <- function(python) dirname(dirname(dirname(python)))
+
+# Remove all folders but one, as far as no session uses them: the rest is for the next time.
+remove_other_folders <- function(keep) {
+  for (folder in setdiff(install_folders(), keep)) {
+    # From here on nobody takes it for an environment.
+    unlink(file.path(folder, "installed"))
+    if (!is_used(folder)) {
+      remove_folder(folder)
+    }
+  }
+}
+
+remove_folder <- function(folder) {
+  if (is_windows()) {
+    # Fails while a file in it is in use; deleting would leave half of it.
+    given_up <- paste0(folder, "-old")
+    if (!suppressWarnings(file.rename(folder, given_up))) {
+      return(invisible())
+    }
+    folder <- given_up
+  }
+  unlink(folder, recursive = TRUE, force = TRUE)
+}
+
+is_used <- function(folder) {
+  marks <- list.files(file.path(folder, "used-by"), full.names = TRUE)
+  any(vapply(marks, mark_holds, NA))
+}
+
+mark_holds <- function(mark) {
+  node <- tryCatch(readLines(mark, n = 1L), error = function(cnd) "", warning = function(cnd) "")
+  if (!identical(node, Sys.info()[["nodename"]])) {
+    # Of another machine nothing is known: a home on a network.
+    return(difftime(Sys.time(), file.mtime(mark), units = "days") < 30)
+  }
+  pid <- as.integer(basename(mark))
+  if (pid == Sys.getpid()) {
+    return(this_session_uses(dirname(dirname(mark))))
+  }
+  process_runs(pid)
+}
+
+this_session_uses <- function(folder) {
+  any(vapply(the_session$servers, function(server) {
+    is_installed_python(server$python) && folder_of(server$python) == folder &&
+      server$process$is_alive()
+  }, NA))
+}
+
+process_runs <- function(pid) {
+  if (is_windows()) {
+    # There a signal 0 would end it; renaming its folder tells whether it is in use.
+    return(FALSE)
+  }
+  tools::pskill(pid, 0L)
+}

@@ -1,0 +1,63 @@
+# What is installed: the lock files that travel with the server, see tools/lock. base.txt holds
+# what the server itself needs, EXTRA.txt what an extra adds.
+
+server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video")
+
+lock_file <- function(part = "base") {
+  system.file("server", "lock", paste0(part, ".txt"), package = "gym")
+}
+
+lock_files <- function(extras) {
+  vapply(c("base", extras), lock_file, "", USE.NAMES = FALSE)
+}
+
+# The same for the same lock, however git or a zip program wrote the ends of its lines.
+lock_hash <- function() {
+  lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
+  substr(openssl::sha256(paste(lines, collapse = "\n")), 1L, 12L)
+}
+
+# The value of a "# key: value" at the top of a lock file.
+lock_entry <- function(part, key) {
+  start <- paste0("# ", key, ": ")
+  lines <- readLines(lock_file(part), n = 10L, warn = FALSE)
+  substring(lines[startsWith(lines, start)][1L], nchar(start) + 1L)
+}
+
+# About how much the packages are, in MB: what is downloaded, and what it takes on the disk.
+lock_megabytes <- function(extras) {
+  size <- function(key) {
+    texts <- vapply(c("base", extras), lock_entry, "", key = key)
+    sum(as.numeric(sub(" MB", "", texts, fixed = TRUE)))
+  }
+  c(download = size("download"), disk = size("disk"))
+}
+
+# This system as the lock files and bundles name it.
+system_name <- function() {
+  info <- Sys.info()
+  machine <- tolower(info[["machine"]])
+  machine <- switch(machine, amd64 = , "x86-64" = "x86_64", machine)
+  paste0(tolower(info[["sysname"]]), "-", machine)
+}
+
+check_extras <- function(extras, call = rlang::caller_env()) {
+  if (!is.character(extras) || anyNA(extras) || !all(extras %in% server_extras)) {
+    must <- paste("any of", paste0('"', server_extras, '"', collapse = ", "))
+    abort_argument(extras, must, "extras", call)
+  }
+  for (extra in extras) {
+    if (system_name() %in% strsplit(lock_entry(extra, "not for"), ", ", fixed = TRUE)[[1L]]) {
+      abort_install(
+        c(
+          paste0("The extra \"", extra, "\" cannot be installed on this system (", system_name(),
+                 ")."),
+          i = "Its packages come ready to run for other systems only.",
+          i = paste("A server on another machine can have it: `create_GymClient()` takes that",
+                    "server's address.")
+        ),
+        call = call
+      )
+    }
+  }
+}

@@ -1,0 +1,89 @@
+# What an installation would do.
+
+#' Plan an installation
+#'
+#' Nothing is changed and nothing downloaded.
+#' @param extras All extras that the environment will hold.
+#' @return A list: `how`, `"uv"` (with the uv found), `"python"` (a Python's venv and pip) or
+#'   `"download"` (uv itself is downloaded first); `tool`, the path of the uv or the Python,
+#'   `NULL` for a download; `folder`, the folder that will be made; `megabytes`, about how much
+#'   is downloaded and how much it takes on the disk, a numeric vector with the names `download`
+#'   and `disk`; `extras`.
+#' @noRd
+install_plan <- function(extras = character(), call = rlang::caller_env()) {
+  uv <- find_uv(call)
+  python <- if (is.null(uv)) find_base_python(with_venv = TRUE)
+  how <- if (!is.null(uv)) "uv" else if (!is.null(python)) "python" else "download"
+  megabytes <- lock_megabytes(extras)
+  if (how != "python" && !has_managed_python()) {
+    megabytes <- megabytes + managed_python_megabytes
+  }
+  if (how == "download") {
+    megabytes <- megabytes + uv_megabytes
+  }
+  list(
+    how = how, tool = if (is.null(uv)) python else uv, folder = next_folder(),
+    megabytes = megabytes, extras = extras
+  )
+}
+
+# About, for Linux with an Intel processor, of the releases named in R/install-uv.R.
+managed_python_megabytes <- c(download = 35, disk = 110)
+uv_megabytes <- c(download = 25, disk = 60)
+
+managed_python_version <- "3.12"
+
+managed_python_folder <- function() file.path(install_root(), "python")
+
+has_managed_python <- function() {
+  start <- paste0("^cpython-", gsub(".", "[.]", managed_python_version, fixed = TRUE))
+  length(list.files(managed_python_folder(), start)) > 0L
+}
+
+# A Python on this machine that an environment can be made from, NULL when there is none. With
+# uv it need not have venv and pip, which Debian leaves out.
+find_base_python <- function(with_venv) {
+  Find(function(python) {
+    about <- probe_python(python)
+    isTRUE(about$fits) && (about$venv || !with_venv)
+  }, setdiff_installed(python_candidates()))
+}
+
+setdiff_installed <- function(pythons) pythons[!is_installed_python(pythons)]
+
+# What a Python is: its version, whether the lock files are for it, and whether it can make
+# environments; NULL for what does not run.
+probe_python <- function(python) {
+  said <- tryCatch(
+    processx::run(
+      python, c("-I", "-c", probe), timeout = 60, error_on_status = FALSE,
+      env = tool_environment()
+    )$stdout,
+    error = function(cnd) ""
+  )
+  words <- strsplit(trimws(said), " ", fixed = TRUE)[[1L]]
+  if (length(words) != 5L || words[[1L]] != "python") {
+    return(NULL)
+  }
+  version <- words[[2L]]
+  list(
+    version = version,
+    fits = version %in% lock_pythons && words[[3L]] == "CPython" && words[[4L]] == "64",
+    venv = words[[5L]] == "venv"
+  )
+}
+
+lock_pythons <- c("3.10", "3.11", "3.12", "3.13")
+
+# One that is too old for -I is too old for the server.
+probe <- paste(
+  "import platform, sys",
+  "try:",
+  "    import ensurepip, venv",
+  "    found = 'venv'",
+  "except ImportError:",
+  "    found = '-'",
+  "print('python', '%d.%d' % sys.version_info[:2], platform.python_implementation(),",
+  "      64 if sys.maxsize > 2**32 else 32, found)",
+  sep = "\n"
+)

@@ -1,0 +1,156 @@
+# Running uv and pip: what they say goes into a log, and what went wrong is put into words that
+# tell what to do.
+
+abort_install <- function(message, ..., call = rlang::caller_env()) {
+  gym_abort(message, class = "gym_error_install", ..., call = call)
+}
+
+# Nothing of another Python's, and not the libraries that R put in front.
+tool_environment <- function(more = character()) {
+  own <- c(
+    PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "",
+    # Where the user's own settings have pip install elsewhere.
+    PIP_USER = "", PIP_TARGET = "", PIP_PREFIX = "", PIP_REQUIRE_VIRTUALENV = "",
+    PIP_DISABLE_PIP_VERSION_CHECK = "1", PIP_NO_INPUT = "1", UV_NO_PROGRESS = "1", NO_COLOR = "1",
+    own_library_path()
+  )
+  c("current", own[setdiff(names(own), names(more))], more)
+}
+
+install_log <- function() file.path(install_root(), "install.log")
+
+#' Run a tool to its end
+#' @param arguments A character vector.
+#' @param env More environment variables.
+#' @return Its output, a character vector of lines, with the attribute `status`.
+#' @noRd
+run_tool <- function(command, arguments, env = character()) {
+  write_log(paste(c(">", command, arguments), collapse = " "))
+  process <- keep_random_state(tryCatch(
+    processx::process$new(
+      command, arguments,
+      stdout = "|", stderr = "2>&1", env = tool_environment(env),
+      # Not the session's: settings of a project there are not meant.
+      wd = install_root(), cleanup_tree = TRUE, windows_hide_window = TRUE
+    ),
+    error = function(cnd) conditionMessage(cnd)
+  ))
+  if (is.character(process)) {
+    write_log(process)
+    return(structure(process, status = -1L))
+  }
+  # Also when the user interrupts.
+  on.exit(if (process$is_alive()) process$kill_tree())
+  output <- character()
+  repeat {
+    process$poll_io(500L)
+    lines <- process$read_output_lines()
+    if (length(lines)) write_log(lines)
+    output <- c(output, lines)
+    keep_turn()
+    if (!process$is_incomplete_output() && !process$is_alive()) {
+      return(structure(output, status = process$get_exit_status()))
+    }
+  }
+}
+
+failed <- function(output) !identical(attr(output, "status"), 0L)
+
+# On a full disk the installation's own failure tells more than the log's.
+write_log <- function(lines) {
+  try(suppressWarnings(cat(paste0(lines, "\n"), file = install_log(), append = TRUE, sep = "")),
+      silent = TRUE)
+}
+
+abort_tool <- function(what, output, call) {
+  words <- utils::tail(trimws(output[nzchar(trimws(output))]), 6L)
+  abort_install(
+    c(
+      paste0(what, "."),
+      x = if (length(words)) paste(words, collapse = "\n"),
+      stats::setNames(install_advice(output), rep("i", length(install_advice(output)))),
+      i = paste0("All that was said is in ", install_log(), "."),
+      i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
+    ),
+    output = as.character(output),
+    call = call
+  )
+}
+
+# What to do about a failure, by the words of uv, pip and the system. The first that fits.
+install_advice <- function(output) {
+  text <- paste(output, collapse = "\n")
+  for (kind in failures) {
+    if (grepl(kind$words, text, ignore.case = TRUE)) {
+      return(kind$advice)
+    }
+  }
+  character()
+}
+
+failures <- list(
+  list(
+    words = "no space left|os error (28|112|122)\\b|errno (28|122)\\b|not enough space|quota exceeded",
+    advice = c(
+      "The disk is full. The package needs room in its cache folder and in the temporary one.",
+      "The environment variable R_USER_CACHE_DIR names another place, TMPDIR and UV_CACHE_DIR too."
+    )
+  ),
+  list(
+    words = "hash(es)? mismatch|do not match the hashes|mismatched hash",
+    advice = c(
+      "A file that came is not the one that the package was made for, and was refused.",
+      "A proxy or mirror may have changed it; try again, or in another network."
+    )
+  ),
+  list(
+    words = paste0(
+      "certificate|unknownissuer|ssl: |sslerror|invalid peer|tls handshake|schannel"
+    ),
+    advice = c(
+      paste("The network's certificate is not trusted, as behind a company's or university's",
+            "proxy."),
+      paste("Set SSL_CERT_FILE to the file of that network's certificates (for pip also",
+            "PIP_CERT), or UV_SYSTEM_CERTS=1 (UV_NATIVE_TLS=1 for an older uv) to use those of",
+            "the system; `Sys.setenv()` sets them for this session.")
+    )
+  ),
+  list(
+    words = "\\b407\\b|proxyerror|proxy|tunnel",
+    advice = paste(
+      "The network's proxy refused. HTTPS_PROXY must be its address, such as",
+      "\"http://user:password@proxy.example:8080\"; `Sys.setenv(HTTPS_PROXY = )` sets it for",
+      "this session."
+    )
+  ),
+  list(
+    words = paste0(
+      "no matching distribution|no solution found|no (usable )?wheels?|not a supported wheel|",
+      "doesn't have a (source distribution or )?wheel|could not find a version"
+    ),
+    advice = c(
+      "The lock file has a package that does not fit this Python or this system.",
+      "The server takes 64-bit Python 3.10 to 3.13; `gym_sitrep()` shows what was found."
+    )
+  ),
+  list(
+    words = "permission denied|os error (5|13)\\b|access is denied|winerror 5\\b",
+    advice = c(
+      "A file or folder cannot be written; a virus scanner may hold it, or another user own it.",
+      "The environment variable R_USER_CACHE_DIR names another place for the cache folder."
+    )
+  ),
+  list(
+    words = paste0(
+      "dns error|resolve|getaddrinfo|name resolution|timed? ?out|unreachable|connection|",
+      "connect error|error sending request|failed to (fetch|download)|could not connect|",
+      "forbidden|could not fetch"
+    ),
+    advice = c(
+      "The network was not reached, or does not let these files through.",
+      "Behind a proxy set HTTPS_PROXY to its address, such as \"http://proxy.example:8080\".",
+      paste("Without a network, `gym_server_install(offline = )` installs from a folder that",
+            "`gym_server_bundle()` filled on another machine.")
+    )
+  )
+)
