@@ -4,6 +4,7 @@
 #'
 #' Only where [rlang::is_interactive()]. It is asked once: a question asked again and again
 #' would swallow, line after line, a script that is pasted into the console.
+#' @param question The question; its last line is the prompt, what is above explains it.
 #' @param default What just pressing Enter means.
 #' @return `TRUE` or `FALSE`; `FALSE` when a dialog was cancelled.
 #' @noRd
@@ -13,7 +14,11 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
     return(isTRUE(utils::askYesNo(question, default = default)))
   }
   choices <- if (default) "(Yes/no)" else "(yes/No)"
-  answer <- tolower(trimws(read_answer_line(paste0(question, " ", choices, " "))))
+  # R cuts a long prompt off.
+  lines <- strsplit(question, "\n", fixed = TRUE)[[1L]]
+  writeLines(utils::head(lines, -1L))
+  prompt <- paste0(utils::tail(lines, 1L), " ", choices, " ")
+  answer <- tolower(trimws(read_answer_line(prompt)))
   if (!nzchar(answer)) {
     return(default)
   }

@@ -86,7 +86,7 @@ confirm_install <- function(plan) {
             plan$megabytes[["download"]], plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
-  isTRUE(utils::askYesNo(paste0(paste(what, collapse = "\n"), "\nInstall them?")))
+  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = TRUE)
 }
 
 describe_plan <- function(plan) {

@@ -55,8 +55,6 @@ end_trial <- function(trial, deadline) {
   } else if (identical(trial$process$get_exit_status(), 0L)) {
     outcome(version, TRUE)
   } else {
-    words <- utils::tail(said[[2L]][nzchar(said[[2L]])], 1L)
-    reason <- sub("^gym_server cannot run on this Python [(].*[)]: ", "", words)
-    outcome(version, FALSE, if (length(reason)) reason else "it ended without a word")
+    outcome(version, FALSE, refusal_words(said[[2L]]))
   }
 }

@@ -185,7 +185,16 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
       "The server ended before it took connections.", own, call, port_hint(own[[1L]])
     )
   }
-  if (length(words)) utils::tail(words, 1L) else "it ended without a word"
+  refusal_words(words)
+}
+
+# Why a Python cannot run the server, from the lines that it wrote.
+refusal_words <- function(lines) {
+  lines <- lines[nzchar(lines)]
+  if (!length(lines)) {
+    return("it ended without a word")
+  }
+  sub("^gym_server cannot run on this Python [(].*[)]: ", "", utils::tail(lines, 1L))
 }
 
 # How the server itself begins when it cannot start as it was asked to; whatever else

@@ -66,3 +66,12 @@ free_port <- function() {
     }
   }
 }
+
+pid_runs <- function(pid) {
+  # Signal 0 only asks; a zombie waits for its parent, not for us.
+  tools::pskill(pid, 0) &&
+    !any(grepl("^State:\\s+Z", tryCatch(
+      readLines(file.path("/proc", pid, "status")),
+      error = function(cnd) "", warning = function(cnd) ""
+    )))
+}

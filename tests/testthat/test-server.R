@@ -1,12 +1,3 @@
-pid_runs <- function(pid) {
-  # Signal 0 only asks; a zombie waits for its parent, not for us.
-  tools::pskill(pid, 0) &&
-    !any(grepl("^State:\\s+Z", tryCatch(
-      readLines(file.path("/proc", pid, "status")),
-      error = function(cnd) "", warning = function(cnd) ""
-    )))
-}
-
 test_that("a server starts on a free port, tells its log and stops", {
   server <- local_server(log_level = "info")
   env_close(server, env_create(server, "CartPole-v1"))
