@@ -13,13 +13,15 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
 abort_http <- function(response, method, call) {
   status <- response$status_code
   problem <- response$answer
+  request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
+  hint <- extra_hint(problem$extra, request) %||% problem$hint
   gym_abort(
     c(
       sentence(problem$message %||% "The server gave no reason"),
-      i = sentence(problem$hint),
+      i = sentence(hint),
       i = if (is.null(problem$message)) stranger_hint(response$url, server_name(response)),
-      " " = paste0(method, " ", response$url, " [", trimws(paste(status, status_text)), "]")
+      " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
     ),
     class = c(
       if (identical(problem$code, "action_not_in_space")) "gym_error_space",
@@ -28,9 +30,24 @@ abort_http <- function(response, method, call) {
     ),
     status = status,
     code = problem$code,
-    hint = problem$hint,
+    hint = hint,
     call = call
   )
+}
+
+# What is missing on a server that runs from what gym_server_install() made is installed by
+# that; what is missing on another is its operator's affair.
+extra_hint <- function(extra, request) {
+  base <- sub("^\\S+ ([a-z]+://[^/]*).*", "\\1", request)
+  server <- the_session$servers[[base]]
+  if (is.null(extra) || is.null(server) || !is_installed_python(server$python)) {
+    return(NULL)
+  }
+  anew <- "`gym_server_stop()` ends this server, and the next `gym_make()` starts one that has it"
+  if (extra %in% installed_server()$extras) {
+    return(paste0("it has been installed meanwhile: ", anew))
+  }
+  paste0("`gym_server_install(extras = \"", extra, "\")` installs it; ", anew)
 }
 
 # The server's words begin in lower case and have no full stop, to stand anywhere.

@@ -21,7 +21,7 @@ next_folder <- function() {
 }
 
 # A folder that no other session takes, should it make one at the same time.
-make_folder <- function() {
+make_folder <- function(call) {
   repeat {
     folder <- next_folder()
     if (dir.create(folder, recursive = TRUE, showWarnings = FALSE)) {
@@ -29,15 +29,27 @@ make_folder <- function() {
       return(folder)
     }
     if (!dir.exists(folder)) {
-      abort_install(
-        c(
-          paste0("The folder ", folder, " cannot be made."),
-          i = "It must be possible to write there, and the disk must have room.",
-          i = "The environment variable R_USER_CACHE_DIR names another place for it."
-        ),
-        call = NULL
-      )
+      abort_folder(folder, call)
     }
+  }
+}
+
+abort_folder <- function(folder, call) {
+  abort_install(
+    c(
+      paste0("The folder ", folder, " cannot be made."),
+      i = "It must be possible to write there, and the disk must have room.",
+      i = "The environment variable R_USER_CACHE_DIR names another place for it."
+    ),
+    call = call
+  )
+}
+
+# At the end: what is not whole goes, and the mark that this session made.
+leave_folder <- function(folder, whole) {
+  unlink(file.path(folder, "used-by", as.character(Sys.getpid())))
+  if (!whole) {
+    remove_folder(folder)
   }
 }
 
@@ -94,7 +106,7 @@ read_marker <- function(folder) {
   list(extras = words("Extras"), site = fields[["Site"]], packages = words("Packages"))
 }
 
-write_marker <- function(folder, extras) {
+write_marker <- function(folder, extras, call) {
   site <- if (is_windows()) {
     file.path("venv", "Lib", "site-packages")
   } else {
@@ -111,10 +123,18 @@ write_marker <- function(folder, extras) {
     End = "yes"
   )
   # Whole at once, or not at all.
-  path <- tempfile("marker-", folder)
-  writeLines(paste0(names(fields), ": ", fields), path)
-  if (!file.rename(path, file.path(folder, "installed"))) {
-    abort_install(paste0("The file ", file.path(folder, "installed"), " cannot be written."))
+  path <- file.path(folder, "installed")
+  part <- paste0(path, "-")
+  try(suppressWarnings({
+    writeLines(paste0(names(fields), ": ", fields), part)
+    file.rename(part, path)
+  }), silent = TRUE)
+  if (is.null(read_marker(folder))) {
+    abort_install(
+      c(paste0("The file ", path, " cannot be written."),
+        i = "Is the disk full? `gym_server_install()` begins anew."),
+      call = call
+    )
   }
 }
 
@@ -122,9 +142,10 @@ write_marker <- function(folder, extras) {
 use_folder <- function(folder) {
   marks <- file.path(folder, "used-by")
   dir.create(marks, showWarnings = FALSE)
-  suppressWarnings(
+  # Another user's environment needs no mark, and a full disk has worse troubles.
+  try(suppressWarnings(
     writeLines(Sys.info()[["nodename"]], file.path(marks, as.character(Sys.getpid())))
-  )
+  ), silent = TRUE)
 }
 
 # Before a server starts, so that no other session removes what it runs from.

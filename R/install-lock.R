@@ -14,8 +14,10 @@ lock_files <- function(extras) {
 # The same for the same lock, however git or a zip program wrote the ends of its lines.
 lock_hash <- function() {
   lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
-  substr(openssl::sha256(paste(lines, collapse = "\n")), 1L, 12L)
+  substr(hex(openssl::sha256(charToRaw(paste(lines, collapse = "\n")))), 1L, 12L)
 }
+
+hex <- function(hash) paste(unclass(hash), collapse = "")
 
 # The value of a "# key: value" at the top of a lock file.
 lock_entry <- function(part, key) {

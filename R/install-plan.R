@@ -29,7 +29,7 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
 
 # About, for Linux with an Intel processor, of the releases named in R/install-uv.R.
 managed_python_megabytes <- c(download = 35, disk = 110)
-uv_megabytes <- c(download = 25, disk = 60)
+uv_megabytes <- c(download = 20, disk = 40)
 
 managed_python_version <- "3.12"
 
@@ -42,14 +42,12 @@ has_managed_python <- function() {
 
 # A Python on this machine that an environment can be made from, NULL when there is none. With
 # uv it need not have venv and pip, which Debian leaves out.
-find_base_python <- function(with_venv) {
+find_base_python <- function(with_venv, versions = lock_pythons) {
   Find(function(python) {
     about <- probe_python(python)
-    isTRUE(about$fits) && (about$venv || !with_venv)
-  }, setdiff_installed(python_candidates()))
+    isTRUE(about$fits) && about$version %in% versions && (about$venv || !with_venv)
+  }, Filter(Negate(is_installed_python), python_candidates()))
 }
-
-setdiff_installed <- function(pythons) pythons[!is_installed_python(pythons)]
 
 # What a Python is: its version, whether the lock files are for it, and whether it can make
 # environments; NULL for what does not run.

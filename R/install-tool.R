@@ -11,7 +11,8 @@ tool_environment <- function(more = character()) {
     PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "",
     # Where the user's own settings have pip install elsewhere.
     PIP_USER = "", PIP_TARGET = "", PIP_PREFIX = "", PIP_REQUIRE_VIRTUALENV = "",
-    PIP_DISABLE_PIP_VERSION_CHECK = "1", PIP_NO_INPUT = "1", UV_NO_PROGRESS = "1", NO_COLOR = "1",
+    PIP_DISABLE_PIP_VERSION_CHECK = "1", PIP_NO_INPUT = "1", PIP_PROGRESS_BAR = "off",
+    UV_NO_PROGRESS = "1", NO_COLOR = "1",
     own_library_path()
   )
   c("current", own[setdiff(names(own), names(more))], more)
@@ -62,13 +63,13 @@ write_log <- function(lines) {
       silent = TRUE)
 }
 
-abort_tool <- function(what, output, call) {
-  words <- utils::tail(trimws(output[nzchar(trimws(output))]), 6L)
+abort_tool <- function(what, output, call, more = NULL) {
+  words <- telling_lines(output)
   abort_install(
     c(
       paste0(what, "."),
       x = if (length(words)) paste(words, collapse = "\n"),
-      stats::setNames(install_advice(output), rep("i", length(install_advice(output)))),
+      bullets(c(install_advice(output), more)),
       i = paste0("All that was said is in ", install_log(), "."),
       i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
     ),
@@ -76,6 +77,18 @@ abort_tool <- function(what, output, call) {
     call = call
   )
 }
+
+# The lines that name an error and what follows them; the last lines where there is none.
+telling_lines <- function(output, n = 6L) {
+  lines <- trimws(output[nzchar(trimws(output))])
+  begins <- grep("^error\\b|connection broken by", lines, ignore.case = TRUE)
+  if (length(begins)) {
+    return(utils::head(lines[seq(begins[[1L]], length(lines))], n))
+  }
+  utils::tail(lines, n)
+}
+
+bullets <- function(texts) stats::setNames(texts, rep("i", length(texts)))
 
 # What to do about a failure, by the words of uv, pip and the system. The first that fits.
 install_advice <- function(output) {
@@ -118,19 +131,9 @@ failures <- list(
   list(
     words = "\\b407\\b|proxyerror|proxy|tunnel",
     advice = paste(
-      "The network's proxy refused. HTTPS_PROXY must be its address, such as",
+      "The network's proxy did not let it through. HTTPS_PROXY must be its address, such as",
       "\"http://user:password@proxy.example:8080\"; `Sys.setenv(HTTPS_PROXY = )` sets it for",
       "this session."
-    )
-  ),
-  list(
-    words = paste0(
-      "no matching distribution|no solution found|no (usable )?wheels?|not a supported wheel|",
-      "doesn't have a (source distribution or )?wheel|could not find a version"
-    ),
-    advice = c(
-      "The lock file has a package that does not fit this Python or this system.",
-      "The server takes 64-bit Python 3.10 to 3.13; `gym_sitrep()` shows what was found."
     )
   ),
   list(
@@ -144,13 +147,23 @@ failures <- list(
     words = paste0(
       "dns error|resolve|getaddrinfo|name resolution|timed? ?out|unreachable|connection|",
       "connect error|error sending request|failed to (fetch|download)|could not connect|",
-      "forbidden|could not fetch"
+      "forbidden|could not fetch|from versions: none"
     ),
     advice = c(
       "The network was not reached, or does not let these files through.",
       "Behind a proxy set HTTPS_PROXY to its address, such as \"http://proxy.example:8080\".",
       paste("Without a network, `gym_server_install(offline = )` installs from a folder that",
             "`gym_server_bundle()` filled on another machine.")
+    )
+  ),
+  list(
+    words = paste0(
+      "no matching distribution|no solution found|no (usable )?wheels?|not a supported wheel|",
+      "doesn't have a (source distribution or )?wheel|could not find a version"
+    ),
+    advice = c(
+      "The lock file has a package that does not fit this Python or this system.",
+      "The server takes 64-bit Python 3.10 to 3.13; `gym_sitrep()` shows what was found."
     )
   )
 )

@@ -13,43 +13,60 @@ turn_patience <- 60
 
 #' Evaluate an expression when it is this session's turn
 #' @noRd
-in_turn <- function(code) {
-  wait_for_turn()
-  on.exit(end_turn())
+in_turn <- function(code, call = rlang::caller_env()) {
+  wait_for_turn(call)
+  the_session$has_turn <- TRUE
+  on.exit({
+    the_session$has_turn <- FALSE
+    unlink(turn_folder(), recursive = TRUE)
+  })
   force(code)
 }
 
-wait_for_turn <- function() {
+wait_for_turn <- function(call) {
   said <- FALSE
+  refused <- 0
   dir.create(install_root(), recursive = TRUE, showWarnings = FALSE)
   while (!dir.create(turn_folder(), showWarnings = FALSE)) {
-    if (!dir.exists(install_root())) {
-      abort_cache_folder()
+    # Where there is none, its holder has just ended; or none can be made.
+    refused <- if (dir.exists(turn_folder())) 0 else refused + 1
+    if (refused > 20) {
+      abort_folder(install_root(), call)
     }
     if (turn_is_void()) {
       unlink(turn_folder(), recursive = TRUE)
-      next
+    } else {
+      if (refused == 0 && !said) {
+        cli::cli_inform("Another R session is installing the server: waiting until it is done.")
+        said <- TRUE
+      }
+      Sys.sleep(if (refused) 0.05 else 0.5)
     }
-    if (!said) {
-      cli::cli_inform("Another R session is installing the server: waiting until it is done ...")
-      said <- TRUE
-    }
-    Sys.sleep(0.5)
   }
-  writeLines(c(Sys.info()[["nodename"]], Sys.getpid()), turn_owner())
+  # Without it, on a full disk, the folder itself tells the age.
+  try(suppressWarnings(
+    writeLines(c(Sys.info()[["nodename"]], as.character(Sys.getpid())), turn_owner())
+  ), silent = TRUE)
 }
 
-end_turn <- function() unlink(turn_folder(), recursive = TRUE)
-
+# While a tool works.
 keep_turn <- function() {
-  if (file.exists(turn_owner())) Sys.setFileTime(turn_owner(), Sys.time())
+  if (isTRUE(the_session$has_turn)) {
+    Sys.setFileTime(turn_sign(), Sys.time())
+  }
 }
+
+turn_sign <- function() if (file.exists(turn_owner())) turn_owner() else turn_folder()
 
 turn_is_void <- function() {
-  owner <- tryCatch(readLines(turn_owner()), error = function(cnd) NULL, warning = function(cnd) NULL)
+  owner <- tryCatch(
+    readLines(turn_owner()),
+    error = function(cnd) NULL, warning = function(cnd) NULL
+  )
+  # Windows cannot be asked whether a process runs without other packages.
   if (length(owner) == 2L && owner[[1L]] == Sys.info()[["nodename"]] && !is_windows()) {
     return(!process_runs(as.integer(owner[[2L]])))
   }
-  touched <- file.mtime(if (length(owner)) turn_owner() else turn_folder())
+  touched <- file.mtime(turn_sign())
   !is.na(touched) && difftime(Sys.time(), touched, units = "secs") > turn_patience
 }

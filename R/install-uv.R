@@ -2,40 +2,41 @@
 
 uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 
+# --managed-python came not long before.
+least_uv <- "0.7.0"
+
 # The first uv that runs and is new enough; NULL when there is none.
 find_uv <- function(call = rlang::caller_env()) {
   named <- Sys.getenv("GYM_UV")
-  if (nzchar(named)) {
-    if (!uv_works(path.expand(named))) {
-      abort_install(
-        c(
-          paste0("The variable GYM_UV names ", named, ", which is no uv that can be used."),
-          i = paste0("It must be the path of uv ", least_uv, " or newer."),
-          i = "`Sys.unsetenv(\"GYM_UV\")` has another looked for."
-        ),
-        call = call
-      )
-    }
-    return(path.expand(named))
+  if (!nzchar(named)) {
+    return(Find(uv_works, uv_candidates()))
   }
-  Find(uv_works, uv_candidates())
+  if (!uv_works(path.expand(named))) {
+    abort_install(
+      c(
+        paste0("The variable GYM_UV names ", named, ", which is no uv that can be used."),
+        i = paste0("It must be the path of uv ", least_uv, " or newer."),
+        i = "`Sys.unsetenv(\"GYM_UV\")` has another looked for."
+      ),
+      call = call
+    )
+  }
+  path.expand(named)
 }
 
 uv_candidates <- function() {
   reticulate <- Sys.getenv("RETICULATE_UV")
+  home <- if (is_windows()) Sys.getenv("USERPROFILE") else path.expand("~")
   places <- c(
-    if (!reticulate %in% c("", "managed")) path.expand(reticulate),
+    # reticulate takes "managed" for its own.
+    if (reticulate != "managed") path.expand(reticulate),
     unname(Sys.which("uv")),
-    path.expand(file.path(if (is_windows()) Sys.getenv("USERPROFILE") else "~",
-                          ".local", "bin", uv_name())),
+    file.path(home, ".local", "bin", uv_name()),
     file.path(tools::R_user_dir("reticulate", "cache"), "uv", "bin", uv_name()),
     brought_uv()
   )
-  unique(places[nzchar(places) & file.exists(places)])
+  unique(places[file.exists(places) & !dir.exists(places)])
 }
-
-# --managed-python is older, but not by much.
-least_uv <- "0.7.0"
 
 uv_works <- function(uv) {
   said <- tryCatch(
@@ -46,6 +47,149 @@ uv_works <- function(uv) {
   startsWith(said, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
+# The release that is brought where there is none, and the SHA-256 of its archives, as published
+# with it and kept by the makers of uv in github.com/astral-sh/setup-uv,
+# src/download/checksum/known-checksums.json.
+uv_release <- list(
+  version = "0.12.16",
+  checksums = c(
+    "x86_64-unknown-linux-gnu" =
+      "8e5c6e5523dffc2dcf615bd995554c84c9feb4e577808a3fb8698a639d3f8d9c",
+    "x86_64-unknown-linux-musl" =
+      "a01206ffbd60f3a7ee30949be1863527986f5307494a064042c69ce7e6d44799",
+    "aarch64-unknown-linux-gnu" =
+      "36d913ee9c647481d64f1a0a0485f85ff2feaee605c341fc22e73398f9212c26",
+    "aarch64-unknown-linux-musl" =
+      "5beba1f35c0922fd086cce850ce919e55bc4e873c4fcda891343526afdb4c5b3",
+    "x86_64-apple-darwin" =
+      "a42bcc9ce97eb8b364d7f162233a9c6b8c0ee25388e551d362809795127e0c31",
+    "aarch64-apple-darwin" =
+      "b6e03fae61704b1aa622f12b792a69483e837b83068e44f4fd34f8a07a8f74a3",
+    "x86_64-pc-windows-msvc" =
+      "f730454bf09019754e5e5abd71a8aa18683cb739cba0d9c720bac2e7c901160f",
+    "aarch64-pc-windows-msvc" =
+      "9977129f89c4036edfcb200d2484755571e51fa74517f02e478c1d7bcc353b2e"
+  )
+)
+
+# The name that uv's releases give this system.
+uv_target <- function() {
+  parts <- strsplit(system_name(), "-", fixed = TRUE)[[1L]]
+  processor <- sub("arm64", "aarch64", parts[[2L]], fixed = TRUE)
+  paste0(processor, switch(parts[[1L]],
+    linux = if (has_musl()) "-unknown-linux-musl" else "-unknown-linux-gnu",
+    darwin = "-apple-darwin",
+    windows = "-pc-windows-msvc",
+    paste0("-", parts[[1L]])
+  ))
+}
+
+has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
+
 # Where the pinned uv is put.
-brought_uv <- function() file.path(install_root(), "uv", uv_name())
-uv_release <- list(version = "0.11.12")
+brought_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
+
+# Download the pinned uv, unless that was done before. Nothing of the archive is unpacked before
+# its checksum is known to be right. UV_DOWNLOAD_URL is what uv's own installer takes.
+bring_uv <- function(call) {
+  uv <- brought_uv()
+  if (file.exists(uv)) {
+    return(uv)
+  }
+  target <- uv_target()
+  if (!target %in% names(uv_release$checksums)) {
+    abort_install(
+      c(
+        paste0("There is no uv to download for this system (", target, ")."),
+        i = "Install Python 3.10, 3.11, 3.12 or 3.13, then call `gym_server_install()` again."
+      ),
+      call = call
+    )
+  }
+  dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
+  archive <- file.path(
+    dirname(uv), paste0("uv-", target, if (is_windows()) ".zip" else ".tar.gz")
+  )
+  on.exit(unlink(archive))
+  base <- Sys.getenv(
+    "UV_DOWNLOAD_URL",
+    paste0("https://github.com/astral-sh/uv/releases/download/", uv_release$version)
+  )
+  cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
+  download_uv(paste0(sub("/+$", "", base), "/", basename(archive)), archive, call)
+  check_uv_archive(archive, uv_release$checksums[[target]], call)
+  unpack_uv(archive, uv, call)
+}
+
+download_uv <- function(url, archive, call) {
+  write_log(paste("> download", url))
+  handle <- curl::new_handle(failonerror = TRUE, followlocation = TRUE, connecttimeout = 30)
+  certificates <- Sys.getenv("SSL_CERT_FILE")
+  if (nzchar(certificates)) {
+    curl::handle_setopt(handle, cainfo = certificates)
+  }
+  tryCatch(
+    curl::curl_download(url, archive, handle = handle),
+    error = function(cnd) {
+      write_log(conditionMessage(cnd))
+      abort_tool(
+        paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
+        more = paste(
+          "uv can also be installed by hand (<https://docs.astral.sh/uv/>), and so can Python",
+          "3.10 to 3.13: `gym_server_install()` takes what it finds."
+        )
+      )
+    }
+  )
+}
+
+# Opened as "rb", as R would unpack it otherwise and tell the hash of what is in it.
+file_sha256 <- function(path) {
+  bytes <- file(path, "rb")
+  on.exit(close(bytes))
+  hex(openssl::sha256(bytes))
+}
+
+check_uv_archive <- function(archive, expected, call) {
+  found <- file_sha256(archive)
+  if (!identical(found, expected)) {
+    abort_install(
+      c(
+        "The uv that was downloaded is not the one that was published, and was thrown away.",
+        x = paste0("Its SHA-256 is ", found, " and should be ", expected, "."),
+        i = paste("A proxy may have put a page of its own in its place, or the download broke off:",
+                  "try again, or in another network.")
+      ),
+      call = call
+    )
+  }
+}
+
+unpack_uv <- function(archive, uv, call) {
+  place <- tempfile("unpacked-", dirname(uv))
+  on.exit(unlink(place, recursive = TRUE))
+  dir.create(place)
+  tryCatch(
+    if (is_windows()) {
+      utils::unzip(archive, exdir = place)
+    } else {
+      utils::untar(archive, exdir = place, tar = "internal")
+    },
+    error = identity, warning = identity
+  )
+  unpacked <- list.files(place, paste0("^", uv_name(), "$"), recursive = TRUE, full.names = TRUE)
+  if (length(unpacked)) {
+    Sys.chmod(unpacked[[1L]], "755")
+  }
+  if (!length(unpacked) || !uv_works(unpacked[[1L]]) || !file.rename(unpacked[[1L]], uv)) {
+    abort_install(
+      c(
+        paste("The uv that was downloaded cannot be run from", dirname(uv)),
+        i = "Is the disk full, or are programs not allowed to run from there?",
+        i = "A Python 3.10 to 3.13 on the PATH does without uv."
+      ),
+      call = call
+    )
+  }
+  uv
+}

@@ -46,14 +46,18 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
     cli::cli_inform(c(v = "The server is installed in {.path {there$folder}}."))
     return(invisible(there$python))
   }
-  plan <- install_plan(wanted, call)
+  plan <- if (is.null(offline)) install_plan(wanted, call) else bundle_plan(offline, wanted, call)
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
   python <- in_turn({
     there <- installed_server()
-    # Another session may have done it meanwhile.
-    if (has_all(there, wanted)) there$python else install_environment(plan, call)
+    if (has_all(there, wanted)) {
+      cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
+      there$python
+    } else {
+      install_environment(plan, call)
+    }
   })
   tell_what_comes_first(python)
   invisible(python)
@@ -82,128 +86,76 @@ confirm_install <- function(plan) {
   what <- c(
     "The server that plays the environments needs Python packages on this machine.",
     paste0("What:  ", describe_plan(plan)),
-    sprintf("Size:  about %.0f MB to download, %.0f MB on the disk",
-            plan$megabytes[["download"]], plan$megabytes[["disk"]]),
+    sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
   ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = TRUE)
 }
 
 describe_plan <- function(plan) {
-  extras <- if (length(plan$extras)) paste0(" (with ", toString(plan$extras), ")")
+  uv <- paste0(if (plan$how == "download") paste("downloading uv", uv_release$version),
+               if (plan$how == "uv") paste("with", plan$tool))
+  python <- if (!is.null(plan$base_python)) {
+    paste(" for", plan$base_python)
+  } else if (plan$how != "python") {
+    paste(" and bringing Python", managed_python_version)
+  }
   paste0(
-    "Gymnasium", extras, ", ",
-    switch(plan$how,
-      uv = paste0("by uv (", plan$tool, "), which brings Python ", managed_python_version),
-      python = paste0("by ", plan$tool),
-      download = paste0("by uv ", uv_release$version, ", which is downloaded first and brings Python ",
-                        managed_python_version)
-    )
+    describe_packages(plan$extras), ", ",
+    if (plan$how == "python") paste("with pip, for", plan$tool) else paste0(uv, python)
   )
 }
 
-install_environment <- function(plan, call) {
-  started <- Sys.time()
-  write_log(c("", paste("##", format(started), "gym", utils::packageVersion("gym"), plan$how)))
-  folder <- make_folder()
-  whole <- FALSE
-  on.exit(if (!whole) remove_folder(folder))
-  cli::cli_inform(c(
-    i = "Installing {describe_plan(plan)}: about {round(plan$megabytes[['download']])} MB."
-  ))
-  uv <- if (plan$how == "uv") plan$tool else if (plan$how == "download") bring_uv(call)
-  make_environment(folder, uv, plan$tool, call)
-  install_packages(folder, uv, plan$extras, call)
-  python <- environment_python(folder)
-  trial <- try_environment(python, plan$extras)
-  if (failed(trial)) {
-    abort_tool("The packages are installed, but the server cannot be run with them", trial, call)
-  }
-  write_marker(folder, plan$extras)
-  whole <- TRUE
-  remove_other_folders(keep = folder)
-  seconds <- as.numeric(difftime(Sys.time(), started, units = "secs"))
-  cli::cli_inform(c(v = "Installed in {round(seconds)} s, in {.path {folder}}."))
-  python
+describe_packages <- function(extras) {
+  paste0("Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
 }
 
-make_environment <- function(folder, uv, python, call) {
-  venv <- file.path(folder, "venv")
-  if (is.null(uv)) {
-    output <- run_tool(python, c("-I", "-m", "venv", venv))
-    if (failed(output)) {
-      abort_tool(paste("No environment could be made with", python), output, call)
-    }
+describe_download <- function(plan) {
+  if (!is.null(plan$bundle)) {
+    return(paste0("from ", plan$bundle$dir, ", without a network"))
+  }
+  sprintf("about %.0f MB to download", plan$megabytes[["download"]])
+}
+
+# GYM_PYTHON comes before what is installed: with one that cannot run the server, the best
+# installation would be of no use.
+check_named_python <- function(call) {
+  named <- Sys.getenv("GYM_PYTHON")
+  if (!nzchar(named)) {
     return(invisible())
   }
-  output <- run_tool(
-    uv, c("venv", "--managed-python", "--python", managed_python_version, venv),
-    env = managed_python_place()
-  )
-  if (!failed(output)) {
+  about <- probe_python(path.expand(named))
+  if (isTRUE(about$fits)) {
     return(invisible())
   }
-  python <- find_base_python(with_venv = FALSE)
-  if (is.null(python)) {
-    abort_no_managed_python(output, call)
-  }
-  cli::cli_inform(c(
-    "!" = "uv could not bring a Python, so {.path {python}} is taken (see {.path {install_log()}})."
-  ))
-  unlink(venv, recursive = TRUE)
-  output <- run_tool(uv, c("venv", "--no-managed-python", "--python", python, venv))
-  if (failed(output)) {
-    abort_tool(paste("No environment could be made with", python), output, call)
-  }
+  what <- if (is.null(about)) "which does not run" else paste0("which is Python ", about$version)
+  abort_install(
+    c(
+      paste0("The variable GYM_PYTHON names ", named, ", ", what, "."),
+      i = "The server needs 64-bit Python 3.10 to 3.13, and the Python named there comes first.",
+      i = paste("`Sys.unsetenv(\"GYM_PYTHON\")`, and the same in ~/.Renviron; then",
+                "`gym_server_install()` again.")
+    ),
+    call = call
+  )
 }
 
-# Beside the environments, so that it goes when they go, and on Windows does not roam.
-managed_python_place <- function() {
-  if (nzchar(Sys.getenv("UV_PYTHON_INSTALL_DIR"))) {
-    return(character())
-  }
-  c(UV_PYTHON_INSTALL_DIR = managed_python_folder())
-}
-
-install_packages <- function(folder, uv, extras, call) {
-  python <- environment_python(folder)
-  requirements <- as.vector(rbind("-r", lock_files(extras)))
-  output <- if (is.null(uv)) {
-    run_tool(python, c(
-      "-I", "-m", "pip", "install", "--require-hashes", "--only-binary", ":all:", "--no-deps",
-      "--no-compile", requirements
-    ))
-  } else {
-    run_tool(uv, c(
-      "pip", "install", "--python", python, "--require-hashes", "--no-build", "--no-deps",
-      requirements
+# What would keep this session from using what was installed.
+tell_what_comes_first <- function(python) {
+  named <- Sys.getenv("GYM_PYTHON")
+  if (nzchar(named) && !identical(path.expand(named), python)) {
+    cli::cli_inform(c(
+      "!" = "The variable GYM_PYTHON is set, and the Python that it names comes first.",
+      " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} has this session use what was installed."
     ))
   }
-  if (failed(output)) {
-    abort_tool("The server's packages could not be installed", output, call)
+  running <- Filter(function(server) {
+    is_installed_python(server$python) && server$python != python && server$process$is_alive()
+  }, the_session$servers)
+  if (length(running)) {
+    cli::cli_inform(c(
+      "!" = "This session's server still runs from what was installed before.",
+      " " = "{.code gym_server_stop()} ends it; the next {.code gym_make()} starts one anew."
+    ))
   }
 }
-
-# Import the server as it will be run, and look for what the extras bring.
-try_environment <- function(python, extras) {
-  modules <- c(
-    box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
-  )
-  modules <- modules[names(modules) %in% extras]
-  script <- paste0(
-    "import importlib.util, gym_server.cli\n",
-    paste0("import gymnasium.envs.classic_control, pygame\n",
-           if (length(modules)) paste0("assert importlib.util.find_spec('", modules, "'), '",
-                                       modules, " is missing'\n", collapse = ""))
-  )
-  run_tool(python, c("-c", script), env = c(
-    PYTHONPATH = system.file("server", package = "gym"), PYTHONDONTWRITEBYTECODE = "1"
-  ))
-}
-
-abort_no_managed_python <- function(output, call) {
-  abort_tool("uv could not bring a Python, and this machine has no Python 3.10 to 3.13", output, call)
-}
-
-check_named_python <- function(call) NULL
-tell_what_comes_first <- function(python) NULL

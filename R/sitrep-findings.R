@@ -67,6 +67,8 @@ sitrep_environment <- function(python_runs) {
 
 folder_megabytes <- function(folder) {
   files <- list.files(folder, all.files = TRUE, full.names = TRUE, recursive = TRUE)
+  # A link of Python's to lib.
+  files <- files[!grepl("/lib64/", files, fixed = TRUE)]
   round(sum(file.size(files), na.rm = TRUE) / 1e6)
 }
 

@@ -22,7 +22,7 @@
 #' gym_sitrep()
 gym_sitrep <- function() {
   variables <- Sys.getenv()
-  variables <- variables[grepl("^GYM_", names(variables))]
+  variables <- variables[grepl("^GYM_", names(variables)) & nzchar(variables)]
   pythons <- tryCatch(try_pythons(python_candidates()), error = identity)
   python_runs <- is.data.frame(pythons) && any(pythons$runs, na.rm = TRUE)
   found <- rbind(

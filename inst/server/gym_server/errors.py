@@ -31,13 +31,17 @@ class GymServerError(Exception):
         code: stable name of what is wrong, snake_case.
         message: one sentence for a person.
         hint: what to do about it, or None.
+        extra: the extra of the server that is missing, or None.
     """
 
-    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+    def __init__(
+        self, code: str, message: str, hint: str | None = None, extra: str | None = None
+    ) -> None:
         super().__init__(message)
         self.code = code
         self.message = message
         self.hint = hint
+        self.extra = extra
 
     @property
     def status(self) -> int:
@@ -86,7 +90,7 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
             is logged.
 
     Returns:
-        The HTTP status and ``{"message", "code", "hint"?}``.
+        The HTTP status and ``{"message", "code", "hint"?, "extra"?}``.
     """
     if isinstance(error, HTTPException):
         error = _from_http(error)
@@ -102,6 +106,8 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
     body = {"message": error.message, "code": error.code}
     if error.hint:
         body["hint"] = error.hint
+    if error.extra:
+        body["extra"] = error.extra
     return error.status, body
 
 

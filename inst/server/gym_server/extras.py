@@ -58,6 +58,7 @@ def missing_extra(what: str, extra: str) -> GymServerError:
         "missing_dependency",
         f"{what} needs the server's extra '{extra}'",
         f'"{sys.executable}" -m pip install {wanted}',
+        extra,
     )
 
 

@@ -192,6 +192,7 @@ def _require_video(env: gymnasium.Env) -> None:
             "video_unavailable",
             f"Videos need moviepy, which this server does not have: {error}",
             "install gym-server[video], or leave video_callable out",
+            "video",
         ) from error
 
 

@@ -20,6 +20,7 @@ _ERROR = {
         "message": {"type": "string"},
         "code": {"type": "string"},
         "hint": {"type": "string"},
+        "extra": {"type": "string", "description": "The extra of the server that is missing."},
     },
 }
 

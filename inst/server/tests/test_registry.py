@@ -102,6 +102,7 @@ def test_an_environment_whose_extra_is_missing_names_it(env_id, extra, module, r
     status, answer, entries = python(hidden(module) + f"ENV_ID = {env_id!r}" + CREATE)
     assert (status, answer["code"]) == (400, "missing_dependency")
     assert answer["message"] == f"{env_id} needs the server's extra '{extra}'"
+    assert answer["extra"] == extra
     assert "-m pip install " in answer["hint"]
     assert requirement in answer["hint"]
     assert all(entry["available"] is False for entry in entries if entry["id"] == env_id)

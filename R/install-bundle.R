@@ -1,0 +1,229 @@
+# Bundles: what an installation downloads, in a folder that can be carried to a machine without a
+# network.
+#
+#   bundle.dcf   for what it was made: system, lock, extras, Python
+#   wheels/      the packages
+#   lock/        the lock files, for whoever wants to know what is in it
+#   uv/          uv, when it was used
+#   python/      the archive of the Python that uv brings, when it could be had
+
+#' Fill a folder for installing without a network
+#'
+#' Downloads what [gym_server_install()] would download, so that
+#' `gym_server_install(offline = dir)` can install it on machines without a network: a
+#' classroom's, say. Those need the same kind of system (Windows, macOS or Linux, and the same
+#' processor) and the same version of this package.
+#'
+#' Where uv is found or can be downloaded it is part of the bundle, and so is the Python that it
+#' brings. Where that cannot be had the bundle is for the version of the Python that made it,
+#' and the other machines need a Python of that version, too: the function says so.
+#'
+#' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
+#'   is replaced, anything else refused.
+#' @param extras The extras that the bundle shall have, as for [gym_server_install()].
+#' @return `dir`, invisibly.
+#' @section Errors: `gym_error_install` when something could not be downloaded, with what to do;
+#'   `gym_error_argument`.
+#' @seealso [gym_server_install()]
+#' @export
+#' @examples
+#' # Downloads some 100 MB:
+#' if (interactive()) gym_server_bundle(file.path(tempdir(), "gym-bundle"), extras = "box2d")
+gym_server_bundle <- function(dir, extras = character()) {
+  check_string(dir)
+  check_extras(extras)
+  call <- rlang::current_env()
+  dir <- empty_bundle(dir, call)
+  extras <- server_extras[server_extras %in% extras]
+  in_turn({
+    plan <- install_plan(extras, call)
+    cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
+    uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
+    base <- bundle_python(dir, uv, call)
+    download_wheels(dir, base, extras, call)
+    has_uv <- copy_uv(uv, dir)
+  })
+  dir.create(file.path(dir, "lock"))
+  file.copy(lock_files(extras), file.path(dir, "lock"))
+  # Last, as without it the folder is no bundle.
+  write.dcf(list(
+    System = bundle_system(), Lock = lock_hash(), Extras = paste(extras, collapse = " "),
+    Python = probe_python(base$python)$version,
+    Brings = if (has_uv && base$managed) "uv and Python" else if (has_uv) "uv" else "packages"
+  ), file.path(dir, "bundle.dcf"))
+  unlink(file.path(dir, "making"), recursive = TRUE)
+  tell_bundle(read_bundle(dir, call))
+  invisible(dir)
+}
+
+empty_bundle <- function(dir, call) {
+  if (length(list.files(dir, all.files = TRUE, no.. = TRUE))) {
+    own <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
+    if (!all(list.files(dir, all.files = TRUE, no.. = TRUE) %in% own)) {
+      gym_abort(
+        paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
+        class = "gym_error_argument",
+        call = call
+      )
+    }
+    unlink(file.path(dir, own), recursive = TRUE)
+  }
+  dir.create(file.path(dir, "making"), recursive = TRUE, showWarnings = FALSE)
+  if (!dir.exists(file.path(dir, "making"))) {
+    abort_install(paste0("The folder ", dir, " cannot be made."), call = call)
+  }
+  normalizePath(dir, winslash = "/")
+}
+
+# The Python that the packages are downloaded for, and by: uv's own, whose archive is kept, or
+# one of this machine.
+bundle_python <- function(dir, uv, call) {
+  if (!is.null(uv)) {
+    place <- file.path(dir, "making", "python")
+    output <- run_tool(
+      uv, c("python", "install", managed_python_version, "--install-dir", place),
+      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), only_there)
+    )
+    found <- list.files(place, paste0("^cpython-", managed_python_version), full.names = TRUE)
+    if (!failed(output) && length(found)) {
+      python <- file.path(found[[1L]], if (is_windows()) "python.exe" else "bin/python3")
+      return(list(python = python, managed = TRUE))
+    }
+  }
+  python <- find_base_python(with_venv = TRUE)
+  if (is.null(python)) {
+    if (is.null(uv)) output <- character()
+    abort_tool(
+      "There is no Python for which the packages could be downloaded", output, call,
+      more = "Python 3.10 to 3.13 with `venv` is needed where uv cannot bring one."
+    )
+  }
+  list(python = python, managed = FALSE)
+}
+
+download_wheels <- function(dir, base, extras, call) {
+  venv <- file.path(dir, "making", "venv")
+  output <- run_tool(base$python, c("-I", "-m", "venv", venv))
+  if (!failed(output)) {
+    python <- file.path(venv, if (is_windows()) "Scripts/python.exe" else "bin/python")
+    output <- run_tool(python, c(
+      "-I", "-m", "pip", "download", "--require-hashes", "--only-binary", ":all:", "--no-deps",
+      "--dest", file.path(dir, "wheels"), as.vector(rbind("-r", lock_files(extras)))
+    ))
+  }
+  if (failed(output)) {
+    abort_tool("The server's packages could not be downloaded", output, call)
+  }
+}
+
+copy_uv <- function(uv, dir) {
+  if (is.null(uv)) {
+    return(FALSE)
+  }
+  place <- file.path(dir, "uv", uv_name())
+  dir.create(dirname(place))
+  # What is found on the PATH may only call the real one.
+  copied <- file.copy(uv, place) && uv_works(place)
+  if (!copied) unlink(dirname(place), recursive = TRUE)
+  copied
+}
+
+tell_bundle <- function(bundle) {
+  files <- list.files(bundle$dir, recursive = TRUE, full.names = TRUE)
+  megabytes <- round(sum(file.size(files)) / 1e6)
+  needs <- if (!bundle$brings_python) {
+    paste0("The other machine needs Python ", bundle$python, ": uv could bring none for it.")
+  }
+  cli::cli_inform(c(
+    v = "The bundle is ready: {megabytes} MB in {.path {bundle$dir}}.",
+    "!" = needs,
+    i = "On the other machine: {.code gym_server_install(offline = \"{basename(bundle$dir)}\")}"
+  ))
+}
+
+# Wheels for musl are others than those for glibc.
+bundle_system <- function() {
+  paste0(system_name(), if (startsWith(system_name(), "linux") && has_musl()) "-musl")
+}
+
+read_bundle <- function(dir, call) {
+  fields <- tryCatch(
+    read.dcf(file.path(dir, "bundle.dcf"))[1L, ], error = function(cnd) NULL,
+    warning = function(cnd) NULL
+  )
+  if (!all(c("System", "Lock", "Extras", "Python", "Brings") %in% names(fields))) {
+    abort_bundle(
+      paste0("There is no whole bundle in ", dir, "."),
+      "`gym_server_bundle()` makes one; one that broke off has no file bundle.dcf.", call
+    )
+  }
+  dir <- normalizePath(dir, winslash = "/")
+  uv <- file.path(dir, "uv", uv_name())
+  list(
+    dir = dir, system = fields[["System"]], lock = fields[["Lock"]],
+    extras = strsplit(fields[["Extras"]], " ", fixed = TRUE)[[1L]], python = fields[["Python"]],
+    uv = if (file.exists(uv)) uv, brings_python = fields[["Brings"]] == "uv and Python"
+  )
+}
+
+abort_bundle <- function(problem, mend, call) {
+  abort_install(c(problem, i = mend), call = call)
+}
+
+# As install_plan(), for what a bundle has.
+bundle_plan <- function(dir, extras, call) {
+  bundle <- read_bundle(dir, call)
+  check_bundle(bundle, extras, call)
+  # Another uv would bring another Python than the one whose archive is there.
+  uv <- bundle_uv(bundle) %||% find_uv(call)
+  python <- if (is.null(uv) || !bundle$brings_python) {
+    find_base_python(with_venv = is.null(uv), versions = bundle$python) %||% abort_bundle(
+      paste0("The bundle is for Python ", bundle$python, " and brings none."),
+      paste0("Install Python ", bundle$python, " on this machine, or make the bundle on one where ",
+             "uv can bring a Python."),
+      call
+    )
+  }
+  list(
+    how = if (is.null(uv)) "python" else "uv", tool = if (is.null(uv)) python else uv,
+    folder = next_folder(), extras = extras, bundle = bundle, base_python = python,
+    megabytes = c(download = 0, disk = lock_megabytes(extras)[["disk"]])
+  )
+}
+
+check_bundle <- function(bundle, extras, call) {
+  if (bundle$system != bundle_system()) {
+    abort_bundle(
+      paste0("The bundle was made for another system, ", bundle$system, "; this one is ",
+             bundle_system(), "."),
+      "Make it with `gym_server_bundle()` on a machine of this kind.", call
+    )
+  }
+  if (bundle$lock != lock_hash()) {
+    abort_bundle(
+      "The bundle was made by another version of this package, which needs other packages.",
+      "Install the same version of the package on both machines, and make the bundle anew.", call
+    )
+  }
+  lacking <- setdiff(extras, bundle$extras)
+  if (length(lacking)) {
+    abort_bundle(
+      paste0("The bundle lacks ", paste0("\"", lacking, "\"", collapse = ", "), "."),
+      paste0("On the other machine: `gym_server_bundle(dir, extras = ",
+             paste(deparse(extras), collapse = ""), ")`."),
+      call
+    )
+  }
+}
+
+# A stick or a share may not let programs run.
+bundle_uv <- function(bundle) {
+  if (is.null(bundle$uv)) {
+    return(NULL)
+  }
+  uv <- file.path(install_root(), "uv", "bundle", uv_name())
+  dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
+  file.copy(bundle$uv, uv, overwrite = TRUE)
+  Sys.chmod(uv, "755")
+  if (uv_works(uv)) uv
+}
