@@ -18,11 +18,11 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   lines <- strsplit(question, "\n", fixed = TRUE)[[1L]]
   writeLines(utils::head(lines, -1L))
   prompt <- paste0(utils::tail(lines, 1L), " ", choices, " ")
-  answer <- tolower(trimws(read_answer_line(prompt)))
+  answer <- trimws(read_answer_line(prompt))
   if (!nzchar(answer)) {
     return(default)
   }
-  choice <- pmatch(answer, c("yes", "no"))
+  choice <- pmatch(tolower(answer), c("yes", "no"))
   if (is.na(choice)) {
     gym_abort(
       c(

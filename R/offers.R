@@ -29,17 +29,24 @@ install_allowed <- function() tolower(Sys.getenv("GYM_INSTALL")) %in% c("1", "tr
 #' @noRd
 offer_server <- function(client, call = rlang::caller_env()) {
   base <- client$remote_base
-  place <- local_place(base)
-  if (is.null(place) || !rlang::is_interactive() || base %in% the_session$start_declined ||
-        !is.null(client$config$options$proxy) || probe_server(base, timeout = 0.3)$listens) {
+  if (!rlang::is_interactive() || !is_vacant(client) || base %in% the_session$start_declined) {
     return(invisible())
   }
   if (!ask_yes_no(paste0("No server runs at ", base, ". Start one there?"), TRUE, call = call)) {
     the_session$start_declined <- c(the_session$start_declined, base)
     return(invisible())
   }
+  place <- local_place(base)
   server <- start_server(place$port, options = list(host = place$host), call = call)
   # Under the name that the script has for it, too.
   the_session$servers[[base]] <- the_session$servers[[server$remote_base]]
   cli::cli_inform(c(v = "The server at {base} is ready. It stops with this R session."))
+}
+
+# Whether a client expects a server on this machine where nobody listens. An address behind
+# a proxy is not this machine's.
+is_vacant <- function(client) {
+  base <- client$remote_base
+  !is.null(local_place(base)) && is.null(client$config$options$proxy) &&
+    !probe_server(base, timeout = 0.3)$listens
 }

@@ -12,12 +12,12 @@
 try_pythons <- function(pythons, timeout = 6) {
   trials <- lapply(pythons, begin_trial)
   deadline <- Sys.time() + timeout
-  outcomes <- lapply(trials, end_trial, deadline = deadline)
+  outcomes <- Map(end_trial, pythons, trials, list(deadline))
   data.frame(
     python = pythons,
-    version = vapply(outcomes, function(outcome) outcome$version, ""),
-    runs = vapply(outcomes, function(outcome) outcome$runs, NA),
-    reason = vapply(outcomes, function(outcome) outcome$reason, "")
+    version = vapply(outcomes, function(outcome) outcome$version, "", USE.NAMES = FALSE),
+    runs = vapply(outcomes, function(outcome) outcome$runs, NA, USE.NAMES = FALSE),
+    reason = vapply(outcomes, function(outcome) outcome$reason, "", USE.NAMES = FALSE)
   )
 }
 
@@ -37,12 +37,12 @@ begin_trial <- function(python) {
   if (!is.null(process)) list(process = process, output = output)
 }
 
-end_trial <- function(trial, deadline) {
+end_trial <- function(python, trial, deadline) {
   outcome <- function(version = NA_character_, runs = FALSE, reason = NA_character_) {
     list(version = version, runs = runs, reason = reason)
   }
   if (is.null(trial)) {
-    return(outcome(reason = "it cannot be run"))
+    return(outcome(reason = not_run_words(python)))
   }
   on.exit(unlink(trial$output))
   left <- as.numeric(deadline - Sys.time(), units = "secs")

@@ -34,17 +34,17 @@ no_python_words <- function(refusals) {
 
 # Read by people who chose a Python.
 named_python_words <- function(named, refusals, python) {
-  by_variable <- is.null(python)
+  by <- if (is.null(python)) "GYM_PYTHON" else "`python`"
+  unset <- if (is.null(python)) " (`Sys.unsetenv(\"GYM_PYTHON\")`)"
   c(
-    paste0("The Python that ", if (by_variable) "GYM_PYTHON" else "`python`",
-           " names cannot run the server."),
+    paste0("The Python that ", by, " names cannot run the server."),
     x = paste0(named, ": ", refusals),
     i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
       paste("What it lacks, in a terminal:", shQuote(named), "-m pip install",
             shQuote(normalizePath(system.file("server", package = "gym"))))
     },
     i = paste0(
-      if (by_variable) "Without GYM_PYTHON (`Sys.unsetenv(\"GYM_PYTHON\")`)" else "Without `python`",
+      "Without ", by, unset,
       " the session uses the one that `gym::gym_server_install()` installs."
     )
   )

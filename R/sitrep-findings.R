@@ -67,8 +67,8 @@ sitrep_environment <- function(python_runs) {
 
 folder_megabytes <- function(folder) {
   files <- list.files(folder, all.files = TRUE, full.names = TRUE, recursive = TRUE)
-  # A link of Python's to lib.
-  files <- files[!grepl("/lib64/", files, fixed = TRUE)]
+  # lib64 is a link to lib, and Python itself may be one to another.
+  files <- files[!grepl("/lib64/", files, fixed = TRUE) & Sys.readlink(files) %in% c("", NA)]
   round(sum(file.size(files), na.rm = TRUE) / 1e6)
 }
 
@@ -100,7 +100,8 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
         finding("Python", what, paste("cannot run the server:", reason), "wrong",
                 "Sys.unsetenv(\"GYM_PYTHON\")")
       } else {
-        finding("Python", what, if (is.na(runs)) reason else paste("cannot run it:", reason), "note")
+        problem <- if (is.na(runs)) reason else paste("cannot run it:", reason)
+        finding("Python", what, problem, "note")
       }
     },
     seq_len(nrow(pythons)), pythons$python, pythons$version, pythons$runs, pythons$reason

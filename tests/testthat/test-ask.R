@@ -25,7 +25,7 @@ test_that("a line of a script is not taken for an answer, nor asked for another"
   error <- expect_error(
     answering("env_id <- \"CartPole-v0\"", default = TRUE), class = "gym_error_argument"
   )
-  expect_match(conditionMessage(error), "cartpole-v0", fixed = TRUE)
+  expect_match(conditionMessage(error), "CartPole-v0", fixed = TRUE)
   expect_match(conditionMessage(error), "next line of a script", fixed = TRUE)
 })
 
