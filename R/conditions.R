@@ -18,7 +18,7 @@ abort_http <- function(response, method, call) {
   hint <- extra_hint(problem$extra, request) %||% problem$hint
   gym_abort(
     c(
-      sentence(problem$message %||% "The server gave no reason"),
+      sentence(problem$message %||% "The answer is not what a Gym server sends"),
       i = sentence(hint),
       i = if (is.null(problem$message)) stranger_hint(response$url, server_name(response)),
       " " = paste0(request, " [", trimws(paste(status, status_text)), "]")

@@ -29,7 +29,7 @@ install_allowed <- function() tolower(Sys.getenv("GYM_INSTALL")) %in% c("1", "tr
 #' @noRd
 offer_server <- function(client, call = rlang::caller_env()) {
   base <- client$remote_base
-  if (!rlang::is_interactive() || !is_vacant(client) || base %in% the_session$start_declined) {
+  if (!rlang::is_interactive() || base %in% the_session$start_declined || !is_vacant(client)) {
     return(invisible())
   }
   if (!ask_yes_no(paste0("No server runs at ", base, ". Start one there?"), TRUE, call = call)) {

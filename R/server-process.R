@@ -34,8 +34,9 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   words <- log_tail(log)
   own <- grep(server_words, words, value = TRUE)
   if (length(own)) {
+    in_r <- sub("--port 0 takes", "`gym_server_start()` without a port takes", own, fixed = TRUE)
     abort_server_start(
-      "The server ended before it took connections.", own, call, port_hint(own[[1L]])
+      "The server ended before it took connections.", in_r, call, port_hint(own[[1L]])
     )
   }
   refusal_words(words)

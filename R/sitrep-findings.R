@@ -91,6 +91,7 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
     return(finding("Python", "Pythons", "none was found", "note"))
   }
   taken <- which(pythons$runs)[1L]
+  own <- installed_server()$python
   rows <- Map(
     function(i, python, version, runs, reason) {
       what <- paste0(python, if (!is.na(version)) paste0(" (", version, ")"))
@@ -99,6 +100,9 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
       } else if (named && isFALSE(runs)) {
         finding("Python", what, paste("cannot run the server:", reason), "wrong",
                 "Sys.unsetenv(\"GYM_PYTHON\")")
+      } else if (isFALSE(runs) && python %in% own) {
+        finding("Python", what, paste("cannot run the server:", reason), "wrong",
+                "gym_server_install()")
       } else {
         problem <- if (is.na(runs)) reason else paste("cannot run it:", reason)
         finding("Python", what, problem, "note")
@@ -156,8 +160,9 @@ sitrep_server <- function(url, what, mend) {
                    mend))
   }
   if (!probe$is_gym) {
-    return(finding("servers", what, paste("no Gym server.", stranger_hint(url, probe$name)),
-                   "wrong", "gym_server_start()"))
+    called <- if (!is.null(probe$name)) paste0(", it calls itself \"", probe$name, "\"")
+    return(finding("servers", what, paste0("no Gym server", called), "wrong",
+                   "Sys.unsetenv(\"GYM_SERVER_URL\")"))
   }
   count <- count_of(probe$instances, "environment")
   health <- tryCatch(get_answer(new_client(url, 2), "/v1/health/"), gym_error = function(cnd) NULL)

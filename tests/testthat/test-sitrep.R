@@ -73,6 +73,17 @@ test_that("the installed environment is told: whole, damaged, or of another vers
   expect_match(environment_row()$finding, "another version")
 })
 
+test_that("an installed Python that cannot run the server is wrong", {
+  report(runs = FALSE, reason = "RuntimeError: damaged by hand")
+  local_functions(
+    installed_server = function() list(python = "/some/python3", folder = "/some", extras = NULL)
+  )
+  found <- sitrep()$found
+  row <- found[startsWith(found$what, "/some/python3"), ]
+  expect_identical(row$state, "wrong")
+  expect_identical(row$mend, "gym_server_install()")
+})
+
 test_that("the session's server is told with its environments, also when it died", {
   server <- test_client()
   known <- the_session$servers
