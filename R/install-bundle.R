@@ -132,7 +132,7 @@ tell_bundle <- function(bundle) {
   files <- list.files(bundle$dir, recursive = TRUE, full.names = TRUE)
   megabytes <- round(sum(file.size(files)) / 1e6)
   needs <- if (!bundle$brings_python) {
-    paste0("The other machine needs Python ", bundle$python, ": uv could bring none for it.")
+    paste0("It brings no Python: the other machine needs Python ", bundle$python, ".")
   }
   cli::cli_inform(c(
     v = "The bundle is ready: {megabytes} MB in {.path {bundle$dir}}.",

@@ -156,7 +156,7 @@ use_python <- function(python) {
 }
 
 is_installed_python <- function(python) {
-  startsWith(python, paste0(install_root(), "/"))
+  !is.null(python) && startsWith(python, paste0(install_root(), "/"))
 }
 
 folder_of <- function(python) dirname(dirname(dirname(python)))

@@ -103,7 +103,9 @@ install_advice <- function(output) {
 
 failures <- list(
   list(
-    words = "no space left|os error (28|112|122)\\b|errno (28|122)\\b|not enough space|quota exceeded",
+    words = paste0(
+      "no space left|os error (28|112|122)\\b|errno (28|122)\\b|not enough space|quota exceeded"
+    ),
     advice = c(
       "The disk is full. The package needs room in its cache folder and in the temporary one.",
       "The environment variable R_USER_CACHE_DIR names another place, TMPDIR and UV_CACHE_DIR too."
@@ -146,7 +148,7 @@ failures <- list(
   list(
     words = paste0(
       "dns error|resolve|getaddrinfo|name resolution|timed? ?out|unreachable|connection|",
-      "connect error|error sending request|failed to (fetch|download)|could not connect|",
+      "connect error|connect to|error sending request|failed to (fetch|download)|",
       "forbidden|could not fetch|from versions: none"
     ),
     advice = c(

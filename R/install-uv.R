@@ -48,8 +48,8 @@ uv_works <- function(uv) {
 }
 
 # The release that is brought where there is none, and the SHA-256 of its archives, as published
-# with it and kept by the makers of uv in github.com/astral-sh/setup-uv,
-# src/download/checksum/known-checksums.json.
+# with it and kept by the makers of uv: github.com/astral-sh/setup-uv, in the folder
+# src/download/checksum the file known-checksums.json.
 uv_release <- list(
   version = "0.12.16",
   checksums = c(

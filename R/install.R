@@ -15,6 +15,12 @@
 #' Extras that were installed before are kept. A call that finds everything there checks it,
 #' says so and changes nothing; what was damaged is made anew.
 #'
+#' Environment variables change where things come from and go, set by [Sys.setenv()] or in
+#' `~/.Renviron`: `R_USER_CACHE_DIR` is the place of the cache folder; `HTTPS_PROXY` the
+#' network's proxy; `SSL_CERT_FILE` the file of its certificates; `UV_PYTHON_INSTALL_MIRROR`
+#' where uv gets its Pythons, and `UV_DOWNLOAD_URL` where uv itself is downloaded from. uv and
+#' pip go by their own settings, such as those of an institution's mirror.
+#'
 #' @param extras What to install beside the server, a character vector with any of
 #'   `"toy-text"`, `"box2d"`, `"mujoco"`, `"atari"` and `"video"`; the default is none. The
 #'   environments of classic control and toy text need none.

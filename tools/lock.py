@@ -1,9 +1,8 @@
 """Writes inst/server/lock/: called by tools/lock, with a folder to work in.
 
 One resolution for all extras, all systems and all Pythons that the server supports. base.txt
-holds what the server itself needs, EXTRA.txt what an extra adds; each is a requirements file
-that pip and uv read, and needs the others' of its own extra's sake only. Their first lines are
-comments, "# key: value", that R reads.
+holds what the server itself needs, EXTRA.txt what an extra adds to that, both as requirements
+that pip and uv read. Their first lines are comments, "# key: value", that R reads.
 """
 
 from __future__ import annotations
@@ -13,10 +12,10 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import tomllib
 from packaging import tags
 from packaging.markers import Marker
 from packaging.utils import parse_wheel_filename
@@ -47,6 +46,7 @@ SYSTEMS = {
 
 
 def main(folder: Path) -> None:
+    """Resolve what pyproject.toml asks for, and write a file for each part."""
     pyproject = SERVER / "pyproject.toml"
     project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
     _write_project(project, folder)
@@ -88,8 +88,7 @@ def _write_project(project: dict, folder: Path) -> None:
         *(f"{extra} = {json.dumps(project['optional-dependencies'][extra])}\n" for extra in EXTRAS),
         "[tool.uv]\npackage = false\nno-build = true\n",
         # Where the newest release of a package has no wheel for these, an older one is taken.
-        "required-environments = "
-        "[\"sys_platform == 'darwin' and platform_machine == 'x86_64'\"]\n",
+        "required-environments = [\"sys_platform == 'darwin' and platform_machine == 'x86_64'\"]\n",
     ]
     (folder / "pyproject.toml").write_text("".join(text), encoding="utf-8")
 
@@ -101,9 +100,7 @@ def _uv(*arguments: str, cwd: Path) -> str:
 
 def _export(folder: Path, extras: list[str]) -> dict[str, str]:
     """Return requirements with hashes, by what stands before their hashes."""
-    text = _uv(
-        "export", "--quiet", "--frozen", "--no-header", "--no-annotate", *extras, cwd=folder
-    )
+    text = _uv("export", "--quiet", "--frozen", "--no-header", "--no-annotate", *extras, cwd=folder)
     blocks = re.split(r"\n(?=\S)", text.strip())
     return {block.partition(" \\\n")[0]: block for block in blocks}
 

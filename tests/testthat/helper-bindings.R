@@ -1,18 +1,22 @@
-# Functions of the package replaced until the test ends. testthat's own
+# A function of the package replaced until the test ends. testthat's own
 # local_mocked_bindings() is younger than the testthat that this package runs on.
-local_functions <- function(..., frame = parent.frame()) {
-  namespace <- asNamespace("gym")
-  replaced <- list(...)
-  originals <- mget(names(replaced), envir = namespace)
-  set <- function(functions) {
-    for (name in names(functions)) {
-      unlockBinding(name, namespace)
-      assign(name, functions[[name]], envir = namespace)
-      lockBinding(name, namespace)
-    }
+local_binding <- function(name, value, frame = parent.frame()) {
+  space <- asNamespace("gym")
+  before <- get(name, space)
+  set <- function(value) {
+    unlockBinding(name, space)
+    assign(name, value, space)
+    lockBinding(name, space)
   }
-  set(replaced)
-  withr::defer(set(originals), envir = frame)
+  set(value)
+  withr::defer(set(before), envir = frame)
+}
+
+local_functions <- function(..., frame = parent.frame()) {
+  replaced <- list(...)
+  for (name in names(replaced)) {
+    local_binding(name, replaced[[name]], frame = frame)
+  }
 }
 
 # What a session remembers, kept as it was for other tests.

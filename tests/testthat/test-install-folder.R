@@ -1,0 +1,89 @@
+test_that("an environment is found when it is whole, and by no other lock", {
+  local_cache()
+  expect_null(installed_server())
+  folder <- fake_environment(extras = c("box2d", "video"))
+  there <- installed_server()
+  expect_identical(there$folder, folder)
+  expect_identical(there$python, environment_python(folder))
+  expect_identical(there$extras, c("box2d", "video"))
+  expect_identical(there$python, grep("gym", python_candidates(), value = TRUE)[1L])
+  unlink(folder, recursive = TRUE)
+  fake_environment(hash = "0123456789ab", extras = "atari")
+  expect_null(installed_server())
+  expect_identical(earlier_extras(), "atari")
+})
+
+test_that("what was interrupted or damaged is no environment", {
+  local_cache()
+  folder <- fake_environment()
+  unlink(file.path(folder, "venv", "lib", "python3.12", "site-packages", "numpy"),
+         recursive = TRUE)
+  unlink(file.path(folder, "venv", "Lib", "site-packages", "numpy"), recursive = TRUE)
+  expect_null(installed_server())
+  second <- fake_environment(2)
+  expect_identical(installed_server()$folder, second)
+  unlink(environment_python(second))
+  expect_null(installed_server())
+  third <- fake_environment(3)
+  marker <- readLines(file.path(third, "installed"))
+  writeLines(head(marker, -1L), file.path(third, "installed"))
+  expect_null(installed_server())
+  fourth <- fake_environment(4)
+  unlink(file.path(fourth, "installed"))
+  expect_null(installed_server())
+})
+
+test_that("only what no session uses is removed", {
+  skip_on_os("windows")
+  local_cache()
+  used <- fake_environment(1)
+  unused <- fake_environment(2)
+  kept <- fake_environment(3)
+  other <- processx::process$new("sleep", "60")
+  withr::defer(other$kill())
+  for (folder in c(used, unused)) {
+    dir.create(file.path(folder, "used-by"))
+  }
+  node <- Sys.info()[["nodename"]]
+  writeLines(node, file.path(used, "used-by", other$get_pid()))
+  # This session runs no server from there.
+  writeLines(node, file.path(unused, "used-by", Sys.getpid()))
+  remove_other_folders(kept)
+  expect_identical(dir.exists(c(used, unused, kept)), c(TRUE, FALSE, TRUE))
+  expect_true(file.exists(environment_python(used)))
+  # It is in nobody's way any more, and goes the next time.
+  expect_identical(installed_server()$folder, kept)
+  expect_identical(basename(next_folder()), paste0(lock_hash(), "-4"))
+  other$kill()
+  remove_other_folders(kept)
+  expect_false(dir.exists(used))
+})
+
+test_that("an environment that a machine elsewhere uses is left alone for a month", {
+  local_cache()
+  folder <- fake_environment()
+  dir.create(file.path(folder, "used-by"))
+  mark <- file.path(folder, "used-by", "1")
+  writeLines("another-machine", mark)
+  expect_true(is_used(folder))
+  Sys.setFileTime(mark, Sys.time() - 31 * 86400)
+  expect_false(is_used(folder))
+})
+
+test_that("two sessions never make the same folder", {
+  local_cache()
+  first <- make_folder(NULL)
+  second <- make_folder(NULL)
+  expect_false(first == second)
+  leave_folder(first, whole = FALSE)
+  expect_false(dir.exists(first))
+  leave_folder(second, whole = TRUE)
+  expect_identical(list.files(file.path(second, "used-by")), character())
+})
+
+test_that("a cache folder that cannot be made is an error that says what to set", {
+  file <- withr::local_tempfile(lines = "not a folder")
+  withr::local_envvar(R_USER_CACHE_DIR = file)
+  expect_error(make_folder(NULL), "R_USER_CACHE_DIR", class = "gym_error_install")
+  expect_error(in_turn(1), "R_USER_CACHE_DIR", class = "gym_error_install")
+})

@@ -1,0 +1,74 @@
+test_that("a failure says what to do", {
+  said <- function(...) paste(install_advice(c(...)), collapse = " ")
+  # The words are those of uv 0.13.9 and pip 23.2.1.
+  expect_match(said(
+    "error: Failed to install: numpy-2.5.5-cp312-cp312-manylinux_2_28_x86_64.whl (numpy==2.5.5)",
+    "cause: failed to copy file: No space left on device (os error 28)"
+  ), "disk is full")
+  expect_match(said(
+    "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device"
+  ), "disk is full")
+  expect_match(said(
+    "error: Failed to fetch: `https://index.example/simple/blinker/`",
+    "cause: client error (Connect)", "cause: invalid peer certificate: UnknownIssuer"
+  ), "SSL_CERT_FILE")
+  expect_match(said(
+    "WARNING: Retrying after connection broken by 'SSLError(SSLCertVerificationError(1, ...))'",
+    "ERROR: Could not find a version that satisfies the requirement blinker==1.9.0"
+  ), "PIP_CERT")
+  expect_match(said(
+    "cause: tunnel error: failed to create underlying connection", "cause: tcp connect error"
+  ), "HTTPS_PROXY")
+  expect_match(said(
+    "cause: dns error", "cause: failed to lookup address information: Name or service not known"
+  ), "gym_server_bundle")
+  expect_match(said(
+    "ERROR: Could not find a version that satisfies blinker==1.9.0 (from versions: none)"
+  ), "network")
+  expect_match(said(
+    "ERROR: Could not find a version that satisfies numpy==2.5.5 (from versions: 1.0, 2.2.6)"
+  ), "Python 3.10 to 3.13")
+  expect_match(said(
+    "error: Hash mismatch for `blinker==1.9.0`", "Expected:", "  sha256:0", "Computed:"
+  ), "refused")
+  expect_match(said(
+    "ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE."
+  ), "refused")
+  expect_identical(install_advice("something else"), character())
+})
+
+test_that("an error shows the lines that name it", {
+  lines <- c("Resolved 14 packages", "error: Failed to fetch", "cause: dns error", "")
+  expect_identical(telling_lines(lines), c("error: Failed to fetch", "cause: dns error"))
+  expect_identical(telling_lines(c(letters, "")), tail(letters, 6L))
+})
+
+test_that("a tool gets nothing of another Python's, and its words go into the log", {
+  skip_on_os("windows")
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  withr::local_envvar(PYTHONPATH = "/else", PYTHONHOME = "/else", PIP_TARGET = "/else")
+  output <- run_tool("/bin/sh", c("-c", "echo \"<$PYTHONPATH$PYTHONHOME$PIP_TARGET>\"; exit 3"))
+  expect_identical(as.character(output), "<>")
+  expect_true(failed(output))
+  expect_false(failed(run_tool("/bin/sh", c("-c", "echo $OWN"), env = c(OWN = "own"))))
+  expect_identical(tail(readLines(install_log()), 1L), "own")
+  expect_true(failed(run_tool("/no/such/tool", "x")))
+})
+
+test_that("an interrupt ends the tool", {
+  skip_on_os("windows")
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  pid <- withr::local_tempfile()
+  tryCatch(
+    {
+      setTimeLimit(elapsed = 3, transient = TRUE)
+      run_tool("/bin/sh", c("-c", "echo $$ > \"$0\"; exec sleep 60", pid))
+    },
+    error = identity
+  )
+  setTimeLimit()
+  # Until it is reaped its number is taken.
+  expect_true(wait_until(function() !process_runs(as.integer(readLines(pid)))))
+})

@@ -1,0 +1,115 @@
+fake_uv <- function(folder, version = "0.9.0") {
+  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
+  uv <- file.path(folder, "uv")
+  writeLines(c("#!/bin/sh", paste0("echo 'uv ", version, " (abc)'")), uv)
+  Sys.chmod(uv, "755")
+  uv
+}
+
+# uv's release archive, served from a folder, with the checksum that it should have.
+local_release <- function(uv, frame = parent.frame()) {
+  folder <- withr::local_tempdir(.local_envir = frame)
+  name <- paste0("uv-", uv_target())
+  dir.create(file.path(folder, name))
+  file.copy(uv, file.path(folder, name, "uv"))
+  archive <- file.path(folder, paste0(name, ".tar.gz"))
+  withr::with_dir(folder, utils::tar(archive, name, compression = "gzip", tar = "internal"))
+  withr::local_envvar(UV_DOWNLOAD_URL = paste0("file://", folder), .local_envir = frame)
+  release <- uv_release
+  release$checksums[[uv_target()]] <- file_sha256(archive)
+  local_binding("uv_release", release, frame)
+  archive
+}
+
+test_that("uv is looked for in the order that the help page tells", {
+  skip_on_os("windows")
+  local_cache()
+  folder <- withr::local_tempdir()
+  reticulate <- fake_uv(file.path(folder, "reticulate"))
+  path <- fake_uv(file.path(folder, "path"))
+  home <- fake_uv(file.path(folder, "home", ".local", "bin"))
+  own <- fake_uv(file.path(tools::R_user_dir("reticulate", "cache"), "uv", "bin"))
+  brought <- fake_uv(dirname(brought_uv()))
+  withr::local_envvar(
+    GYM_UV = NA, RETICULATE_UV = reticulate, HOME = file.path(folder, "home"),
+    PATH = paste(dirname(path), "/usr/bin", "/bin", sep = ":")
+  )
+  expect_identical(uv_candidates()[1:2], c(reticulate, path))
+  expect_identical(tail(uv_candidates(), 2L), c(own, brought))
+  expect_identical(find_uv(), reticulate)
+  # One that is too old, or not uv at all, is passed over.
+  fake_uv(dirname(reticulate), "0.6.17")
+  expect_identical(find_uv(), path)
+  writeLines(c("#!/bin/sh", "echo hello"), path)
+  expect_false(find_uv() == path)
+  withr::local_envvar(RETICULATE_UV = "managed")
+  expect_false("managed" %in% uv_candidates())
+})
+
+test_that("GYM_UV must name a uv that runs", {
+  local_cache()
+  withr::local_envvar(GYM_UV = "/no/such/uv")
+  expect_error(gym_server_install(), "GYM_UV names /no/such/uv", class = "gym_error_install")
+})
+
+test_that("the pinned uv has a checksum for each system, and this system a name", {
+  expect_match(uv_release$checksums, "^[0-9a-f]{64}$")
+  expect_false(anyDuplicated(uv_release$checksums) > 0)
+  expect_length(uv_release$checksums, 8L)
+  targets <- c(
+    "linux-x86_64" = "x86_64-unknown-linux-", "linux-aarch64" = "aarch64-unknown-linux-",
+    "darwin-x86_64" = "x86_64-apple-darwin", "darwin-arm64" = "aarch64-apple-darwin",
+    "windows-x86_64" = "x86_64-pc-windows-msvc"
+  )
+  for (system in names(targets)) {
+    local_binding("system_name", function() system)
+    expect_match(uv_target(), targets[[system]], fixed = TRUE)
+    expect_true(uv_target() %in% names(uv_release$checksums))
+  }
+  local_binding("system_name", function() "sunos-sparc")
+  expect_error(bring_uv(NULL), "Install Python", class = "gym_error_install")
+})
+
+test_that("uv is brought, and run only when its checksum is right", {
+  skip_on_os("windows")
+  local_cache()
+  folder <- withr::local_tempdir()
+  uv <- fake_uv(folder)
+  archive <- local_release(uv)
+  expect_message(brought <- bring_uv(NULL), "Downloading uv")
+  expect_identical(brought, brought_uv())
+  expect_true(uv_works(brought))
+  expect_identical(list.files(dirname(brought)), "uv")
+  expect_silent(bring_uv(NULL))
+
+  unlink(dirname(brought), recursive = TRUE)
+  ran <- file.path(folder, "ran")
+  writeLines(c("#!/bin/sh", paste0("touch '", ran, "'"), "echo 'uv 0.9.0'"), uv)
+  right <- asNamespace("gym")$uv_release
+  local_release(uv)
+  # The archive is another than the one whose checksum is known.
+  local_binding("uv_release", right)
+  expect_error(suppressMessages(bring_uv(NULL)), "SHA-256", class = "gym_error_install")
+  expect_false(file.exists(ran))
+  expect_identical(list.files(dirname(brought)), character())
+  # A second try, with the right one.
+  withr::local_envvar(UV_DOWNLOAD_URL = paste0("file://", dirname(archive)))
+  expect_identical(suppressMessages(bring_uv(NULL)), brought)
+})
+
+test_that("a download that fails says what else there is", {
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  withr::local_envvar(UV_DOWNLOAD_URL = "http://127.0.0.1:9")
+  error <- expect_error(suppressMessages(bring_uv(NULL)), class = "gym_error_install")
+  expect_match(conditionMessage(error), "HTTPS_PROXY", fixed = TRUE)
+  expect_match(conditionMessage(error), "by hand", fixed = TRUE)
+})
+
+test_that("an archive without a uv that runs is refused", {
+  skip_on_os("windows")
+  local_cache()
+  local_release(withr::local_tempfile(lines = "not a program"))
+  expect_error(suppressMessages(bring_uv(NULL)), "cannot be run", class = "gym_error_install")
+  expect_false(file.exists(brought_uv()))
+})

@@ -1,0 +1,112 @@
+# What the package's own tests cannot do without the network is in one test, so that packages are
+# downloaded once.
+
+test_that("an installation runs the server, takes extras and mends itself", {
+  local_cache()
+  skip_if_no_uv()
+  skip_if_no_packages()
+  suppressMessages(expect_message(python <- gym_server_install(), "Installed in"))
+  expect_identical(python, installed_server()$python)
+  expect_identical(python_candidates()[2L], python)
+
+  # The tests' own environment comes first where it is active.
+  withr::local_envvar(VIRTUAL_ENV = NA)
+  server <- local_server()
+  expect_identical(the_session$servers[[server$remote_base]]$python, python)
+  local_env(client = server)$reset()
+  error <- expect_error(gym_make("LunarLander-v3", client = server), class = "gym_error_http_400")
+  expect_match(conditionMessage(error), "gym_server_install(extras = \"box2d\")", fixed = TRUE)
+  expect_match(error$hint, "gym_server_stop()", fixed = TRUE)
+
+  # Its server goes on, and is told of.
+  suppressMessages(expect_message(
+    second <- gym_server_install("box2d"), "still runs from what was installed before"
+  ))
+  expect_false(second == python)
+  expect_true(file.exists(python))
+  expect_identical(installed_server()$extras, "box2d")
+  local_env("FrozenLake-v1", client = server)$reset()
+  error <- expect_error(gym_make("LunarLander-v3", client = server), class = "gym_error_http_400")
+  expect_match(error$hint, "installed meanwhile")
+  gym_server_stop(server)
+  local_env("LunarLander-v3", client = local_server())$reset()
+
+  # All there: nothing is done, and what was asked for before is kept.
+  expect_message(third <- gym_server_install(), "is installed in")
+  expect_identical(third, second)
+
+  # A file inside a package, which only the trial notices.
+  site <- file.path(installed_server()$folder, read_marker(installed_server()$folder)$site)
+  unlink(file.path(site, "flask", "app.py"))
+  expect_false(is.null(installed_server()))
+  fourth <- suppressMessages(gym_server_install())
+  expect_false(fourth == third)
+  expect_identical(installed_server()[c("python", "extras")],
+                   list(python = fourth, extras = "box2d"))
+  unlink(file.path(dirname(dirname(fourth)), "pyvenv.cfg"))
+  unlink(fourth)
+  expect_null(installed_server())
+  expect_identical(suppressMessages(gym_server_install()), installed_server()$python)
+})
+
+test_that("pip installs it where there is no uv", {
+  local_cache()
+  skip_if_no_packages()
+  local_binding("find_uv", function(...) NULL)
+  suppressMessages(expect_message(python <- gym_server_install(), "with pip, for"))
+  expect_identical(python, installed_server()$python)
+  expect_false(failed(try_environment(python, character())))
+})
+
+test_that("who says no gets nothing, and who says yes is asked once", {
+  local_cache()
+  local_failing_uv("error: Failed to fetch")
+  asked <- character()
+  local_binding("ask_yes_no", function(question, ...) {
+    asked <<- c(asked, question)
+    length(asked) > 1L
+  })
+  expect_null(gym_server_install("video", ask = TRUE))
+  expect_false(dir.exists(install_root()))
+  expect_match(asked, "Gymnasium (with video)", fixed = TRUE)
+  expect_match(asked, "about [0-9]+ MB to download, [0-9]+ MB on the disk")
+  expect_match(asked, install_root(), fixed = TRUE)
+  expect_error(suppressMessages(gym_server_install(ask = TRUE)), class = "gym_error_install")
+  expect_length(asked, 2L)
+})
+
+test_that("an installation that fails leaves what was there before", {
+  local_cache()
+  folder <- fake_environment()
+  local_failing_uv("error: failed to copy: No space left on device (os error 28)")
+  error <- expect_error(
+    suppressMessages(gym_server_install("box2d")), class = "gym_error_install"
+  )
+  expect_match(conditionMessage(error), "The disk is full", fixed = TRUE)
+  expect_match(conditionMessage(error), install_log(), fixed = TRUE)
+  expect_match(error$output, "os error 28", all = FALSE)
+  expect_identical(installed_server()$folder, folder)
+  expect_identical(
+    list.files(install_root()), c(basename(folder), "install.log")
+  )
+})
+
+test_that("a GYM_PYTHON that cannot run the server is named before anything is done", {
+  local_cache()
+  skip_on_os("windows")
+  old <- withr::local_tempfile(lines = c("#!/bin/sh", "echo python 3.9 CPython 64 venv"))
+  Sys.chmod(old, "755")
+  withr::local_envvar(GYM_PYTHON = old)
+  error <- expect_error(gym_server_install(), "which is Python 3.9", class = "gym_error_install")
+  expect_match(conditionMessage(error), "Sys.unsetenv(\"GYM_PYTHON\")", fixed = TRUE)
+  withr::local_envvar(GYM_PYTHON = "/no/such/python")
+  expect_error(gym_server_install(), "does not run", class = "gym_error_install")
+  expect_false(dir.exists(install_root()))
+})
+
+test_that("arguments are checked", {
+  expect_error(gym_server_install("box3d"), class = "gym_error_argument")
+  expect_error(gym_server_install(character(), "offline"), class = "gym_error_argument")
+  expect_error(gym_server_install(offline = 1), class = "gym_error_argument")
+  expect_error(gym_server_install(ask = NA), class = "gym_error_argument")
+})
