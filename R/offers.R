@@ -10,12 +10,13 @@
 #' @noRd
 offered_python <- function() {
   if (install_allowed()) {
-    return(gym_server_install(ask = FALSE))
+    return(keep_random_state(gym_server_install(ask = FALSE)))
   }
   if (!rlang::is_interactive() || isTRUE(the_session$install_declined)) {
     return(NULL)
   }
-  python <- gym_server_install(ask = TRUE)
+  # Processes get names that are drawn from R's generator.
+  python <- keep_random_state(gym_server_install(ask = TRUE))
   the_session$install_declined <- is.null(python)
   python
 }

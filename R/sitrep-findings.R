@@ -38,12 +38,7 @@ sitrep_variables <- function(variables) {
   finding("R", "variables", texts %||% "none of the package's is set")
 }
 
-#' @param python_runs Can any of the Pythons run the server?
-#' @noRd
-sitrep_installation <- function(python_runs) {
-  rbind(sitrep_environment(python_runs), sitrep_uv())
-}
-
+# `python_runs`: whether any of the Pythons can run the server.
 sitrep_environment <- function(python_runs) {
   server <- installed_server()
   folders <- install_folders()

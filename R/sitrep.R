@@ -21,22 +21,28 @@
 #' @examples
 #' gym_sitrep()
 gym_sitrep <- function() {
+  # Processes get names that are drawn from R's generator.
+  found <- keep_random_state(sitrep_findings())
+  class(found) <- c("gym_sitrep", class(found))
+  print(found)
+  invisible(found)
+}
+
+sitrep_findings <- function() {
   variables <- Sys.getenv()
   variables <- variables[grepl("^GYM_", names(variables)) & nzchar(variables)]
   pythons <- tryCatch(try_pythons(python_candidates()), error = identity)
   python_runs <- is.data.frame(pythons) && any(pythons$runs, na.rm = TRUE)
-  found <- rbind(
+  rbind(
     attempt_rows("R", "versions", sitrep_versions()),
     attempt_rows("R", "suggested packages", sitrep_suggested()),
     attempt_rows("R", "variables", sitrep_variables(variables)),
-    attempt_rows("Python", "environment", sitrep_installation(python_runs)),
+    attempt_rows("Python", "environment", sitrep_environment(python_runs)),
+    attempt_rows("Python", "uv", sitrep_uv()),
     attempt_rows("Python", "Pythons", sitrep_pythons(pythons)),
     attempt_rows("servers", "this session's", sitrep_own_servers()),
     attempt_rows("servers", "GYM_SERVER_URL", sitrep_named_server(Sys.getenv("GYM_SERVER_URL")))
   )
-  class(found) <- c("gym_sitrep", class(found))
-  print(found)
-  invisible(found)
 }
 
 finding <- function(topic, what, finding, state = "ok", mend = NA_character_) {

@@ -12,6 +12,7 @@ local_bare_session <- function(answers, interactive = TRUE, frame = parent.frame
     python_candidates = function(python = NULL) python %||% character(),
     gym_server_install = function(..., ask = NA) {
       calls$ask <- c(calls$ask, ask)
+      stats::runif(1)
       answer <- answers[[1L]]
       answers <<- answers[-1L]
       invisible(answer)
@@ -26,7 +27,10 @@ working_python <- function() the_session$servers[[test_client()$remote_base]]$py
 test_that("an interactive session without a Python installs when asked, and goes on", {
   python <- working_python()
   calls <- local_bare_session(list(python))
+  set.seed(1)
+  before <- .Random.seed
   env <- gym_make("CartPole-v1", seed = 1)
+  expect_identical(.Random.seed, before)
   withr::defer(gym_server_stop(env$client))
   expect_length(env$reset(), 4)
   expect_identical(calls$ask, TRUE)
