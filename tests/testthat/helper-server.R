@@ -11,6 +11,13 @@ skip_if_no_server <- function() {
   )
 }
 
+# A Python that can run the server.
+working_python <- function() {
+  # First, as it may start the server.
+  client <- test_client()
+  the_session$servers[[client$remote_base]]$python
+}
+
 # A server of its own for a test that stops it or needs other options.
 local_server <- function(..., frame = parent.frame()) {
   skip_if_no_server()

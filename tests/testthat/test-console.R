@@ -2,7 +2,7 @@
 
 test_that("a script that names a server that is not there gets one, and goes on", {
   skip_if_no_server()
-  python <- the_session$servers[[test_client()$remote_base]]$python
+  python <- working_python()
   console <- local_console(c(GYM_PYTHON = python))
   port <- free_port()
   console$say("library(gym)")

@@ -1,6 +1,6 @@
 # A program that is no Gym server; the port it listens on.
 local_stranger <- function(name, frame = parent.frame()) {
-  python <- the_session$servers[[test_client()$remote_base]]$python
+  python <- working_python()
   process <- processx::process$new(
     python, c(test_path("stranger_server.py"), name), stdin = "|", stdout = "|", stderr = NULL
   )

@@ -22,8 +22,6 @@ local_bare_session <- function(answers, interactive = TRUE, frame = parent.frame
   calls
 }
 
-working_python <- function() the_session$servers[[test_client()$remote_base]]$python
-
 test_that("an interactive session without a Python installs when asked, and goes on", {
   python <- working_python()
   calls <- local_bare_session(list(python))

@@ -7,7 +7,7 @@ fake_python <- function(folder, ..., name = "python3") {
 
 test_that("each Python is tried, and what it lacks is told", {
   skip_on_os("windows")
-  working <- the_session$servers[[test_client()$remote_base]]$python
+  working <- working_python()
   folder <- withr::local_tempdir()
   bare <- fake_python(
     folder, "echo 3.12.1",

@@ -49,7 +49,7 @@ test_that("a Python that cannot run the server is named, with the mend", {
 
 test_that("the first Python that can run the server is taken", {
   skip_on_os("windows")
-  working <- the_session$servers[[test_client()$remote_base]]$python
+  working <- working_python()
   folder <- withr::local_tempdir()
   # One that has none of the packages, as a system's own may be.
   bare <- file.path(folder, "bare", "python3")
