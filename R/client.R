@@ -4,6 +4,11 @@
 #' talks to no server until it is first used. Scripts that only want to play an
 #' environment need none: [gym_client()] has one ready.
 #'
+#' In an interactive session, where nobody listens at an address of this machine such
+#' as `"http://127.0.0.1:5000"`, it offers once to start a server there, as
+#' [gym_server_start()] does. A script is asked nothing: with no server there the first
+#' call fails and says what starts one.
+#'
 #' A client may be saved with [saveRDS()], sent to another process and used in a
 #' forked one; each copy makes a connection of its own.
 #'
@@ -23,10 +28,11 @@
 #' @return An object of class `GymClient`, a list with the element
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https
-#'   URL or the timeout not a positive number.
+#'   URL or the timeout not a positive number; `gym_error_server_start` when a server
+#'   that was to be started could not be.
 #' @export
 #' @examples
-#' server <- create_GymClient("http://127.0.0.1:5000")
+#' server <- create_GymClient("http://gym.example.org:5000")
 #' server
 #'
 #' @examplesIf gym:::can_start_server()
@@ -50,6 +56,12 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config())
     must <- "made with httr, such as by httr::add_headers()"
     abort_argument(config, must, "config", rlang::current_env())
   }
+  client <- new_client(remote_base, timeout, config)
+  offer_server(client)
+  client
+}
+
+new_client <- function(remote_base, timeout = 60, config = httr::config()) {
   structure(
     list(
       remote_base = sub("/+$", "", remote_base),

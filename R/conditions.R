@@ -10,13 +10,17 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   )
 }
 
-abort_http <- function(status, problem, request, call) {
+abort_http <- function(response, method, call) {
+  status <- response$status_code
+  problem <- response$answer
+  request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
   hint <- extra_hint(problem$extra, request) %||% problem$hint
   gym_abort(
     c(
-      sentence(problem$message %||% "The server gave no reason"),
+      sentence(problem$message %||% "The answer is not what a Gym server sends"),
       i = sentence(hint),
+      i = if (is.null(problem$message)) stranger_hint(response$url, server_name(response)),
       " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
     ),
     class = c(
@@ -58,7 +62,7 @@ sentence <- function(text) {
 }
 
 abort_connection <- function(url, reason, call) {
-  base <- sub("(//[^/]*).*", "\\1", url)
+  base <- base_of(url)
   gym_abort(
     c(paste0("No answer from the server at ", base, "."), x = reason, i = connection_mend(base)),
     class = "gym_error_connection",
@@ -74,13 +78,15 @@ connection_mend <- function(base) {
       "`gym_make()` starts another when it has ended."
     ))
   }
-  port <- sub("^https?://[^/]*:([0-9]+).*$", "\\1", base)
-  if (is_loopback(base) && grepl("^[0-9]+$", port)) {
-    paste0("Is a server running there? `gym_server_start(port = ", port, ")` starts one.")
-  } else {
+  place <- local_place(base)
+  if (is.null(place)) {
     "Is that its address, and is it running there?"
+  } else {
+    paste0("Is a server running there? `", start_call(place), "` starts one.")
   }
 }
+
+base_of <- function(url) sub("(//[^/]*).*", "\\1", url)
 
 abort_no_answer <- function(response, call) {
   gym_abort(
@@ -88,7 +94,7 @@ abort_no_answer <- function(response, call) {
       "The answer is not what a Gym server sends.",
       x = paste0(response$url, " gave status ", response$status_code, " and ",
                  response$type %||% "content of no type", "."),
-      i = "Is the address that of a Gym server?"
+      i = stranger_hint(response$url, server_name(response))
     ),
     class = "gym_error_connection",
     url = response$url,

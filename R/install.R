@@ -88,14 +88,14 @@ has_all <- function(there, extras) {
   !is.null(there) && all(extras %in% there$extras) && !failed(try_environment(there$python, extras))
 }
 
-confirm_install <- function(plan) {
+confirm_install <- function(plan, call = rlang::caller_env()) {
   what <- c(
     "The server that plays the environments needs Python packages on this machine.",
     paste0("What:  ", describe_plan(plan)),
     sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
-  ask_yes_no(paste0(paste(what, collapse = "\n"), "\nInstall them?"))
+  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = TRUE, call = call)
 }
 
 describe_plan <- function(plan) {
@@ -165,5 +165,3 @@ tell_what_comes_first <- function(python) {
     ))
   }
 }
-
-ask_yes_no <- function(question) isTRUE(utils::askYesNo(question))

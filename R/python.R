@@ -1,53 +1,66 @@
 # Which Python runs the server: where it is looked for, and what to say when there is none.
 
-abort_no_python <- function(python, candidates, refusals, call = rlang::caller_env()) {
-  looked <- if (length(candidates)) paste0(candidates, ": ", refusals)
+#' Say that no Python can run the server
+#' @param refusals Why each Python that was tried cannot, strings named by its path.
+#' @noRd
+abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
+  named <- named_python(python)
   gym_abort(
-    c(
-      "No Python was found that can run the server.",
-      stats::setNames(looked, rep("x", length(looked))),
-      i = if (is.null(python)) {
-        paste("Python is looked for in GYM_PYTHON or, where that is not set, in an active",
-              "virtual environment and on the PATH.")
-      },
-      i = "The server needs Python 3.10 or newer and a few packages. In a terminal:",
-      stats::setNames(installing_commands(), c(" ", " ")),
-      i = "and then, in R:",
-      " " = paste0("Sys.setenv(GYM_PYTHON = \"", installed_python(), "\")"),
-      i = "To make that last, put it into ~/.Renviron as GYM_PYTHON=..."
-    ),
+    if (is.null(named)) no_python_words(refusals) else named_python_words(named, refusals, python),
     class = "gym_error_server_start",
-    candidates = candidates,
+    refusals = refusals,
     call = call
   )
 }
 
-# An environment of its own: a system's Python often refuses packages.
-installing_commands <- function() {
-  server <- system.file("server", package = "gym")
-  if (is_windows()) {
-    c("py -m venv \"%USERPROFILE%\\gym-python\"",
-      paste0("\"%USERPROFILE%\\gym-python\\Scripts\\python\" -m pip install ",
-             shQuote(normalizePath(server), type = "cmd")))
-  } else {
-    c("python3 -m venv ~/gym-python",
-      paste("~/gym-python/bin/python -m pip install", shQuote(server)))
+# Read by people who need not know what Python is; the rest is in gym_sitrep().
+no_python_words <- function(refusals) {
+  own <- refusals[names(refusals) %in% installed_server()$python]
+  if (length(own)) {
+    return(c(
+      "The Python that was installed for the server cannot run it.",
+      x = paste0(names(own), ": ", own),
+      i = "`gym::gym_server_install()` installs it anew."
+    ))
   }
+  c(
+    "The server needs a Python of its own, which is not installed yet.",
+    i = "`gym::gym_server_install()` installs it.",
+    i = if (!rlang::is_interactive()) {
+      "With the environment variable GYM_INSTALL=1 a script does so by itself."
+    }
+  )
 }
 
-installed_python <- function() {
-  if (is_windows()) {
-    file.path(chartr("\\", "/", Sys.getenv("USERPROFILE")), "gym-python/Scripts/python.exe")
-  } else {
-    "~/gym-python/bin/python"
-  }
+# Read by people who chose a Python.
+named_python_words <- function(named, refusals, python) {
+  by <- if (is.null(python)) "GYM_PYTHON" else "`python`"
+  unset <- if (is.null(python)) " (`Sys.unsetenv(\"GYM_PYTHON\")`)"
+  c(
+    paste0("The Python that ", by, " names cannot run the server."),
+    x = paste0(named, ": ", refusals),
+    i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
+      paste("What it lacks, in a terminal:", shQuote(named), "-m pip install",
+            shQuote(normalizePath(system.file("server", package = "gym"))))
+    },
+    i = paste0(
+      "Without ", by, unset,
+      " the session uses the one that `gym::gym_server_install()` installs."
+    )
+  )
+}
+
+# The Python that somebody chose, NULL when nobody did.
+named_python <- function(python) {
+  named <- python %||% Sys.getenv("GYM_PYTHON")
+  if (nzchar(named)) path.expand(named)
 }
 
 # Where Python may be, in the order in which it is tried.
 python_candidates <- function(python = NULL) {
-  named <- python %||% Sys.getenv("GYM_PYTHON")
-  if (nzchar(named)) {
-    return(path.expand(named))
+  named <- named_python(python)
+  if (!is.null(named)) {
+    return(named)
   }
   active <- Sys.getenv(c("VIRTUAL_ENV", "CONDA_PREFIX"), names = FALSE)
   folder <- if (is_windows()) c("Scripts", ".") else "bin"

@@ -316,7 +316,7 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer <- response$answer
   check_echo(response, answer, call)
   if (response$status_code >= 400L) {
-    abort_http(response$status_code, answer, paste(method, response$url), call)
+    abort_http(response, method, call)
   }
   if (response$status_code != 204L && is.null(answer)) {
     abort_no_answer(response, call)

@@ -8,18 +8,24 @@
 #' it, to one on this machine, which is started at the first call and stops with
 #' the session.
 #'
+#' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start` when no server could be started.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' gym_client()
 gym_client <- function() {
+  session_client()
+}
+
+# `install` as start_server() takes it.
+session_client <- function(install = TRUE, call = rlang::caller_env()) {
   url <- Sys.getenv("GYM_SERVER_URL")
   if (nzchar(url)) {
-    return(named_client(url))
+    return(named_client(url, call))
   }
-  if (is.null(the_session$client) || !is_running(the_session$client)) {
-    the_session$client <- gym_server_start()
+  if (is.null(the_session$client) || !is_running(the_session$client$remote_base)) {
+    the_session$client <- start_server(install = install, call = call)
   }
   the_session$client
 }
@@ -35,15 +41,15 @@ named_client <- function(url, call = rlang::caller_env()) {
     )
   }
   if (!identical(the_session$named_url, url)) {
-    the_session$named_client <- create_GymClient(url)
+    the_session$named_client <- new_client(url)
     the_session$named_url <- url
   }
   the_session$named_client
 }
 
 # In a forked child the parent's server is as good as its own.
-is_running <- function(client) {
-  server <- the_session$servers[[client$remote_base]]
+is_running <- function(base) {
+  server <- the_session$servers[[base]]
   !is.null(server) && (Sys.getpid() != the_session$pid || server$process$is_alive())
 }
 
@@ -57,8 +63,14 @@ is_running <- function(client) {
 #' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); where
 #' [gym_server_install()] has put it; on the `PATH`.
 #' The first that can run the server is taken. Where `python` or `GYM_PYTHON`
-#' names one, no other is tried.
+#' names one, no other is tried. [gym_sitrep()] shows what comes of it.
 #'
+#' @section Where there is no Python:
+#' Without a Python that can run the server an interactive session offers once to
+#' install one, by [gym_server_install()], and goes on with what was asked for. A
+#' script stops and says so, or, with the environment variable `GYM_INSTALL=1`,
+#' installs it without asking. Where `python` or `GYM_PYTHON` names a Python nothing
+#' is installed.
 #' @param port The port to listen on, a whole number; `NULL`, the default, takes
 #'   a free one.
 #' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
@@ -81,29 +93,42 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
-  arguments <- c(
-    "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
-    server_options(list(...))
-  )
-  candidates <- python_candidates(python)
-  refusals <- character()
-  for (candidate in candidates) {
-    server <- launch_server(candidate, arguments, timeout)
-    if (is.list(server)) {
-      the_session$servers[[server$url]] <- server
-      return(create_GymClient(server$url))
-    }
-    refusals <- c(refusals, server)
-  }
-  abort_no_python(python, candidates, refusals)
+  start_server(port, python, list(...), timeout)
 }
 
-# As `-m gym_server`, but without the working directory among the places of modules,
-# where a file named random.py would take the place of Python's own.
-run_server <- paste0(
-  "import sys; sys.path[:] = [place for place in sys.path if place]; ",
-  "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
-)
+#' Start a server with the first Python that can run it
+#' @param install May a Python environment be installed, or offered, when no Python can?
+#' @return A client for the server.
+#' @noRd
+start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60,
+                         install = TRUE, call = rlang::caller_env()) {
+  arguments <- c(
+    "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
+    server_options(options, call)
+  )
+  refusals <- character()
+  for (candidate in python_candidates(python)) {
+    server <- launch_server(candidate, arguments, timeout, call)
+    if (is.list(server)) {
+      return(register_server(server))
+    }
+    refusals[[candidate]] <- server
+  }
+  installed <- if (install && is.null(named_python(python))) offered_python()
+  if (!is.null(installed)) {
+    server <- launch_server(installed, arguments, timeout, call)
+    if (is.list(server)) {
+      return(register_server(server))
+    }
+    refusals[[installed]] <- server
+  }
+  abort_no_python(python, refusals, call)
+}
+
+register_server <- function(server) {
+  the_session$servers[[server$url]] <- server
+  new_client(server$url)
+}
 
 # Extra options as the command line takes them: log_level = "info" becomes
 # --log-level info, TRUE a flag, a vector one option for each element.
@@ -120,116 +145,6 @@ server_options <- function(options, call = rlang::caller_env()) {
     },
     flags, options
   ), use.names = FALSE)
-}
-
-# Start the server with one Python. Returns what is known of the running server,
-# or a string that says why this Python cannot run it.
-launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
-  log <- tempfile("gym-server-", fileext = ".log")
-  use_python(python)
-  # processx draws a name from R's generator.
-  process <- keep_random_state(tryCatch(
-    processx::process$new(
-      python, arguments,
-      stdin = "|", stdout = "|", stderr = log,
-      env = server_environment(),
-      # The closing of its standard input ends the server, which also lets it
-      # close its environments and cannot be done by a forked child.
-      cleanup = FALSE, windows_hide_window = TRUE
-    ),
-    error = function(cnd) conditionMessage(cnd)
-  ))
-  if (is.character(process)) {
-    return("it cannot be run")
-  }
-  url <- await_start(process, log, timeout, call)
-  if (!is.null(url)) {
-    return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
-  }
-  words <- log_tail(log)
-  own <- grep(server_words, words, value = TRUE)
-  if (length(own)) {
-    abort_server_start("The server ended before it took connections.", own, call)
-  }
-  if (length(words)) utils::tail(words, 1L) else "it ended without a word"
-}
-
-# How the server itself begins when it cannot start as it was asked to; whatever else
-# is said comes from a Python that cannot run it, or from what only looks like one.
-server_words <- "^(gym_server:|gym-http-server: error)"
-
-server_environment <- function() {
-  search_path <- c(system.file("server", package = "gym"), Sys.getenv("PYTHONPATH"))
-  c(
-    "current",
-    PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
-    PYTHONUNBUFFERED = "1",
-    # R's library may be another user's; nothing is written there.
-    PYTHONDONTWRITEBYTECODE = "1",
-    own_library_path()
-  )
-}
-
-# What LD_LIBRARY_PATH was before R's start put its own folders in front, where Python
-# would find the libraries of another Python.
-own_library_path <- function() {
-  path <- Sys.getenv("LD_LIBRARY_PATH")
-  script <- file.path(R.home("etc"), "ldpaths")
-  if (!nzchar(path) || !file.exists(script)) {
-    return(NULL)
-  }
-  added <- processx::run(
-    "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
-    env = c("current", LD_LIBRARY_PATH = ""), error_on_status = FALSE
-  )$stdout
-  # More than once where R has started R.
-  while (nzchar(added) && startsWith(path, added)) {
-    path <- sub("^:", "", substring(path, nchar(added) + 1L))
-  }
-  c(LD_LIBRARY_PATH = path)
-}
-
-# Wait for the line by which the server says that it takes connections. Returns
-# its address, NULL when the process ended first.
-await_start <- function(process, log, timeout, call) {
-  deadline <- Sys.time() + timeout
-  repeat {
-    left <- as.numeric(deadline - Sys.time(), units = "secs")
-    if (left <= 0) {
-      process$kill()
-      abort_server_start(
-        paste0("The server did not start within ", timeout, " seconds."), log_tail(log), call
-      )
-    }
-    process$poll_io(as.integer(ceiling(left * 1000)))
-    lines <- process$read_output_lines()
-    address <- grep("^Server starting at: ", lines, value = TRUE)
-    if (length(address)) {
-      # A server that listens on all addresses is reached by this machine's own.
-      address <- sub("//0.0.0.0:", "//127.0.0.1:", address[1L], fixed = TRUE)
-      return(sub("^Server starting at: ", "", address))
-    }
-    if (!process$is_incomplete_output()) {
-      process$wait(5000)
-      return(NULL)
-    }
-  }
-}
-
-log_tail <- function(log, n = 20L) {
-  if (!file.exists(log)) {
-    return(character())
-  }
-  utils::tail(readLines(log, warn = FALSE), n)
-}
-
-abort_server_start <- function(message, log_lines, call) {
-  gym_abort(
-    c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n")),
-    class = "gym_error_server_start",
-    log = log_lines,
-    call = call
-  )
 }
 
 #' Stop a server that this session started
@@ -287,23 +202,6 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-stop_server <- function(server, patience = 15) {
-  process <- server$process
-  if (!process$is_alive()) {
-    return(invisible())
-  }
-  close(process$get_input_connection())
-  process$wait(1000)
-  if (process$is_alive() && !is_windows()) {
-    # A forked child that still lives holds the server's standard input open, too.
-    process$signal(tools::SIGTERM)
-  }
-  process$wait(patience * 1000)
-  if (process$is_alive()) {
-    process$kill()
-  }
-}
-
 # At the end of the session; a forked child's end is not the session's.
 stop_session_servers <- function(session) {
   if (Sys.getpid() != session$pid) {
@@ -314,10 +212,10 @@ stop_session_servers <- function(session) {
   }
 }
 
-# For the examples: whether the session has a server or can have one.
+# For the examples: whether the session has a server or can have one, as things are.
 can_start_server <- function() {
   tryCatch(
-    inherits(gym_client(), "GymClient"),
+    inherits(session_client(install = FALSE), "GymClient"),
     gym_error_server_start = function(cnd) FALSE
   )
 }

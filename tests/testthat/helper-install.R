@@ -72,19 +72,6 @@ local_failing_uv <- function(words, frame = parent.frame()) {
   uv
 }
 
-# testthat's own are not in its older versions.
-local_binding <- function(name, value, frame = parent.frame()) {
-  space <- asNamespace("gym")
-  before <- get(name, space)
-  set <- function(value) {
-    unlockBinding(name, space)
-    assign(name, value, space)
-    lockBinding(name, space)
-  }
-  set(value)
-  withr::defer(set(before), envir = frame)
-}
-
 wait_until <- function(condition) {
   for (i in 1:200) {
     if (condition()) {

@@ -11,6 +11,13 @@ skip_if_no_server <- function() {
   )
 }
 
+# A Python that can run the server.
+working_python <- function() {
+  # First, as it may start the server.
+  client <- test_client()
+  the_session$servers[[client$remote_base]]$python
+}
+
 # A server of its own for a test that stops it or needs other options.
 local_server <- function(..., frame = parent.frame()) {
   skip_if_no_server()
@@ -65,4 +72,13 @@ free_port <- function() {
       return(port)
     }
   }
+}
+
+pid_runs <- function(pid) {
+  # Signal 0 only asks; a zombie waits for its parent, not for us.
+  tools::pskill(pid, 0) &&
+    !any(grepl("^State:\\s+Z", tryCatch(
+      readLines(file.path("/proc", pid, "status")),
+      error = function(cnd) "", warning = function(cnd) ""
+    )))
 }

@@ -256,7 +256,7 @@ test_that("what is no answer of a Gym server is an error with a class", {
 })
 
 test_that("another kind of server is told from a Gym server", {
-  python <- the_session$servers[[test_client()$remote_base]]$python
+  python <- working_python()
   folder <- withr::local_tempdir()
   dir.create(file.path(folder, "v1", "envs"), recursive = TRUE)
   writeLines("<html>", file.path(folder, "v1", "envs", "index.html"))

@@ -62,7 +62,7 @@ test_that("who says no gets nothing, and who says yes is asked once", {
   local_cache()
   local_failing_uv("error: Failed to fetch")
   asked <- character()
-  local_binding("ask_yes_no", function(question) {
+  local_binding("ask_yes_no", function(question, ...) {
     asked <<- c(asked, question)
     length(asked) > 1L
   })

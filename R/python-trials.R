@@ -1,0 +1,60 @@
+# Whether Pythons can run the server, found out without starting it.
+
+#' Try Pythons, all at once
+#'
+#' Each imports all of the server and says its version.
+#' @param pythons Paths of Pythons, a character vector.
+#' @param timeout How long all of them may take together, in seconds.
+#' @return A data frame with one row for each: `python`, `version` (a string or `NA`), `runs`
+#'   (logical, `NA` when it did not answer in time) and `reason` (why it cannot run the
+#'   server, a string or `NA`).
+#' @noRd
+try_pythons <- function(pythons, timeout = 6) {
+  trials <- lapply(pythons, begin_trial)
+  deadline <- Sys.time() + timeout
+  outcomes <- Map(end_trial, pythons, trials, list(deadline))
+  data.frame(
+    python = pythons,
+    version = vapply(outcomes, function(outcome) outcome$version, "", USE.NAMES = FALSE),
+    runs = vapply(outcomes, function(outcome) outcome$runs, NA, USE.NAMES = FALSE),
+    reason = vapply(outcomes, function(outcome) outcome$reason, "", USE.NAMES = FALSE)
+  )
+}
+
+say_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); "
+
+# Returns the running process and its files, NULL for what cannot be run.
+begin_trial <- function(python) {
+  output <- tempfile("gym-python-", fileext = c(".out", ".err"))
+  process <- keep_random_state(tryCatch(
+    processx::process$new(
+      python, c("-c", paste0(say_version, run_server), "--version"),
+      stdout = output[[1L]], stderr = output[[2L]], env = server_environment(),
+      cleanup_tree = TRUE, windows_hide_window = TRUE
+    ),
+    error = function(cnd) NULL
+  ))
+  if (!is.null(process)) list(process = process, output = output)
+}
+
+end_trial <- function(python, trial, deadline) {
+  outcome <- function(version = NA_character_, runs = FALSE, reason = NA_character_) {
+    list(version = version, runs = runs, reason = reason)
+  }
+  if (is.null(trial)) {
+    return(outcome(reason = not_run_words(python)))
+  }
+  on.exit(unlink(trial$output))
+  left <- as.numeric(deadline - Sys.time(), units = "secs")
+  trial$process$wait(max(0, left) * 1000)
+  said <- lapply(trial$output, log_tail)
+  version <- grep("^[0-9.]+$", said[[1L]], value = TRUE)[1L]
+  if (trial$process$is_alive()) {
+    trial$process$kill_tree()
+    outcome(version, NA, "it did not answer in time")
+  } else if (identical(trial$process$get_exit_status(), 0L)) {
+    outcome(version, TRUE)
+  } else {
+    outcome(version, FALSE, refusal_words(said[[2L]]))
+  }
+}

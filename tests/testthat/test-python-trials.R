@@ -1,0 +1,38 @@
+fake_python <- function(folder, ..., name = "python3") {
+  path <- file.path(folder, name)
+  writeLines(c("#!/bin/sh", ...), path)
+  Sys.chmod(path, "755")
+  path
+}
+
+test_that("each Python is tried, and what it lacks is told", {
+  skip_on_os("windows")
+  working <- working_python()
+  folder <- withr::local_tempdir()
+  bare <- fake_python(
+    folder, "echo 3.12.1",
+    "echo \"gym_server cannot run on this Python (3.12.1, /x (y)): No module named 'flask'\" >&2",
+    "exit 78"
+  )
+  hanging <- fake_python(folder, "echo 3.11.0; exec sleep 60", name = "hanging")
+  silent <- fake_python(folder, "exit 1", name = "silent")
+  set.seed(1)
+  before <- .Random.seed
+  trials <- try_pythons(c(bare, working, silent, "/no/such/python"), timeout = 60)
+  expect_identical(.Random.seed, before)
+  expect_identical(trials$runs, c(FALSE, TRUE, FALSE, FALSE))
+  expect_identical(trials$reason, c(
+    "No module named 'flask'", NA, "it ended without a word", "there is no such file"
+  ))
+  expect_identical(trials$version[[1]], "3.12.1")
+  expect_match(trials$version[[2]], "^3[.][0-9]+[.][0-9]+$")
+  expect_identical(trials$version[3:4], c(NA_character_, NA))
+
+  trial <- try_pythons(hanging, timeout = 0.5)
+  expect_identical(trial$runs, NA)
+  expect_identical(trial$version, "3.11.0")
+})
+
+test_that("no Python is no trial", {
+  expect_identical(nrow(try_pythons(character())), 0L)
+})

@@ -1,0 +1,161 @@
+# A report of a session of which all that takes time is known.
+report <- function(runs = TRUE, reason = NA_character_, frame = parent.frame()) {
+  local_functions(
+    python_candidates = function(python = NULL) python %||% "/some/python3",
+    try_pythons = function(...) {
+      data.frame(python = "/some/python3", version = "3.12.1", runs = runs, reason = reason)
+    },
+    installed_server = function() NULL,
+    install_folders = function() character(),
+    find_uv = function(...) NULL,
+    frame = frame
+  )
+  withr::local_envvar(GYM_PYTHON = NA, GYM_SERVER_URL = NA, .local_envir = frame)
+  local_session(servers = list(), client = NULL, frame = frame)
+}
+
+sitrep <- function() {
+  found <- NULL
+  lines <- capture.output(found <- gym_sitrep())
+  list(found = found, lines = lines, text = paste(lines, collapse = "\n"))
+}
+
+test_that("where all is well the report says so on one screen", {
+  report()
+  seen <- sitrep()
+  expect_s3_class(seen$found, "gym_sitrep")
+  expect_named(seen$found, c("topic", "what", "finding", "state", "mend"))
+  expect_false(any(seen$found$state == "wrong"))
+  expect_lte(length(seen$lines), 25)
+  expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
+  expect_match(seen$text, "/some/python3 (3.12.1): runs the server", fixed = TRUE)
+  expect_match(seen$text, paste0("gym: ", packageVersion("gym")), fixed = TRUE)
+  expect_identical(capture.output(print(seen$found)), seen$lines)
+})
+
+test_that("without a Python the report names the call that mends it", {
+  report(runs = FALSE, reason = "No module named 'flask'")
+  seen <- sitrep()
+  wrong <- seen$found[seen$found$state == "wrong", ]
+  expect_identical(wrong$what, "environment")
+  expect_identical(wrong$mend, "gym_server_install()")
+  expect_match(seen$text, "No module named 'flask'", fixed = TRUE)
+  expect_match(seen$text, "1 thing is wrong", fixed = TRUE)
+})
+
+test_that("a Python that GYM_PYTHON names and that cannot run the server is wrong", {
+  report(runs = FALSE, reason = "Python 3.10 or newer is needed")
+  withr::local_envvar(GYM_PYTHON = "/some/python3")
+  found <- sitrep()$found
+  row <- found[startsWith(found$what, "/some/python3"), ]
+  expect_identical(row$state, "wrong")
+  expect_identical(row$mend, "Sys.unsetenv(\"GYM_PYTHON\")")
+})
+
+test_that("the installed environment is told: whole, damaged, or of another version", {
+  report()
+  folder <- withr::local_tempdir()
+  writeBin(raw(3e6), file.path(folder, "x"))
+  local_functions(
+    installed_server = function() list(python = "p", folder = folder, extras = "box2d"),
+    lock_hash = function() "abc"
+  )
+  environment_row <- function() {
+    found <- sitrep()$found
+    found[found$what == "environment", ]
+  }
+  expect_match(environment_row()$finding, "extras: box2d; 3 MB", fixed = TRUE)
+  expect_identical(environment_row()$state, "ok")
+  local_functions(installed_server = function() NULL, install_folders = function() "/c/abc-2")
+  expect_match(environment_row()$finding, "damaged")
+  expect_identical(environment_row()$state, "wrong")
+  local_functions(install_folders = function() "/c/0ff-1")
+  expect_match(environment_row()$finding, "another version")
+})
+
+test_that("an installed Python that cannot run the server is wrong", {
+  report(runs = FALSE, reason = "RuntimeError: damaged by hand")
+  local_functions(
+    installed_server = function() list(python = "/some/python3", folder = "/some", extras = NULL)
+  )
+  found <- sitrep()$found
+  row <- found[startsWith(found$what, "/some/python3"), ]
+  expect_identical(row$state, "wrong")
+  expect_identical(row$mend, "gym_server_install()")
+})
+
+test_that("the session's server is told with its environments, also when it died", {
+  server <- test_client()
+  known <- the_session$servers
+  python <- known[[server$remote_base]]$python
+  report()
+  local_session(servers = known[server$remote_base], client = server)
+  id <- env_create(server, "CartPole-v1")
+  withr::defer(env_close(server, id))
+  server_row <- function() {
+    found <- sitrep()$found
+    found[found$topic == "servers", ]
+  }
+  row <- server_row()
+  expect_match(row$what, server$remote_base, fixed = TRUE)
+  expect_match(row$finding, "1 environment, pid [0-9]+, server .*, Gymnasium .*, Python 3")
+  expect_identical(row$state, "ok")
+
+  other <- gym_server_start(python = python)
+  the_session$servers[[other$remote_base]]$process$kill()
+  local_session(servers = the_session$servers[other$remote_base], client = other)
+  row <- server_row()
+  expect_match(row$finding, "ended with status")
+  expect_identical(row$state, "wrong")
+  expect_identical(row$mend, "gym_server_log()")
+})
+
+test_that("the server that GYM_SERVER_URL names is looked at, its password kept", {
+  report()
+  port <- free_port()
+  withr::local_envvar(GYM_SERVER_URL = paste0("http://127.0.0.1:", port))
+  found <- sitrep()$found
+  row <- found[grepl("(GYM_SERVER_URL)", found$what, fixed = TRUE), ]
+  expect_identical(row$state, "wrong")
+  expect_identical(row$mend, paste0("gym_server_start(port = ", port, ")"))
+  withr::local_envvar(GYM_SERVER_URL = paste0("http://ann:secret@127.0.0.1:", port))
+  seen <- sitrep()
+  expect_no_match(seen$text, "secret")
+  withr::local_envvar(GYM_SERVER_URL = "127.0.0.1:5000")
+  expect_match(sitrep()$text, "is not the address of a server", fixed = TRUE)
+})
+
+test_that("what goes wrong in finding out is a finding", {
+  report()
+  local_functions(
+    find_uv = function(...) gym_abort("GYM_UV names no uv.", class = "gym_error_install"),
+    install_folders = function() stop("the disk is gone")
+  )
+  seen <- sitrep()
+  expect_match(seen$text, "the disk is gone", fixed = TRUE)
+  local_functions(
+    install_folders = function() character(),
+    try_pythons = function(...) stop("no processes")
+  )
+  seen <- sitrep()
+  expect_match(seen$text, "no processes", fixed = TRUE)
+  expect_match(seen$text, "GYM_UV names no uv", fixed = TRUE)
+})
+
+test_that("the real report asks nothing, changes nothing and takes no server", {
+  withr::local_options(rlang_interactive = TRUE)
+  local_functions(
+    read_answer_line = function(prompt) stop("asked: ", prompt),
+    gym_server_install = function(...) stop("installed")
+  )
+  cache <- withr::local_tempdir()
+  withr::local_envvar(R_USER_CACHE_DIR = cache, GYM_PYTHON = NA)
+  servers <- the_session$servers
+  set.seed(1)
+  before <- .Random.seed
+  seen <- sitrep()
+  expect_identical(.Random.seed, before)
+  expect_lte(length(seen$lines), 25)
+  expect_identical(the_session$servers, servers)
+  expect_identical(list.files(cache, recursive = TRUE, include.dirs = TRUE), character())
+})
