@@ -51,6 +51,11 @@ as.raster.gym_frame <- function(x, ...) {
 #' @param ... Unused.
 #' @return The frame, invisibly.
 #' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", seed = 1)
+#' env$reset()
+#' plot(env$render())
+#' env$close()
 plot.gym_frame <- function(x, ...) {
   old <- graphics::par(mar = c(0, 0, 0, 0))
   on.exit(graphics::par(old))

@@ -18,9 +18,7 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
   if (how != "python" && !has_managed_python()) {
     megabytes <- megabytes + managed_python_megabytes
   }
-  if (how == "download") {
-    megabytes <- megabytes + uv_megabytes
-  }
+  megabytes <- megabytes + switch(how, download = uv_megabytes, python = pip_megabytes, 0)
   list(
     how = how, tool = if (is.null(uv)) python else uv, folder = next_folder(),
     megabytes = megabytes, extras = extras
@@ -30,6 +28,9 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
 # About, for Linux with an Intel processor, of the releases named in R/install-uv.R.
 managed_python_megabytes <- c(download = 35, disk = 110)
 uv_megabytes <- c(download = 20, disk = 40)
+
+# pip itself, and the modules that it compiles.
+pip_megabytes <- c(download = 0, disk = 30)
 
 managed_python_version <- "3.12"
 

@@ -68,6 +68,9 @@ python_candidates <- function(python = NULL) {
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
   # Windows' WindowsApps holds a stand-in that opens the Store.
   path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
+  if (lacks_developer_tools()) {
+    path <- setdiff(path, "/usr/bin")
+  }
   found <- c(pythons_in(places), installed_server()$python, pythons_in(path))
   # An environment's Python may be a link to one that lies elsewhere and lacks its packages.
   found[!duplicated(paste(normalizePath(dirname(found)), normalizePath(found)))]
@@ -77,6 +80,12 @@ pythons_in <- function(places) {
   commands <- paste0(c("python3", "python"), if (is_windows()) ".exe")
   found <- file.path(rep(places, each = length(commands)), rep(commands, length(places)))
   found[file.access(found, 1L) == 0L]
+}
+
+# On macOS /usr/bin/python3 is then a stand-in that opens a dialog.
+lacks_developer_tools <- function() {
+  Sys.info()[["sysname"]] == "Darwin" &&
+    processx::run("/usr/bin/xcode-select", "-p", error_on_status = FALSE)$status != 0L
 }
 
 is_windows <- function() .Platform$OS.type == "windows"

@@ -40,7 +40,7 @@ test_that("without uv a Python that fits does it, and without both uv is downloa
   )
   plan <- install_plan()
   expect_identical(plan[c("how", "tool")], list(how = "python", tool = pythons[[5]]))
-  expect_identical(plan$megabytes, lock_megabytes(character()))
+  expect_identical(plan$megabytes, lock_megabytes(character()) + pip_megabytes)
   # With uv it need not have venv.
   expect_identical(find_base_python(with_venv = FALSE), pythons[[4]])
   unlink(pythons[[5]])

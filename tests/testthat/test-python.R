@@ -17,3 +17,12 @@ test_that("Python is looked for in the order that the help page tells", {
   expect_identical(python_candidates(), "/its/python")
   expect_identical(python_candidates("/my/python"), "/my/python")
 })
+
+test_that("the stand-in for Python of macOS without developer tools is left alone", {
+  skip_on_os("windows")
+  skip_if_not(any(file.exists(c("/usr/bin/python3", "/usr/bin/python"))), "no Python in /usr/bin")
+  withr::local_envvar(GYM_PYTHON = NA, VIRTUAL_ENV = NA, CONDA_PREFIX = NA, PATH = "/usr/bin")
+  expect_true(any(startsWith(python_candidates(), "/usr/bin/")))
+  local_binding("lacks_developer_tools", function() TRUE)
+  expect_false(any(startsWith(python_candidates(), "/usr/bin/")))
+})
