@@ -4,24 +4,12 @@ library(gym)
 folder <- "pictures"
 dir.create(folder, showWarnings = FALSE)
 
-draw <- function(name, object, width = 900, height = 600) {
+draw <- function(name, object, ...) {
   file <- file.path(folder, name)
-  png(file, width = width, height = height, res = 110)
-  plot(object)
+  png(file, width = 900, height = 600, res = 110)
+  plot(object, ...)
   dev.off()
   normalizePath(file)
-}
-
-last_frame <- function(policy, seed) {
-  env <- gym_make("CartPole-v0", seed = seed)
-  on.exit(env$close())
-  observation <- env$reset()
-  repeat {
-    step <- env$step(act(policy, observation))
-    if (step$terminated || step$truncated) break
-    observation <- step$observation
-  }
-  env$render()
 }
 
 # Fifty random networks may hold none that balances the pole: then another seed.
@@ -38,9 +26,16 @@ cat("100 fresh episodes with the network found:\n\n")
 print(summary(result))
 cat("\n")
 
+moves <- requireNamespace("magick", quietly = TRUE)
+episode <- rollout("CartPole-v0", result$policy, seed = seed, steps = TRUE, frames = moves)
 pictures <- c(
-  "the search" = draw("demo-search.png", result),
-  "the last step of an episode" = draw("demo-frame.png", last_frame(result$policy, seed), 600, 400)
+  "Every episode of the search" = draw("demo-search.png", result),
+  "The network" = draw("demo-network.png", result$policy),
+  "What it does in an episode" = draw("demo-episode.png", episode, type = "trajectory")
 )
-cat(sprintf("A picture of %s: %s\n", names(pictures), pictures), sep = "")
+if (moves) {
+  film <- animate(episode, file.path(folder, "demo.gif"), width = 300, every = 2)
+  pictures <- c(pictures, "The pole, moving" = normalizePath(film$file))
+}
+cat(sprintf("%s: %s\n", names(pictures), pictures), sep = "")
 cat("\nThe same again, in R:  search_random(seed = ", seed, ")\n", sep = "")

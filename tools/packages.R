@@ -24,7 +24,7 @@ goal_packages <- function(goal) {
   benchmarks <- "reticulate"
   optional <- setdiff(names(declared("Suggests")), c("testthat", vignettes, benchmarks))
   switch(goal,
-    demo = list(need = imports),
+    demo = list(need = imports, want = "magick"),
     bench = list(need = c(imports, benchmarks)),
     test = list(need = c(imports, "testthat"), want = optional),
     check = list(need = c(imports, "testthat", vignettes, "codetools"), want = optional),
