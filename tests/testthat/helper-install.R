@@ -44,7 +44,9 @@ skip_if_no_uv <- function() {
 }
 
 # An environment as an installation leaves it, but for what is in it.
-fake_environment <- function(number = 1L, extras = character(), hash = lock_hash()) {
+fake_installation <- function(number = 1L, extras = character(), hash = lock_hash()) {
+  # Never into the user's own cache.
+  stopifnot(startsWith(install_root(), dirname(tempdir())), nzchar(Sys.getenv("R_USER_CACHE_DIR")))
   folder <- file.path(install_root(), paste0(hash, "-", number))
   site <- if (is_windows()) "venv/Lib/site-packages" else "venv/lib/python3.12/site-packages"
   for (package in c("flask", "numpy")) {

@@ -53,7 +53,7 @@ test_that("without uv a Python that fits does it, and without both uv is downloa
 test_that("what was installed is not what the next is made from", {
   local_cache()
   other <- local_pythons(list("3.13"))
-  python <- environment_python(fake_environment())
+  python <- environment_python(fake_installation())
   file.copy(other, python, overwrite = TRUE)
   expect_identical(python_candidates(), c(python, other))
   expect_identical(find_base_python(with_venv = FALSE), other)

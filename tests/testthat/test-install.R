@@ -77,7 +77,7 @@ test_that("who says no gets nothing, and who says yes is asked once", {
 
 test_that("an installation that fails leaves what was there before", {
   local_cache()
-  folder <- fake_environment()
+  folder <- fake_installation()
   local_failing_uv("error: failed to copy: No space left on device (os error 28)")
   error <- expect_error(
     suppressMessages(gym_server_install("box2d")), class = "gym_error_install"
