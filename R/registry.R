@@ -1,4 +1,7 @@
-#' List the environments that a server can make
+#' List the environments of Gymnasium
+#'
+#' Those that the server can make, and those that it could with an extra, see
+#' [gym_server_install()].
 #'
 #' @inheritParams env_create
 #' @param search A text to look for in the ids, whatever its case; where none has

@@ -140,11 +140,19 @@ server_options <- function(options, call = rlang::caller_env()) {
       if (isTRUE(values)) {
         flag
       } else if (length(values) && !isFALSE(values)) {
-        as.vector(rbind(flag, as.character(values)))
+        as.vector(rbind(flag, option_text(values)))
       }
     },
     flags, options
   ), use.names = FALSE)
+}
+
+# 1e5 is 100000 on a command line.
+option_text <- function(values) {
+  if (is.numeric(values)) {
+    values <- vapply(values, format, "", scientific = FALSE, digits = 15L, trim = TRUE)
+  }
+  as.character(values)
 }
 
 #' Stop a server that this session started

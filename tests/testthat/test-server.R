@@ -15,6 +15,16 @@ test_that("a server starts on a free port, tells its log and stops", {
   expect_error(env_list_all(server), class = "gym_error_connection")
 })
 
+test_that("options of the server are written as the command line reads them", {
+  expect_identical(
+    server_options(list(max_num_envs = 1e5, log_level = "info", no_auth = TRUE, off = FALSE)),
+    c("--max-num-envs", "100000", "--log-level", "info", "--no-auth")
+  )
+  expect_identical(
+    server_options(list(allow_module = c("a", "b"))), c("--allow-module", "a", "--allow-module", "b")
+  )
+})
+
 test_that("starting a server leaves R's generator alone", {
   skip_if_no_server()
   set.seed(1)

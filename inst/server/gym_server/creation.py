@@ -12,7 +12,7 @@ from gymnasium.envs import registration
 
 from gym_server import mujoco_setup
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
-from gym_server.extras import extra_of, is_available, missing_extra
+from gym_server.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.plain import brief, from_words
 from gym_server.registry import importing, look_up, near
 
@@ -60,6 +60,13 @@ def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
         extra = extra_of(spec)
         if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):
             raise missing_extra(spec.id, extra) from refusal
+        module = unmet_module(spec)
+        if refusal.code == "missing_dependency" and module:
+            raise GymServerError(
+                "missing_dependency",
+                f"{spec.id} needs the Python package '{module}', which no extra brings",
+                "install it into the server's Python",
+            ) from refusal
         raise
 
 

@@ -62,6 +62,12 @@ def missing_extra(what: str, extra: str) -> GymServerError:
     )
 
 
+def unmet_module(spec: EnvSpec) -> str | None:
+    """Return the module that an environment needs, is not installed, and comes with no extra."""
+    extra, module = _needs(spec)
+    return module if extra is None and module and not _is_installed(module) else None
+
+
 def _needs(spec: EnvSpec) -> tuple[str | None, str | None]:
     if isinstance(spec.entry_point, str):
         for package, needs in _PACKAGES.items():

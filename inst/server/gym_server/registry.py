@@ -75,8 +75,11 @@ def _with_version(name: str) -> str:
 
 
 def near(name: str, limit: int = 3) -> list[str]:
-    """Return the ids that are most like a name, the nearest first."""
-    ids = list(gymnasium.registry)
+    """Return the ids that are most like a name, the nearest first.
+
+    Those that no extra of the server could make are left out.
+    """
+    ids = [i for i, spec in gymnasium.registry.items() if extra_of(spec) or is_available(spec)]
     found = difflib.get_close_matches(name, ids, n=limit, cutoff=0.6)
     if not found:
         by_lower_case = {env_id.lower(): env_id for env_id in ids}

@@ -45,6 +45,14 @@ def test_an_unknown_id_names_the_nearest():
     assert "CartPole-v1" in refusal("cartpole-v1").hint
 
 
+def test_what_cannot_be_made_in_any_way_is_not_offered():
+    # phys2d/CartPole-v1 needs jax, which is in no extra.
+    assert "phys2d" not in refusal("CartPol-v1").hint
+    refused = refusal("phys2d/CartPole-v1")
+    assert refused.code == "missing_dependency"
+    assert "'jax', which no extra" in refused.message
+
+
 def test_an_id_that_is_like_nothing_gets_no_hint():
     assert refusal("Zzzzzzzz-v0").hint is None
 
