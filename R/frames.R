@@ -48,8 +48,11 @@ check_draws <- function(env, call) {
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
-  draws <- inherits(env, "gym_env") &&
-    known_instance(env$client, env$instance_id, call = call)$draws
+  draws <- FALSE
+  if (inherits(env, "gym_env")) {
+    check_open(env, call)
+    draws <- known_instance(env$client, env$instance_id, call = call)$draws
+  }
   if (!draws) {
     gym_abort(
       c(paste0("There are no frames to keep: ", label, " cannot be drawn."),

@@ -114,6 +114,19 @@ test_that("what cannot be animated says why, before anything is played", {
   bad(wdith = 3, message = "`wdith`")
 })
 
+test_that("an environment that was closed is said to be", {
+  skip_if_not_installed("magick")
+  env <- local_env("CartPole-v1")
+  search <- search_random(env, rounds = 1, episodes = 1, max_steps = 5, seed = 1)
+  env$close()
+  closed <- function(code) {
+    expect_error(code, "This environment was closed.*gym_make\\(\"CartPole-v1\"\\)",
+                 class = "gym_error_argument")
+  }
+  closed(animate(search))
+  closed(rollout(env, search$policy, frames = TRUE))
+})
+
 test_that("it prints where it is, and opens where somebody looks", {
   skip_if_not_installed("magick")
   animation <- animate(short_rollout(max_steps = 3), width = 60)
