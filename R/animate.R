@@ -39,11 +39,9 @@
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, frames = TRUE)
 #' animate(played, width = 300)
 #'
-#' \donttest{
 #' # The policy that a search has found, in a fresh episode.
-#' file <- tempfile(fileext = ".gif")
-#' animate(search_random("CartPole-v0", seed = 1), file, seed = 1, every = 2)
-#' }
+#' search <- search_random("CartPole-v0", seed = 1)
+#' animate(search, seed = 1, width = 300, every = 4)
 animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 
 #' @export
