@@ -64,8 +64,8 @@
 #'   actions, observations that are not at least two numbers, actions that are neither
 #'   discrete nor a Box), a name is none of the observation's, or a range is neither known
 #'   nor given.
-#' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees (0.2095)
-#'   in angle, see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
+#' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees in angle,
+#'   see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
 #' @export
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
