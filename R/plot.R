@@ -8,6 +8,19 @@ open_plot <- function(frame, chosen) {
   do.call(graphics::plot, c(chosen, frame[setdiff(names(frame), names(chosen))]))
 }
 
+# A title that tells environment and policy, the latter up to the first detail: "random" or
+# "network 4-2-1".
+played_title <- function(x) {
+  policy <- sub("(,| over).*", "", policy_text(x$policy))
+  paste(c(x$env_id, paste("policy:", policy)), collapse = ", ")
+}
+
+# Rounds are whole numbers from 1, and so are the marks on their axis.
+round_ticks <- function(last) {
+  at <- unique(round(pretty(c(1, last))))
+  at[at >= 1 & at <= last]
+}
+
 # Colours that remain apart for the colour-blind (Okabe and Ito, 2008).
 okabe_ito <- list(
   orange = "#E69F00", sky_blue = "#56B4E9", green = "#009E73", yellow = "#F0E442",
