@@ -81,15 +81,3 @@ frame_from_png <- function(file) {
 
 # Width and height stand in the header of the file.
 png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")
-
-#' Make sure that a package is there which not everybody needs
-#' @noRd
-check_suggested <- function(package, purpose, call = rlang::caller_env()) {
-  if (!requireNamespace(package, quietly = TRUE)) {
-    gym_abort(
-      c(paste0("To ", purpose, " takes the package ", package, "."),
-        i = paste0("`install.packages(\"", package, "\")` installs it.")),
-      class = "gym_error_argument", call = call
-    )
-  }
-}

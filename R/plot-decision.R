@@ -175,18 +175,6 @@ region_middle <- function(inside) {
 
 # Drawing -------------------------------------------------------------------------
 
-# A field of colours over the plot, with the lines of levels where there are any.
-draw_field <- function(data) {
-  graphics::image(data$x, data$y, data$z, zlim = data$zlim, col = data$palette, add = TRUE,
-                  useRaster = TRUE)
-  within <- range(data$z, na.rm = TRUE)
-  border <- data$border[data$border > within[[1L]] & data$border < within[[2L]]]
-  if (length(border)) {
-    graphics::contour(data$x, data$y, data$z, levels = border, add = TRUE, lwd = 2,
-                      drawlabels = FALSE)
-  }
-}
-
 draw_regions <- function(regions) {
   if (NROW(regions)) {
     graphics::text(regions$x, regions$y, regions$label, font = 2L)

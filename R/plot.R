@@ -33,6 +33,18 @@ ending_colours <- c(terminated = okabe_ito$vermillion, truncated = "grey50")
 line_colours <- unlist(okabe_ito[c("blue", "orange", "green", "purple", "sky_blue", "vermillion")],
                        use.names = FALSE)
 
+# A field of colours over the plot, with the lines of levels where there are any.
+draw_field <- function(data) {
+  graphics::image(data$x, data$y, data$z, zlim = data$zlim, col = data$palette, add = TRUE,
+                  useRaster = TRUE)
+  within <- range(data$z, na.rm = TRUE)
+  border <- data$border[data$border > within[[1L]] & data$border < within[[2L]]]
+  if (length(border)) {
+    graphics::contour(data$x, data$y, data$z, levels = border, add = TRUE, lwd = 2,
+                      drawlabels = FALSE)
+  }
+}
+
 # A legend in one line above the plot, where no data are; smaller where the plot is
 # narrow. graphics::legend() gives each entry the width of the longest. Laid out in
 # inches, so that logarithmic axes do not matter.

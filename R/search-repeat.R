@@ -264,8 +264,6 @@ searches_effort_line <- function(x) {
   )
 }
 
-percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
-
 #' @export
 summary.gym_searches <- function(object, ...) {
   solved <- object$searches$solved
