@@ -17,10 +17,14 @@ action_meanings <- list(
   Taxi = c("south", "north", "east", "west", "pick up", "drop off")
 )
 
-# NULL where the environment is unknown or a wrapper has changed what there is to do.
-action_meaning <- function(env_id, n) {
+#' Find out what the actions of an environment mean
+#' @param n How many actions there are, or numbers of an action; `NULL` where that is unknown.
+#' @return Strings, `NULL` where the environment is unknown or a wrapper has changed what there is
+#'   to do.
+#' @noRd
+action_meaning <- function(env_id, n = NULL) {
   meaning <- action_meanings[[environment_family(env_id), exact = TRUE]]
-  if (length(meaning) == n) meaning
+  if (is.null(n) || length(meaning) == n) meaning
 }
 
 # CartPole of CartPole-v1.

@@ -20,7 +20,8 @@
 #' @param width The picture's width in pixels, a whole number; `NULL`, the default, is that of
 #'   the environment's frames (600 in CartPole).
 #' @param every Show every frame, 1, every second one, 2, and so on, at the same pace; the last one
-#'   is always shown. `NULL`, the default, shows as many as the format can at that pace.
+#'   is always shown. `NULL`, the default, shows as many as the format can at that pace; a number
+#'   too small for it is raised to that, with a message.
 #' @param seed A whole number that fixes the episode played, as in [rollout()].
 #' @param env,max_steps,client What to play in, as in [rollout()].
 #' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (after
@@ -38,11 +39,9 @@
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, frames = TRUE)
 #' animate(played, width = 300)
 #'
-#' \donttest{
 #' # The policy that a search has found, in a fresh episode.
-#' file <- tempfile(fileext = ".gif")
-#' animate(search_random("CartPole-v0", seed = 1), file, seed = 1, every = 2)
-#' }
+#' search <- search_random("CartPole-v0", seed = 1)
+#' animate(search, seed = 1, width = 300, every = 4)
 animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 
 #' @export
@@ -150,7 +149,7 @@ frame_rate <- function(frames) {
 #'   a second. Their rounding does not add up.
 #' @noRd
 animation_plan <- function(n, fps, every = NULL) {
-  every <- every %||% max(1, ceiling(fps / fastest_fps))
+  every <- shown_every(every, fps)
   steps <- unique(as.integer(c(seq(0, n - 1, by = every), n - 1)))
   delays <- diff(round(100 * steps / fps))
   list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest_fps), 65535)))
@@ -158,6 +157,20 @@ animation_plan <- function(n, fps, every = NULL) {
 
 # Browsers slow down what is faster.
 fastest_fps <- 50
+
+# At least so many that the pace can be kept.
+shown_every <- function(every, fps) {
+  least <- max(1, ceiling(fps / fastest_fps))
+  if (!is.null(every) && every < least) {
+    rlang::inform(
+      c(paste0("`every` is ", least, " instead of ", every, ": of ", number_text(fps),
+               " frames a second a GIF can show ", fastest_fps, " at most."),
+        i = "With a lower `fps` it shows more of them, at a slower pace."),
+      class = "gym_message_every"
+    )
+  }
+  max(every, least)
+}
 
 copy_animation <- function(made, file, call = rlang::caller_env(2)) {
   if (!suppressWarnings(file.copy(made, file, overwrite = TRUE))) {

@@ -98,6 +98,18 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
   }
 }
 
+#' Make sure that a package is there which not everybody needs
+#' @noRd
+check_suggested <- function(package, purpose, call = rlang::caller_env()) {
+  if (!requireNamespace(package, quietly = TRUE)) {
+    gym_abort(
+      c(paste0("To ", purpose, " takes the package ", package, "."),
+        i = paste0("`install.packages(\"", package, "\")` installs it.")),
+      class = "gym_error_argument", call = call
+    )
+  }
+}
+
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
     paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),

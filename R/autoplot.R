@@ -44,7 +44,7 @@ autoplot_returns <- function(x) {
                         linetype = "dashed") +
     ggplot2::coord_cartesian(xlim = data$xlim, ylim = data$ylim) +
     ggplot2::labs(
-      x = returns_label, y = if (!is.null(data$density)) "density", title = rollout_title(x),
+      x = returns_label, y = if (!is.null(data$density)) "density", title = played_title(x),
       subtitle = label
     )
 }
@@ -66,7 +66,7 @@ autoplot_trajectory <- function(x, episode, data) {
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 2L,
                         labeller = ggplot2::as_labeller(facet_labels(data))) +
     ggplot2::scale_y_continuous(breaks = few_breaks) +
-    ggplot2::labs(x = "steps taken", y = NULL, title = rollout_title(x),
+    ggplot2::labs(x = "steps taken", y = NULL, title = played_title(x),
                   subtitle = trajectory_subtitle(x, episode, data))
 }
 

@@ -22,20 +22,24 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
     )
   }
   names <- observation_names(place$env_id, paste0("obs_", seq_len(n)))
-  usual <- usual_ranges[[environment_family(place$env_id), exact = TRUE]]
   list(
-    names = names, usual = if (all(names %in% names(usual))) usual,
+    names = names, usual = usual_ranges(place$env_id, names),
     low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)
   )
 }
 
-# From the middle to either side. The position's and the angle's are where an episode
-# ends. The velocities' hold 99.5 in 100 steps of 500 episodes of the random policy and of 1,200
-# episodes of 60 random networks.
-usual_ranges <- list(
-  CartPole = list(cart_position = 2.4, cart_velocity = 2, pole_angle = 0.2095,
-                  pole_angular_velocity = 2.5)
-)
+# From the middle to either side: to where an episode ends, and as fast as it gets. `NULL` where
+# that is not known of all parts.
+usual_ranges <- function(env_id, names) {
+  family <- environment_family(env_id)
+  limits <- lapply(episode_limits[[family, exact = TRUE]], function(limit) max(limit$at))
+  usual <- c(limits, usual_speeds[[family, exact = TRUE]])
+  if (all(names %in% names(usual))) usual
+}
+
+# They hold 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes of 60
+# random networks.
+usual_speeds <- list(CartPole = list(cart_velocity = 2, pole_angular_velocity = 2.5))
 
 #' Find the two numbers of an observation to map
 #' @return Their places, integers.

@@ -64,8 +64,8 @@
 #'   actions, observations that are not at least two numbers, actions that are neither
 #'   discrete nor a Box), a name is none of the observation's, or a range is neither known
 #'   nor given.
-#' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees (0.2095)
-#'   in angle, see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
+#' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees in angle,
+#'   see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
 #' @export
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
@@ -161,29 +161,6 @@ mapped_place <- function(policy, env, client, call = rlang::caller_env()) {
   c(list(policy = policy), policy[c("observation_space", "action_space", "env_id")])
 }
 
-#' Ask what is observed and done in an environment
-#'
-#' One that is named by its id is made for the question and closed.
-#' @return A list: `observation_space` and `action_space` of a lane, and `spec`, as
-#'   [policy_bind()] takes them.
-#' @noRd
-known_spaces <- function(env, client, call = rlang::caller_env()) {
-  check_environment(env, call = call)
-  if (is.character(env) || inherits(env, "gym_wrapped")) {
-    env <- gym_make(env, client = client)
-    on.exit(close_made(env, finished = FALSE))
-  }
-  list(
-    observation_space = env$single_observation_space %||% env$observation_space,
-    action_space = env$single_action_space %||% env$action_space,
-    spec = env$spec
-  )
-}
-
-bind_named <- function(policy, env, client, call = rlang::caller_env()) {
-  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
-}
-
 # What is done --------------------------------------------------------------------
 
 #' Ask what is done on each of many observations
@@ -267,6 +244,3 @@ held_text <- function(at) {
   more <- if (length(at) > 4L) paste(", and", length(at) - 4L, "more")
   paste0("Held: ", paste(names(few), "=", number_text_each(few), collapse = ", "), more)
 }
-
-# One by one, as together they would get as many decimals as the longest needs.
-number_text_each <- function(x) vapply(unname(x), number_text, "")

@@ -48,8 +48,11 @@ check_draws <- function(env, call) {
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
-  draws <- inherits(env, "gym_env") &&
-    known_instance(env$client, env$instance_id, call = call)$draws
+  draws <- FALSE
+  if (inherits(env, "gym_env")) {
+    check_open(env, call)
+    draws <- known_instance(env$client, env$instance_id, call = call)$draws
+  }
   if (!draws) {
     gym_abort(
       c(paste0("There are no frames to keep: ", label, " cannot be drawn."),
@@ -78,15 +81,3 @@ frame_from_png <- function(file) {
 
 # Width and height stand in the header of the file.
 png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")
-
-#' Make sure that a package is there which not everybody needs
-#' @noRd
-check_suggested <- function(package, purpose, call = rlang::caller_env()) {
-  if (!requireNamespace(package, quietly = TRUE)) {
-    gym_abort(
-      c(paste0("To ", purpose, " takes the package ", package, "."),
-        i = paste0("`install.packages(\"", package, "\")` installs it.")),
-      class = "gym_error_argument", call = call
-    )
-  }
-}

@@ -26,6 +26,7 @@
 #'   * `$render(lane = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,
+#'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
 #'   * `$single_action_space`, `$single_observation_space`: those of one lane; without
@@ -137,22 +138,14 @@ gym_env <- R6Class(
   ),
   active = list(
     action_space = function() instance_space(private$instance, "action_space"),
-    observation_space = function() instance_space(private$instance, "observation_space")
+    observation_space = function() instance_space(private$instance, "observation_space"),
+    is_open = function() !private$closed
   ),
   private = list(
     instance = NULL,
     pid = NULL,
     closed = FALSE,
-    check_open = function(call = rlang::caller_env()) {
-      if (private$closed) {
-        gym_abort(
-          c("This environment was closed.",
-            i = paste0("`gym_make(\"", self$spec$id, "\")` makes a new one.")),
-          class = "gym_error_argument",
-          call = call
-        )
-      }
-    },
+    check_open = function(call = rlang::caller_env()) check_open(self, call),
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
@@ -162,3 +155,13 @@ gym_env <- R6Class(
     }
   )
 )
+
+check_open <- function(env, call = rlang::caller_env()) {
+  if (!env$is_open) {
+    gym_abort(
+      c("This environment was closed.",
+        i = paste0("`gym_make(\"", env$spec$id, "\")` makes a new one.")),
+      class = "gym_error_argument", argument = "env", value = env, call = call
+    )
+  }
+}

@@ -27,6 +27,25 @@ with_lanes <- function(env, episodes, client, use, frames = FALSE) {
   value
 }
 
+#' Ask what is observed and done in an environment
+#'
+#' One that is named by its id is made for the question and closed.
+#' @return A list: `observation_space` and `action_space` of a lane, and `spec`, as
+#'   [policy_bind()] takes them.
+#' @noRd
+known_spaces <- function(env, client, call = rlang::caller_env()) {
+  check_environment(env, call = call)
+  if (is.character(env) || inherits(env, "gym_wrapped")) {
+    env <- gym_make(env, client = client)
+    on.exit(close_made(env, finished = FALSE))
+  }
+  list(
+    observation_space = env$single_observation_space %||% env$observation_space,
+    action_space = env$single_action_space %||% env$action_space,
+    spec = env$spec
+  )
+}
+
 # What was played is not lost because the environment could not be closed, and an
 # error on the way here says more than one from closing.
 close_made <- function(env, finished) {

@@ -28,8 +28,7 @@ observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 # Falls back to the names of the columns where the environment is unknown or a
 # wrapper has changed what it shows.
 observation_names <- function(env_id, columns) {
-  family <- sub("-v[0-9]+$", "", if (is.null(env_id)) "" else env_id)
-  parts <- observation_parts[[family, exact = TRUE]]
+  parts <- observation_parts[[environment_family(env_id), exact = TRUE]]
   if (length(parts) == length(columns)) parts else columns
 }
 

@@ -30,7 +30,7 @@ plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
   draw_regions(data$regions)
   draw_path(data$path)
   graphics::box(bty = "l")
-  title_above(main %||% decision_title(x))
+  title_above(main %||% played_title(x))
   if (is.null(data$key$labels)) {
     colour_key_above(data$key)
   } else {
@@ -40,11 +40,6 @@ plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
 }
 
 decision_label <- function(x, name) observation_labels(x$env_id, name)
-
-decision_title <- function(x) {
-  policy <- sub("(,| over).*", "", policy_text(x$policy))
-  paste0(c(x$env_id, paste0("policy: ", policy)), collapse = ", ")
-}
 
 # What plot() and autoplot() of a policy do with the names of two observations.
 plot_decision <- function(policy, env = NULL, x = NULL, y = NULL, ..., main = NULL) {
@@ -180,18 +175,6 @@ region_middle <- function(inside) {
 
 # Drawing -------------------------------------------------------------------------
 
-# A field of colours over the plot, with the lines of levels where there are any.
-draw_field <- function(data) {
-  graphics::image(data$x, data$y, data$z, zlim = data$zlim, col = data$palette, add = TRUE,
-                  useRaster = TRUE)
-  within <- range(data$z, na.rm = TRUE)
-  border <- data$border[data$border > within[[1L]] & data$border < within[[2L]]]
-  if (length(border)) {
-    graphics::contour(data$x, data$y, data$z, levels = border, add = TRUE, lwd = 2,
-                      drawlabels = FALSE)
-  }
-}
-
 draw_regions <- function(regions) {
   if (NROW(regions)) {
     graphics::text(regions$x, regions$y, regions$label, font = 2L)
@@ -234,7 +217,7 @@ autoplot.gym_decision_map <- function(object, ...) {
   plot <- ggplot2::ggplot(points, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_raster(ggplot2::aes(fill = .data$z)) +
     fill +
-    ggplot2::labs(title = decision_title(object), x = decision_label(object, object$x),
+    ggplot2::labs(title = played_title(object), x = decision_label(object, object$x),
                   y = decision_label(object, object$y)) +
     ggplot2::coord_cartesian(expand = FALSE)
   if (length(data$border)) {

@@ -112,9 +112,7 @@ luck_label <- function(mark, lucky) {
 
 luck_axis <- function(data) {
   solved <- data$bars[!data$bars$unsolved, ]
-  last <- max(solved$round)
-  at <- unique(round(pretty(c(1, last))))
-  graphics::axis(1L, at = c(1, at[at > 1 & at <= last]))
+  graphics::axis(1L, at = union(1, round_ticks(max(solved$round))))
   given_up <- data$bars[data$bars$unsolved, ]
   if (nrow(given_up)) {
     graphics::mtext("not\nsolved", 1L, line = 1.5, at = given_up$x,
@@ -128,8 +126,7 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
   data <- luck_plot_data(object, mark)
   solved <- data$bars[!data$bars$unsolved, ]
   given_up <- data$bars[data$bars$unsolved, ]
-  at <- unique(c(1, round(pretty(solved$round))))
-  at <- at[at >= 1 & at <= max(solved$round)]
+  at <- union(1, round_ticks(max(solved$round)))
   ggplot2::ggplot(data$bars, ggplot2::aes(x = .data$x)) +
     ggplot2::geom_col(ggplot2::aes(y = .data$searches, fill = .data$lucky), width = 0.8) +
     ggplot2::geom_line(ggplot2::aes(y = .data$expected, group = 1), solved,

@@ -66,7 +66,7 @@ plot_returns <- function(x, main, xlab, ylab, ...) {
   data <- rollout_plot_data(x)
   flat <- is.null(data$density)
   open_plot(
-    list(x = data$xlim, y = data$ylim, main = main %||% rollout_title(x),
+    list(x = data$xlim, y = data$ylim, main = main %||% played_title(x),
          xlab = xlab %||% returns_label, ylab = ylab %||% if (flat) "" else "density",
          yaxs = "i", yaxt = if (flat) "n" else "s"),
     list(...)
@@ -79,11 +79,6 @@ plot_returns <- function(x, main, xlab, ylab, ...) {
 }
 
 returns_label <- "return (reward summed over an episode)"
-
-rollout_title <- function(x) {
-  # Up to the first detail: "random" or "network 4-2-1".
-  paste0(x$env_id, ", policy: ", sub("(,| over).*", "", policy_text(x$policy)))
-}
 
 #' Compute what a plot of a rollout shows
 #' @return A list: `returns`, `median`, `density` (data frame `x`, `y`, `NULL` when all

@@ -39,7 +39,7 @@ plot.gym_search <- function(x, type = c("returns", "network", "landscape"), main
   main <- main %||% search_title(x)
   data <- search_plot_data(x)
   open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n"), list(...))
-  round_axis(data$means$round)
+  graphics::axis(1L, at = round_ticks(max(data$means$round)))
   if (!is.null(data$target)) {
     graphics::abline(h = data$target, col = okabe_ito$vermillion, lty = "dashed", lwd = 2)
   }
@@ -93,12 +93,6 @@ spread <- function(round, value, near) {
   0.6 * (place - (size + 1) / 2) / max(size, 5)
 }
 
-# Rounds are whole numbers, and so are the marks on their axis.
-round_axis <- function(rounds) {
-  at <- unique(round(pretty(c(1, max(rounds)))))
-  graphics::axis(1L, at = at[at >= 1 & at <= max(rounds)])
-}
-
 search_legend <- function(data) {
   shown <- c(TRUE, TRUE, !is.null(data$target))
   legend_above(
@@ -121,14 +115,13 @@ autoplot.gym_search <- function(object, type = c("returns", "network", "landscap
     return(autoplot.gym_landscape(search_landscape(object, ...)))
   }
   data <- search_plot_data(object)
-  rounds <- unique(round(pretty(c(1, max(data$means$round)))))
   plot <- ggplot2::ggplot(data$points, ggplot2::aes(.data$x, .data$return)) +
     ggplot2::geom_point(colour = okabe_ito$sky_blue, alpha = 0.8) +
     ggplot2::geom_line(ggplot2::aes(.data$round, .data$mean_return), data$means,
                        colour = okabe_ito$blue, linewidth = 0.8) +
     ggplot2::geom_point(ggplot2::aes(.data$round, .data$mean_return), data$means,
                         colour = okabe_ito$blue, shape = 15) +
-    ggplot2::scale_x_continuous(breaks = rounds[rounds >= 1]) +
+    ggplot2::scale_x_continuous(breaks = round_ticks(max(data$means$round))) +
     ggplot2::labs(title = search_title(object), x = "round",
                   y = "return (reward summed over an episode)",
                   subtitle = "points: episodes; line: mean of the round; dashed: target")

@@ -22,7 +22,7 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
     graphics::par(mar = c(0.6, left[[column]], 1.6, 0.8))
     draw_panel(data, i, at_bottom = i %in% grid[nrow(grid), ], title_cex)
   }
-  title <- main %||% rollout_title(x)
+  title <- main %||% played_title(x)
   graphics::mtext(title, line = 1.6, outer = TRUE, font = 2, cex = 1.1 * cex)
   graphics::mtext(trajectory_subtitle(x, episode, data), line = 0.3, outer = TRUE, cex = cex)
   graphics::mtext("steps taken", side = 1L, line = 1.6, outer = TRUE, cex = cex)

@@ -8,6 +8,19 @@ open_plot <- function(frame, chosen) {
   do.call(graphics::plot, c(chosen, frame[setdiff(names(frame), names(chosen))]))
 }
 
+# A title that tells environment and policy, the latter up to the first detail: "random" or
+# "network 4-2-1".
+played_title <- function(x) {
+  policy <- sub("(,| over).*", "", policy_text(x$policy))
+  paste(c(x$env_id, paste("policy:", policy)), collapse = ", ")
+}
+
+# Rounds are whole numbers from 1, and so are the marks on their axis.
+round_ticks <- function(last) {
+  at <- unique(round(pretty(c(1, last))))
+  at[at >= 1 & at <= last]
+}
+
 # Colours that remain apart for the colour-blind (Okabe and Ito, 2008).
 okabe_ito <- list(
   orange = "#E69F00", sky_blue = "#56B4E9", green = "#009E73", yellow = "#F0E442",
@@ -19,6 +32,18 @@ limit_colours <- c(failure = okabe_ito$vermillion, goal = okabe_ito$green)
 ending_colours <- c(terminated = okabe_ito$vermillion, truncated = "grey50")
 line_colours <- unlist(okabe_ito[c("blue", "orange", "green", "purple", "sky_blue", "vermillion")],
                        use.names = FALSE)
+
+# A field of colours over the plot, with the lines of levels where there are any.
+draw_field <- function(data) {
+  graphics::image(data$x, data$y, data$z, zlim = data$zlim, col = data$palette, add = TRUE,
+                  useRaster = TRUE)
+  within <- range(data$z, na.rm = TRUE)
+  border <- data$border[data$border > within[[1L]] & data$border < within[[2L]]]
+  if (length(border)) {
+    graphics::contour(data$x, data$y, data$z, levels = border, add = TRUE, lwd = 2,
+                      drawlabels = FALSE)
+  }
+}
 
 # A legend in one line above the plot, where no data are; smaller where the plot is
 # narrow. graphics::legend() gives each entry the width of the longest. Laid out in

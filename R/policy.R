@@ -112,6 +112,11 @@ policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("poli
 #' @exportS3Method
 policy_bind.default <- function(policy, env, call = rlang::caller_env()) policy
 
+# For what is drawn, an environment may be left out.
+bind_named <- function(policy, env, client, call = rlang::caller_env()) {
+  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
+}
+
 #' Draw another policy of the same kind
 #' @noRd
 policy_resample <- function(policy, call = rlang::caller_env()) UseMethod("policy_resample")
@@ -179,12 +184,4 @@ observation_lanes <- function(observation, space) {
 # A discrete space has no shape: its values are single numbers.
 observation_rank <- function(space) {
   if (is.null(space)) 1L else length(space$shape)
-}
-
-# Words for messages and for what is printed ----------------------------------------
-
-environment_label <- function(env) env$spec$id %||% "the environment"
-
-count_of <- function(n, noun) {
-  paste0(format(n, big.mark = ",", scientific = FALSE), " ", noun, if (n != 1) "s")
 }

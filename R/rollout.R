@@ -257,7 +257,3 @@ quartiles <- function(x) {
 
 # Of a single episode there is no standard error.
 standard_error <- function(x) stats::sd(x) / sqrt(length(x))
-
-se_text <- function(se) if (!is.na(se)) paste0(" (standard error ", number_text(se), ")")
-
-number_text <- function(x) format(x, digits = 4L, big.mark = ",")

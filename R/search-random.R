@@ -99,26 +99,44 @@
 search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seed = NULL,
                           progress = rlang::is_interactive(), client = gym_client()) {
-  check_environment(env)
-  check_count(rounds)
-  check_count(episodes)
-  check_number(target, allow_null = TRUE)
-  check_count(max_steps, allow_null = TRUE)
   check_seed(seed)
   check_flag(progress)
   call <- rlang::current_env()
-  keep_random_state(policy_resample(check_policy(policy), call = call))
-  given <- if (!is.character(env)) env
+  settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
+  settings["env"] <- list(if (!is.character(env)) env)
+  settings["seed"] <- list(seed)
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
-    settings <- list(
-      policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
-      target = target %||% lanes$spec$reward_threshold, max_steps = max_steps, seed = seed,
-      env = given, env_id = environment_label(lanes), num_envs = lanes$num_envs,
-      client = lanes$client
-    )
+    settings <- settings_in(lanes, settings)
     bound <- policy_bind(policy, lanes, call = call)
     with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call))
   })
+}
+
+#' Check what a search is to do
+#'
+#' `policy` must not have been forced: whatever drawing it draws is put back.
+#' @return A list, as [play_rounds()] takes it, but for what the environment says of itself.
+#' @noRd
+search_settings <- function(env, policy, rounds, episodes, target, max_steps,
+                            call = rlang::caller_env()) {
+  check_environment(env, call = call)
+  check_count(rounds, call = call)
+  check_count(episodes, call = call)
+  check_number(target, allow_null = TRUE, call = call)
+  check_count(max_steps, allow_null = TRUE, call = call)
+  keep_random_state(policy_resample(check_policy(policy, call = call), call = call))
+  list(
+    policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
+    target = target, max_steps = max_steps
+  )
+}
+
+settings_in <- function(lanes, settings) {
+  settings["target"] <- list(settings$target %||% lanes$spec$reward_threshold)
+  settings["num_envs"] <- list(lanes$num_envs)
+  settings["client"] <- list(lanes$client)
+  settings$env_id <- environment_label(lanes)
+  settings
 }
 
 #' Play rounds until one reaches the target

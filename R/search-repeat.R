@@ -69,21 +69,12 @@
 search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seeds = 1:100,
                           progress = rlang::is_interactive(), client = gym_client()) {
-  check_environment(env)
-  check_count(rounds)
-  check_count(episodes)
-  check_number(target, allow_null = TRUE)
-  check_count(max_steps, allow_null = TRUE)
   check_seeds(seeds)
   check_flag(progress)
   call <- rlang::current_env()
-  keep_random_state(policy_resample(check_policy(policy), call = call))
+  settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
-    settings <- list(
-      policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
-      target = target %||% lanes$spec$reward_threshold, max_steps = max_steps,
-      env_id = environment_label(lanes), num_envs = lanes$num_envs
-    )
+    settings <- settings_in(lanes, settings)
     check_target(settings, call)
     play_searches(lanes, policy_bind(policy, lanes, call = call), settings, seeds, progress, call)
   })
@@ -272,8 +263,6 @@ searches_effort_line <- function(x) {
     " in ", seconds_text(x$elapsed)
   )
 }
-
-percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
 
 #' @export
 summary.gym_searches <- function(object, ...) {

@@ -144,14 +144,6 @@ effort_line <- function(x) {
   )
 }
 
-seconds_text <- function(seconds) {
-  if (seconds < 120) {
-    paste(format(round(seconds, 1L), nsmall = 1L), "s")
-  } else {
-    paste(round(seconds / 60), "min")
-  }
-}
-
 # Predicting -------------------------------------------------------------------
 
 #' @rdname gym_search

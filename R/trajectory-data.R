@@ -107,13 +107,12 @@ action_choices <- function(x, actions) {
   if (is.null(value) || !all_whole(value)) {
     return(NULL)
   }
-  meaning <- action_meanings[[environment_family(x$env_id), exact = TRUE]]
   # A function knows of no space.
   space <- if (!is.function(x$policy)) x$policy$action_space
-  n <- space$n %||% length(meaning)
-  start <- space$start %||% 0L
-  if (length(meaning) > 1L && n == length(meaning) && all(value %in% (start + seq_len(n) - 1L))) {
-    data.frame(value = start + seq_len(n) - 1L, label = meaning)
+  meaning <- action_meaning(x$env_id, space$n)
+  possible <- (space$start %||% 0L) + seq_along(meaning) - 1L
+  if (length(meaning) > 1L && all(value %in% possible)) {
+    data.frame(value = possible, label = meaning)
   } else if (diff(range(value)) < most_choices) {
     value <- seq(min(value), max(value))
     data.frame(value = value, label = as.character(value))
@@ -128,12 +127,11 @@ action_title <- function(env_id, names) {
   if (length(names) != 1L) {
     return("actions"[length(names) > 0L])
   }
-  family <- environment_family(env_id)
-  part <- action_meanings[[family, exact = TRUE]]
-  unit <- action_units[[family, exact = TRUE]]
-  if (length(part) != 1L) {
+  part <- action_meaning(env_id, 1L)
+  if (is.null(part)) {
     return("action")
   }
+  unit <- action_units[[environment_family(env_id), exact = TRUE]]
   paste0("action: ", part, if (!is.null(unit)) paste0(" (", unit, ")"))
 }
 

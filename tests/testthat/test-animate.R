@@ -33,13 +33,28 @@ test_that("no picture is shorter than browsers allow, at the same pace", {
   fast <- animation_plan(101, fps = 100)
   expect_identical(fast$steps, as.integer(seq(0, 100, 2)))
   expect_identical(unique(fast$delays[1:50]), 2L)
-  insisted <- animation_plan(101, fps = 100, every = 1)
-  expect_length(insisted$steps, 101)
-  expect_true(all(insisted$delays >= 2))
   # 30 a second are no whole number of hundredths, but 3 of them make a tenth.
-  thirty <- animation_plan(31, fps = 30)
-  expect_identical(sum(thirty$delays[1:30]), 100L)
+  for (fps in c(10, 30, 50, 60, 100, 120, 1000)) {
+    for (every in list(NULL, 1, 2, 3, 7)) {
+      plan <- suppressMessages(animation_plan(10 * fps + 1, fps, every))
+      info <- paste(fps, "a second, every", every)
+      expect_true(all(plan$delays >= 2), info = info)
+      # All but the last one's second; it may come too late by what it is raised to.
+      seconds <- sum(utils::head(plan$delays, -1)) / 100
+      expect_true(abs(seconds - 10) <= 0.02, info = info)
+    }
+  }
   expect_identical(animation_plan(1, fps = 50), list(steps = 0L, delays = 100L))
+})
+
+test_that("more frames than a GIF can show at that pace are left out, with a message", {
+  expect_message(
+    insisted <- animation_plan(101, fps = 100, every = 1), "`every` is 2 instead of 1",
+    class = "gym_message_every"
+  )
+  expect_identical(insisted, animation_plan(101, fps = 100))
+  expect_silent(animation_plan(101, fps = 100, every = 2))
+  expect_silent(animation_plan(101, fps = 50, every = 1))
 })
 
 test_that("a 200-step CartPole stays well under a megabyte", {
@@ -97,6 +112,19 @@ test_that("what cannot be animated says why, before anything is played", {
   bad(width = 0, message = "`width`")
   bad(every = 0.5, message = "`every`")
   bad(wdith = 3, message = "`wdith`")
+})
+
+test_that("an environment that was closed is said to be", {
+  skip_if_not_installed("magick")
+  env <- local_env("CartPole-v1")
+  search <- search_random(env, rounds = 1, episodes = 1, max_steps = 5, seed = 1)
+  env$close()
+  closed <- function(code) {
+    expect_error(code, "This environment was closed.*gym_make\\(\"CartPole-v1\"\\)",
+                 class = "gym_error_argument")
+  }
+  closed(animate(search))
+  closed(rollout(env, search$policy, frames = TRUE))
 })
 
 test_that("it prints where it is, and opens where somebody looks", {

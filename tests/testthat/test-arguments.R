@@ -67,3 +67,9 @@ test_that("what is long or odd is described, not printed", {
   x <- data.frame(a = 1)
   expect_error(check_count(x), "not an object of class data.frame", fixed = TRUE)
 })
+
+test_that("a missing package is named", {
+  expect_error(check_suggested("notthere", "draw"), "install.packages(\"notthere\")", fixed = TRUE,
+               class = "gym_error_argument")
+  expect_silent(check_suggested("stats", "draw"))
+})

@@ -3,7 +3,7 @@ skip_if_not_installed("ggplot2")
 # Builds and draws; warnings fail the test.
 expect_drawn <- function(plot) {
   expect_s3_class(plot, "ggplot")
-  local_pdf()
+  local_device()
   expect_silent(print(plot))
 }
 

@@ -106,7 +106,7 @@ test_that("other parts are held at 0, or in the middle where 0 is out of bounds"
 
 test_that("ranges are given, usual, the bounds, or those of the path", {
   ends <- function(map) unname(unlist(lapply(map$grid[1:2], range)))
-  expect_equal(ends(pole_map()), c(-0.2095, 0.2095, -2.5, 2.5))
+  expect_equal(ends(pole_map()), c(c(-1, 1) * 12 * pi / 180, -2.5, 2.5))
   expect_equal(ends(pole_map(xlim = c(0, 1))), c(0, 1, -2.5, 2.5))
   env <- fake_environment(observation_space = box_space(c(-5, -Inf, -1, -1), c(7, Inf, 1, 1)))
   path <- data.frame(obs_1 = c(1, 2), obs_2 = c(10, 30))

@@ -140,7 +140,9 @@ test_that("an environment is an object with Gymnasium's names", {
   # The classic calls see the same environment.
   out <- env_step(env$client, env$instance_id, 0)
   expect_equal(out$reward, 1)
+  expect_true(env$is_open)
   env$close()
+  expect_false(env$is_open)
   expect_output(print(env), "closed")
   expect_error(env$close(), NA)
   gone <- local_env()

@@ -89,12 +89,6 @@ test_that("an environment with lanes is refused, and a flag must be one", {
                "`frames` must be TRUE or FALSE", class = "gym_error_argument")
 })
 
-test_that("a missing package is named", {
-  expect_error(check_suggested("notthere", "draw"), "install.packages(\"notthere\")", fixed = TRUE,
-               class = "gym_error_argument")
-  expect_silent(check_suggested("stats", "draw"))
-})
-
 test_that("an environment tells its frames a second", {
   expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
   expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)

@@ -38,10 +38,10 @@ test_that("any rollout plots, returns itself and leaves par and R's generator al
 })
 
 test_that("the title names the environment and the policy", {
-  expect_identical(rollout_title(rollout_of(1)), "Fake-v0, policy: random")
+  expect_identical(played_title(rollout_of(1)), "Fake-v0, policy: random")
   env <- fake_environment(id = "CartPole-v1")
   expect_identical(
-    rollout_title(rollout(env, policy_network())), "CartPole-v1, policy: network 4-2-1"
+    played_title(rollout(env, policy_network())), "CartPole-v1, policy: network 4-2-1"
   )
 })
 

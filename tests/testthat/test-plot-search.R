@@ -87,3 +87,14 @@ test_that("ggplot2 draws the same episodes, means and target", {
   expect_silent(print(plot))
   expect_silent(print(ggplot2::autoplot(search, type = "network")))
 })
+
+test_that("the marks of rounds are whole numbers, from 1 to the last", {
+  expect_equal(round_ticks(1), 1)
+  expect_equal(round_ticks(3), 1:3)
+  expect_equal(round_ticks(50), c(10, 20, 30, 40, 50))
+  for (last in 1:60) {
+    at <- round_ticks(last)
+    expect_gt(length(at), 0)
+    expect_true(all(at == round(at) & at >= 1 & at <= last))
+  }
+})

@@ -15,29 +15,26 @@ drawable <- function() {
 
 test_that("any trajectory plots, returns itself and leaves par and R's generator alone", {
   for (size in list(c(7, 5), c(4, 3))) {
-    local_pdf(width = size[1], height = size[2])
-    graphics::plot.new()
-    before <- plot_parameters()
+    local_device(size[1], size[2])
     set.seed(1)
-    state <- .Random.seed
     for (played in drawable()) {
-      expect_silent(plot(played, type = "trajectory"))
-      expect_identical(expect_invisible(plot(played, type = "trajectory", main = "mine")), played)
+      expect_leaves_session_alone({
+        expect_silent(plot(played, type = "trajectory"))
+        expect_identical(expect_invisible(plot(played, type = "trajectory", main = "mine")), played)
+      })
     }
-    expect_identical(.Random.seed, state)
-    expect_identical(plot_parameters(), before)
   }
 })
 
 test_that("par is put back after an error, too", {
-  local_pdf(width = 0.4, height = 0.4)
+  local_device(0.4, 0.4)
   before <- plot_parameters()
   expect_error(plot(drawable()[[1]], type = "trajectory"))
   expect_identical(plot_parameters(), before)
 })
 
 test_that("CartPole plots with all of its labels", {
-  local_pdf(width = 4, height = 3)
+  local_device(4, 3)
   expect_silent(plot(short_rollout(), type = "trajectory"))
 })
 

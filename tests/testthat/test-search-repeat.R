@@ -35,6 +35,10 @@ test_that("R's generator is left alone, and a session that drew nothing still ha
   state <- .Random.seed
   search_repeat(env, rounds = 2, target = 99, seeds = 1:2)
   expect_identical(.Random.seed, state)
+  withr::local_preserve_seed()
+  rm(".Random.seed", envir = globalenv())
+  search_repeat(env, rounds = 2, target = 99, seeds = 1:2)
+  expect_false(exists(".Random.seed", globalenv(), inherits = FALSE))
 })
 
 test_that("it prints and sums up in a few lines", {

@@ -1,0 +1,103 @@
+# Fitting a network to an environment: as many inputs as it shows numbers, as many outputs as
+# it takes.
+
+#' @exportS3Method
+policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
+  check_inputs(policy, env, call)
+  check_outputs(policy, env, call)
+  policy$observation_space <- env$observation_space
+  policy$action_space <- env$action_space
+  policy["env_id"] <- list(env$spec$id)
+  policy
+}
+
+check_inputs <- function(policy, env, call) {
+  space <- env$observation_space
+  inputs <- policy$sizes[[1L]]
+  gives <- space_width(space)
+  if (is.null(gives)) {
+    abort_fit(policy, paste("A network cannot observe", format(space)), env, call)
+  }
+  if (gives != inputs) {
+    problem <- paste0(
+      "The network takes ", count_of(inputs, "input"), ", but an observation of ",
+      environment_label(env),
+      if (inherits(space, "gym_space_discrete")) {
+        paste0(" is one of ", gives, " and needs an input for each")
+      } else {
+        paste0(" has ", count_of(gives, "number"))
+      }
+    )
+    abort_fit(policy, problem, env, call)
+  }
+}
+
+check_outputs <- function(policy, env, call) {
+  space <- env$action_space
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  width <- space_width(space)
+  if (is.null(width)) {
+    abort_fit(policy, paste("A network cannot choose from", format(space)), env, call)
+  }
+  discrete <- inherits(space, "gym_space_discrete")
+  rounded <- discrete && outputs == 1L && width == 2
+  if (outputs != width && !rounded) {
+    takes <- if (discrete) "has" else "takes an action of"
+    problem <- paste0(
+      "The network gives ", count_of(outputs, "output"), ", but ", environment_label(env), " ",
+      takes, " ", count_of(width, if (discrete) "action" else "number")
+    )
+    abort_fit(policy, problem, env, call)
+  }
+  if (!discrete) {
+    check_bounded(policy, env, call)
+  }
+  if (rounded || !discrete) {
+    check_range(policy, call)
+  }
+}
+
+check_bounded <- function(policy, env, call) {
+  space <- env$action_space
+  if (!all(is.finite(c(space$low, space$high)))) {
+    gym_abort(
+      paste0(
+        "A network's outputs are scaled to the bounds of the action, but ",
+        environment_label(env), " takes ", format(space), " with a side without a bound."
+      ),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+}
+
+abort_fit <- function(policy, problem, env, call) {
+  gym_abort(
+    c(paste0(problem, "."), i = fitting_sizes(policy, env)),
+    class = "gym_error_argument", argument = "policy", value = policy, call = call
+  )
+}
+
+# The sizes that would fit, with the hidden layers left as they are.
+fitting_sizes <- function(policy, env) {
+  inputs <- space_width(env$observation_space)
+  outputs <- space_width(env$action_space)
+  if (is.null(inputs) || is.null(outputs)) {
+    return(NULL)
+  }
+  if (inherits(env$action_space, "gym_space_discrete") && outputs == 2) {
+    outputs <- 1
+  }
+  hidden <- policy$sizes[-c(1L, length(policy$sizes))]
+  sizes <- paste(c(inputs, hidden, outputs), collapse = ", ")
+  paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
+}
+
+# How many inputs a network needs for what is observed there, or outputs for what
+# is done. NULL where a network has no use for the space.
+space_width <- function(space) {
+  if (inherits(space, "gym_space_discrete")) {
+    space$n
+  } else if (inherits(space, "gym_space_box")) {
+    prod(space$shape)
+  }
+}
