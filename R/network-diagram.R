@@ -59,7 +59,11 @@ place_weights <- function(policy, neurons, digits) {
   weights$sign <- ifelse(weights$weight < 0, "negative", "positive")
   weights$width <- if (largest > 0) abs(weights$weight) / largest else 0
   digits <- digits %||% if (nrow(weights) <= 24L) 2 else 0
-  weights$label <- if (digits > 0) sprintf("%.*f", as.integer(digits), weights$weight) else ""
+  weights$label <- if (digits > 0) {
+    sub("^-(0[.]0+)$", "\\1", sprintf("%.*f", as.integer(digits), weights$weight))
+  } else {
+    ""
+  }
   weights
 }
 

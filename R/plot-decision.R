@@ -58,6 +58,10 @@ autoplot_decision <- function(policy, env = NULL, x = NULL, y = NULL, ...) {
 # plotted as ever.
 #' @export
 plot.character <- function(x, y = NULL, ...) {
+  if (inherits(y, "gym_policy")) {
+    # plot(policy, x = "pole_angle"): decision_map() says what is missing.
+    return(plot_decision(y, ..., x = x))
+  }
   name <- names(substitute(list(...)))[2L]
   # What has another name belongs to plot.default(), and may be meant to be evaluated late.
   first <- if (...length() && (name %||% "") %in% c("", "policy")) ..1

@@ -26,8 +26,10 @@ plot.gym_searches <- function(x, mark = 3, main = luck_title(x), xlab = "rounds 
                               ylab = "searches", ...) {
   data <- luck_plot_data(x, mark)
   bars <- data$bars
-  open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n", yaxs = "i"),
-            list(...))
+  open_plot(
+    list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n", yaxt = "n", yaxs = "i"),
+    list(...)
+  )
   luck_axis(data)
   graphics::rect(bars$x - 0.4, 0, bars$x + 0.4, bars$searches, border = NA,
                  col = ifelse(bars$lucky, okabe_ito$vermillion, okabe_ito$sky_blue))
@@ -113,6 +115,8 @@ luck_label <- function(mark, lucky) {
 luck_axis <- function(data) {
   solved <- data$bars[!data$bars$unsolved, ]
   graphics::axis(1L, at = union(1, round_ticks(max(solved$round))))
+  # Searches are whole, too.
+  graphics::axis(2L, at = unique(round(pretty(data$ylim))), las = 1L)
   given_up <- data$bars[data$bars$unsolved, ]
   if (nrow(given_up)) {
     graphics::mtext("not\nsolved", 1L, line = 1.5, at = given_up$x,

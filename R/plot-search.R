@@ -54,7 +54,11 @@ plot.gym_search <- function(x, type = c("returns", "network", "landscape"), main
 }
 
 search_title <- function(x) {
-  outcome <- if (x$solved) paste(": solved in round", x$round)
+  outcome <- if (x$solved) {
+    paste(": solved in round", x$round)
+  } else if (!is.null(x$target)) {
+    paste(": not solved in", count_of(nrow(x$rounds), "round"))
+  }
   paste0("Random search in ", x$env_id, outcome)
 }
 

@@ -37,6 +37,8 @@ test_that("the call that names the observations x and y draws the map of the pol
   expect_identical(drawn, decision_map(follow, env, "pole_angle", "cart_position", size = 11))
   expect_error(plot(policy_random(), env, x = "pole_angle", y = "pole_angular_velocity"),
                "nothing to map", class = "gym_error_argument")
+  # Without env and y the policy arrives in another place.
+  expect_error(plot(policy, x = "pole_angle"), class = "gym_error_argument")
 })
 
 test_that("other strings are plotted as R does", {

@@ -56,10 +56,14 @@ test_that("titles, labels and limits can be chosen", {
   expect_equal(graphics::par("usr")[3:4], c(-54, 54))
 })
 
-test_that("the title says in which round a search was solved", {
+test_that("the title says in which round a search was solved, or that it was not", {
   expect_identical(
     search_title(search_of(c(1, 9), rounds = 2, target = 9)),
     "Random search in Fake-v0: solved in round 2"
+  )
+  expect_identical(
+    search_title(search_of(c(1, 9), rounds = 2, target = 10)),
+    "Random search in Fake-v0: not solved in 2 rounds"
   )
   expect_identical(search_title(search_of(c(1, 9), rounds = 2)), "Random search in Fake-v0")
 })
