@@ -19,7 +19,7 @@
 #' and the other machines need a Python of that version, too: the function says so.
 #'
 #' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
-#'   is replaced, anything else refused.
+#'   is replaced as soon as it is clear how a new one can be made, anything else refused.
 #' @param extras The extras that the bundle shall have, as for [gym_server_install()].
 #' @return `dir`, invisibly.
 #' @section Errors: `gym_error_install` when something could not be downloaded, with what to do;
@@ -33,10 +33,11 @@ gym_server_bundle <- function(dir, extras = character()) {
   check_string(dir)
   check_extras(extras)
   call <- rlang::current_env()
-  dir <- empty_bundle(dir, call)
+  check_bundle_place(dir, call)
   extras <- server_extras[server_extras %in% extras]
   in_turn({
     plan <- install_plan(extras, call)
+    dir <- empty_bundle(dir, call)
     cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
     uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
     base <- bundle_python(dir, uv, call)
@@ -56,22 +57,32 @@ gym_server_bundle <- function(dir, extras = character()) {
   invisible(dir)
 }
 
-empty_bundle <- function(dir, call) {
-  if (length(list.files(dir, all.files = TRUE, no.. = TRUE))) {
-    own <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
-    if (!all(list.files(dir, all.files = TRUE, no.. = TRUE) %in% own)) {
-      gym_abort(
-        paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
-        class = "gym_error_argument",
-        call = call
-      )
-    }
-    unlink(file.path(dir, own), recursive = TRUE)
+bundle_parts <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
+
+# An earlier bundle has bundle.dcf, one that broke off the folder "making": a folder "python"
+# alone may be anybody's.
+check_bundle_place <- function(dir, call) {
+  there <- list.files(dir, all.files = TRUE, no.. = TRUE)
+  is_bundle <- all(there %in% bundle_parts) && any(c("bundle.dcf", "making") %in% there)
+  if (file.exists(dir) && !dir.exists(dir) || length(there) && !is_bundle) {
+    gym_abort(
+      paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
+      class = "gym_error_argument",
+      call = call
+    )
   }
+}
+
+empty_bundle <- function(dir, call) {
+  # Somebody may have put something there while this session waited for its turn.
+  check_bundle_place(dir, call)
+  # First the sign of one that broke off, as removing the rest may be interrupted.
   dir.create(file.path(dir, "making"), recursive = TRUE, showWarnings = FALSE)
   if (!dir.exists(file.path(dir, "making"))) {
     abort_install(paste0("The folder ", dir, " cannot be made."), call = call)
   }
+  unlink(file.path(dir, setdiff(bundle_parts, "making")), recursive = TRUE)
+  unlink(list.files(file.path(dir, "making"), full.names = TRUE), recursive = TRUE)
   normalizePath(dir, winslash = "/")
 }
 

@@ -35,6 +35,35 @@ test_that("a bundle installs without a network", {
                class = "gym_error_install")
 })
 
+test_that("a folder that only looks like a bundle stays as it is", {
+  local_cache()
+  dir <- withr::local_tempdir()
+  dir.create(file.path(dir, "python"))
+  writeLines("print('mine')", file.path(dir, "python", "mine.py"))
+  expect_error(gym_server_bundle(dir), "earlier bundle", class = "gym_error_argument")
+  expect_true(file.exists(file.path(dir, "python", "mine.py")))
+  file <- withr::local_tempfile(lines = "mine")
+  expect_error(gym_server_bundle(file), "earlier bundle", class = "gym_error_argument")
+  expect_identical(readLines(file), "mine")
+})
+
+test_that("an earlier bundle stays until it is clear how a new one can be made", {
+  local_cache()
+  withr::local_envvar(GYM_UV = "/no/such/uv")
+  dir <- fake_bundle()
+  dir.create(file.path(dir, "wheels"))
+  writeLines("", file.path(dir, "wheels", "a.whl"))
+  expect_error(gym_server_bundle(dir), "GYM_UV", class = "gym_error_install")
+  expect_setequal(list.files(dir, recursive = TRUE), c("bundle.dcf", "wheels/a.whl"))
+
+  empty_bundle(dir, NULL)
+  expect_identical(list.files(dir), "making")
+  # As does one that broke off.
+  writeLines("", file.path(dir, "making", "half"))
+  expect_error(empty_bundle(dir, NULL), NA)
+  expect_identical(list.files(dir, recursive = TRUE), character())
+})
+
 test_that("a bundle for something else says so", {
   local_cache()
   refused <- function(..., words) {
