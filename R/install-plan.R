@@ -53,13 +53,7 @@ find_base_python <- function(with_venv, versions = lock_pythons) {
 # What a Python is: its version, whether the lock files are for it, and whether it can make
 # environments; NULL for what does not run.
 probe_python <- function(python) {
-  said <- tryCatch(
-    processx::run(
-      python, c("-I", "-c", probe), timeout = 60, error_on_status = FALSE,
-      env = tool_environment()
-    )$stdout,
-    error = function(cnd) ""
-  )
+  said <- run_quietly(python, c("-I", "-c", probe), timeout = 60, env = tool_environment())$stdout
   words <- strsplit(trimws(said), " ", fixed = TRUE)[[1L]]
   if (length(words) != 5L || words[[1L]] != "python") {
     return(NULL)

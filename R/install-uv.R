@@ -39,10 +39,7 @@ uv_candidates <- function() {
 }
 
 uv_works <- function(uv) {
-  said <- tryCatch(
-    processx::run(uv, "--version", timeout = 30, error_on_status = FALSE)$stdout,
-    error = function(cnd) ""
-  )
+  said <- run_quietly(uv, "--version")$stdout
   version <- regmatches(said, regexpr("[0-9]+[.][0-9]+[.][0-9]+", said))
   startsWith(said, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }

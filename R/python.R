@@ -85,7 +85,7 @@ pythons_in <- function(places) {
 # On macOS /usr/bin/python3 is then a stand-in that opens a dialog.
 lacks_developer_tools <- function() {
   Sys.info()[["sysname"]] == "Darwin" &&
-    processx::run("/usr/bin/xcode-select", "-p", error_on_status = FALSE)$status != 0L
+    !identical(run_quietly("/usr/bin/xcode-select", "-p", timeout = 5)$status, 0L)
 }
 
 is_windows <- function() .Platform$OS.type == "windows"

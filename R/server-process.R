@@ -94,9 +94,9 @@ own_library_path <- function() {
   if (!nzchar(path) || !file.exists(script)) {
     return(NULL)
   }
-  added <- processx::run(
+  added <- run_quietly(
     "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
-    env = c("current", LD_LIBRARY_PATH = ""), error_on_status = FALSE
+    env = c("current", LD_LIBRARY_PATH = "")
   )$stdout
   # More than once where R has started R.
   while (nzchar(added) && startsWith(path, added)) {
