@@ -12,8 +12,7 @@ run_server <- paste0(
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- tempfile("gym-server-", fileext = ".log")
   use_python(python)
-  # processx draws a name from R's generator.
-  process <- keep_random_state(tryCatch(
+  process <- with_own_mark(tryCatch(
     processx::process$new(
       python, arguments,
       stdin = "|", stdout = "|", stderr = log,

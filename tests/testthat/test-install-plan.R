@@ -1,10 +1,6 @@
 # A Python that says of itself what a test wants.
 fake_python <- function(folder, version = "3.12", bits = "64", venv = "venv") {
-  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
-  python <- file.path(folder, "python3")
-  writeLines(c("#!/bin/sh", paste("echo python", version, "CPython", bits, venv)), python)
-  Sys.chmod(python, "755")
-  python
+  fake_program(file.path(folder, "python3"), paste("echo python", version, "CPython", bits, venv))
 }
 
 local_pythons <- function(..., frame = parent.frame()) {

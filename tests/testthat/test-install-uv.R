@@ -1,9 +1,5 @@
 fake_uv <- function(folder, version = "0.9.0") {
-  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
-  uv <- file.path(folder, "uv")
-  writeLines(c("#!/bin/sh", paste0("echo 'uv ", version, " (abc)'")), uv)
-  Sys.chmod(uv, "755")
-  uv
+  fake_program(file.path(folder, "uv"), paste0("echo 'uv ", version, " (abc)'"))
 }
 
 # uv's release archive, served from a folder, with the checksum that it should have.

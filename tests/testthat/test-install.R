@@ -94,8 +94,7 @@ test_that("an installation that fails leaves what was there before", {
 test_that("a GYM_PYTHON that cannot run the server is named before anything is done", {
   local_cache()
   skip_on_os("windows")
-  old <- withr::local_tempfile(lines = c("#!/bin/sh", "echo python 3.9 CPython 64 venv"))
-  Sys.chmod(old, "755")
+  old <- fake_program(withr::local_tempfile(), "echo python 3.9 CPython 64 venv")
   withr::local_envvar(GYM_PYTHON = old)
   error <- expect_error(gym_server_install(), "which is Python 3.9", class = "gym_error_install")
   expect_match(conditionMessage(error), "Sys.unsetenv(\"GYM_PYTHON\")", fixed = TRUE)

@@ -25,3 +25,21 @@ test_that("finding out what there is leaves R's generator as it was", {
   tool_environment()
   expect_identical(.Random.seed, before)
 })
+
+test_that("the end of one process is not that of others", {
+  skip_on_os("windows")
+  folder <- withr::local_tempdir()
+  trials <- lapply(1:2, function(i) {
+    set.seed(1)
+    begin_trial(fake_program(file.path(folder, i), "exec sleep 60"))
+  })
+  trials[[1L]]$process$kill_tree()
+  expect_true(trials[[2L]]$process$is_alive())
+  trials[[2L]]$process$kill_tree()
+
+  set.seed(1)
+  server <- local_server()
+  set.seed(1)
+  run_quietly("/bin/sh", c("-c", "exit 0"))
+  expect_type(env_list_all(server), "list")
+})
