@@ -120,13 +120,22 @@ bring_uv <- function(call) {
 
 download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
-  handle <- curl::new_handle(failonerror = TRUE, followlocation = TRUE, connecttimeout = 30)
+  handle <- curl::new_handle(
+    failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
+    # Bytes in a second, and for how many seconds: one that stands still would never end.
+    low_speed_limit = 100, low_speed_time = 60,
+    noprogress = FALSE, progressfunction = function(down, up) {
+      keep_turn()
+      TRUE
+    }
+  )
   certificates <- Sys.getenv("SSL_CERT_FILE")
   if (nzchar(certificates)) {
     curl::handle_setopt(handle, cainfo = certificates)
   }
   tryCatch(
-    curl::curl_download(url, archive, handle = handle),
+    # Unlike curl_download() it leaves the handle's progress alone.
+    curl::curl_fetch_disk(url, archive, handle = handle),
     error = function(cnd) {
       write_log(conditionMessage(cnd))
       abort_tool(

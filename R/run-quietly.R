@@ -32,5 +32,6 @@ run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
     ),
     error = function(cnd) silent
   ))
+  keep_turn()
   if (isTRUE(run$timeout)) silent else run[c("status", "stdout")]
 }
