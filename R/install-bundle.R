@@ -197,7 +197,7 @@ bundle_plan <- function(dir, extras, call) {
   }
   list(
     how = if (is.null(uv)) "python" else "uv", tool = if (is.null(uv)) python else uv,
-    folder = next_folder(), extras = extras, bundle = bundle, base_python = python,
+    extras = extras, bundle = bundle, base_python = python,
     megabytes = c(download = 0, disk = lock_megabytes(extras)[["disk"]])
   )
 }

@@ -58,6 +58,15 @@ test_that("pip installs it where there is no uv", {
   expect_false(failed(try_environment(python, character())))
 })
 
+test_that("a Python that only ends in order cannot run the server", {
+  skip_on_os("windows")
+  local_cache()
+  there <- fake_installation()
+  expect_identical(installed_server()$folder, there)
+  expect_true(failed(try_environment(environment_python(there), character())))
+  expect_false(has_all(installed_server(), character()))
+})
+
 test_that("who says no gets nothing, and who says yes is asked once", {
   local_cache()
   local_failing_uv("error: Failed to fetch")
