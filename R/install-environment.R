@@ -7,6 +7,7 @@ install_environment <- function(plan, call) {
   folder <- make_folder(call)
   whole <- FALSE
   on.exit(leave_folder(folder, whole))
+  plan <- take_bundled_uv(plan, call)
   cli::cli_inform(c(i = "Installing {describe_plan(plan)}: {describe_download(plan)}."))
   uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
   make_environment(folder, uv, plan, call)
