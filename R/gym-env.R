@@ -37,8 +37,9 @@
 #'     (how many frames make a second of it), the latter three `NULL` where the environment
 #'     has none,
 #'   * `$client`, `$instance_id`: for the classic calls.
-#' @section Errors: As [env_create()]; `gym_error_server_start` when no server
-#'   could be started.
+#' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
+#'   started; `gym_error_install` when a Python environment was to be installed for it, and
+#'   could not be.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

@@ -19,7 +19,7 @@
 #' and the other machines need a Python of that version, too: the function says so.
 #'
 #' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
-#'   is replaced, anything else refused.
+#'   is replaced as soon as it is clear how a new one can be made, anything else refused.
 #' @param extras The extras that the bundle shall have, as for [gym_server_install()].
 #' @return `dir`, invisibly.
 #' @section Errors: `gym_error_install` when something could not be downloaded, with what to do;
@@ -33,15 +33,17 @@ gym_server_bundle <- function(dir, extras = character()) {
   check_string(dir)
   check_extras(extras)
   call <- rlang::current_env()
-  dir <- empty_bundle(dir, call)
+  dir <- absolute_path(dir)
+  check_bundle_place(dir, call)
   extras <- server_extras[server_extras %in% extras]
   in_turn({
     plan <- install_plan(extras, call)
+    dir <- empty_bundle(dir, call)
     cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
     uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
     base <- bundle_python(dir, uv, call)
     download_wheels(dir, base, extras, call)
-    has_uv <- copy_uv(uv, dir)
+    uv_hash <- copy_uv(uv, dir)
   })
   dir.create(file.path(dir, "lock"))
   file.copy(lock_files(extras), file.path(dir, "lock"))
@@ -49,29 +51,40 @@ gym_server_bundle <- function(dir, extras = character()) {
   write.dcf(list(
     System = bundle_system(), Lock = lock_hash(), Extras = paste(extras, collapse = " "),
     Python = probe_python(base$python)$version,
-    Brings = if (has_uv && base$managed) "uv and Python" else if (has_uv) "uv" else "packages"
+    Brings = if (is.null(uv_hash)) "packages" else if (base$managed) "uv and Python" else "uv",
+    UvHash = uv_hash %||% "none"
   ), file.path(dir, "bundle.dcf"))
   unlink(file.path(dir, "making"), recursive = TRUE)
   tell_bundle(read_bundle(dir, call))
   invisible(dir)
 }
 
-empty_bundle <- function(dir, call) {
-  if (length(list.files(dir, all.files = TRUE, no.. = TRUE))) {
-    own <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
-    if (!all(list.files(dir, all.files = TRUE, no.. = TRUE) %in% own)) {
-      gym_abort(
-        paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
-        class = "gym_error_argument",
-        call = call
-      )
-    }
-    unlink(file.path(dir, own), recursive = TRUE)
+bundle_parts <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
+
+# An earlier bundle has bundle.dcf, one that broke off the folder "making": a folder "python"
+# alone may be anybody's.
+check_bundle_place <- function(dir, call) {
+  there <- list.files(dir, all.files = TRUE, no.. = TRUE)
+  is_bundle <- all(there %in% bundle_parts) && any(c("bundle.dcf", "making") %in% there)
+  if (file.exists(dir) && !dir.exists(dir) || length(there) && !is_bundle) {
+    gym_abort(
+      paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
+      class = "gym_error_argument",
+      call = call
+    )
   }
+}
+
+empty_bundle <- function(dir, call) {
+  # Somebody may have put something there while this session waited for its turn.
+  check_bundle_place(dir, call)
+  # First the sign of one that broke off, as removing the rest may be interrupted.
   dir.create(file.path(dir, "making"), recursive = TRUE, showWarnings = FALSE)
   if (!dir.exists(file.path(dir, "making"))) {
     abort_install(paste0("The folder ", dir, " cannot be made."), call = call)
   }
+  unlink(file.path(dir, setdiff(bundle_parts, "making")), recursive = TRUE)
+  unlink(list.files(file.path(dir, "making"), full.names = TRUE), recursive = TRUE)
   normalizePath(dir, winslash = "/")
 }
 
@@ -116,16 +129,19 @@ download_wheels <- function(dir, base, extras, call) {
   }
 }
 
+# Returns the copy's SHA-256, NULL when there is none.
 copy_uv <- function(uv, dir) {
   if (is.null(uv)) {
-    return(FALSE)
+    return(NULL)
   }
   place <- file.path(dir, "uv", uv_name())
   dir.create(dirname(place))
   # What is found on the PATH may only call the real one.
-  copied <- file.copy(uv, place) && uv_works(place)
-  if (!copied) unlink(dirname(place), recursive = TRUE)
-  copied
+  if (file.copy(uv, place) && uv_works(place)) {
+    return(file_sha256(place))
+  }
+  unlink(dirname(place), recursive = TRUE)
+  NULL
 }
 
 tell_bundle <- function(bundle) {
@@ -147,11 +163,12 @@ bundle_system <- function() {
 }
 
 read_bundle <- function(dir, call) {
+  dir <- absolute_path(dir)
   fields <- tryCatch(
     read.dcf(file.path(dir, "bundle.dcf"))[1L, ], error = function(cnd) NULL,
     warning = function(cnd) NULL
   )
-  if (!all(c("System", "Lock", "Extras", "Python", "Brings") %in% names(fields))) {
+  if (!all(c("System", "Lock", "Extras", "Python", "Brings", "UvHash") %in% names(fields))) {
     abort_bundle(
       paste0("There is no whole bundle in ", dir, "."),
       "`gym_server_bundle()` makes one; one that broke off has no file bundle.dcf.", call
@@ -162,7 +179,8 @@ read_bundle <- function(dir, call) {
   list(
     dir = dir, system = fields[["System"]], lock = fields[["Lock"]],
     extras = strsplit(fields[["Extras"]], " ", fixed = TRUE)[[1L]], python = fields[["Python"]],
-    uv = if (file.exists(uv)) uv, brings_python = fields[["Brings"]] == "uv and Python"
+    uv = if (fields[["UvHash"]] != "none") uv, hash_of_uv = fields[["UvHash"]],
+    brings_python = fields[["Brings"]] == "uv and Python"
   )
 }
 
@@ -170,12 +188,17 @@ abort_bundle <- function(problem, mend, call) {
   abort_install(c(problem, i = mend), call = call)
 }
 
-# As install_plan(), for what a bundle has.
+# As install_plan(), for what a bundle has. Its uv, `bundle$uv`, is to be taken by
+# take_bundled_uv() before it is run.
 bundle_plan <- function(dir, extras, call) {
   bundle <- read_bundle(dir, call)
   check_bundle(bundle, extras, call)
+  plan_from_bundle(bundle, extras, call)
+}
+
+plan_from_bundle <- function(bundle, extras, call) {
   # Another uv would bring another Python than the one whose archive is there.
-  uv <- bundle_uv(bundle) %||% find_uv(call)
+  uv <- if (is.null(bundle$uv)) find_uv(call) else bundled_uv()
   python <- if (is.null(uv) || !bundle$brings_python) {
     find_base_python(with_venv = is.null(uv), versions = bundle$python) %||% abort_bundle(
       paste0("The bundle is for Python ", bundle$python, " and brings none."),
@@ -186,7 +209,7 @@ bundle_plan <- function(dir, extras, call) {
   }
   list(
     how = if (is.null(uv)) "python" else "uv", tool = if (is.null(uv)) python else uv,
-    folder = next_folder(), extras = extras, bundle = bundle, base_python = python,
+    extras = extras, bundle = bundle, base_python = python,
     megabytes = c(download = 0, disk = lock_megabytes(extras)[["disk"]])
   )
 }
@@ -216,14 +239,33 @@ check_bundle <- function(bundle, extras, call) {
   }
 }
 
-# A stick or a share may not let programs run.
-bundle_uv <- function(bundle) {
+# Where a bundle's uv is copied to: a stick or a share may not let programs run.
+bundled_uv <- function() file.path(install_root(), "uv", "bundle", uv_name())
+
+# Copy the bundle's uv, unless that was done before, and run it only when it is the one that was
+# put there. Where it does not run another is looked for. Returns the plan.
+take_bundled_uv <- function(plan, call) {
+  bundle <- plan$bundle
   if (is.null(bundle$uv)) {
-    return(NULL)
+    return(plan)
   }
-  uv <- file.path(install_root(), "uv", "bundle", uv_name())
-  dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
-  file.copy(bundle$uv, uv, overwrite = TRUE)
-  Sys.chmod(uv, "755")
-  if (uv_works(uv)) uv
+  uv <- bundled_uv()
+  if (!has_hash(uv, bundle$hash_of_uv)) {
+    dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
+    if (!has_hash(bundle$uv, bundle$hash_of_uv)) {
+      abort_bundle(
+        paste0("The uv in ", bundle$dir, " is not the one that was put there, and was not run."),
+        "It was damaged or changed on the way: copy the bundle again, or make it anew.", call
+      )
+    }
+    file.copy(bundle$uv, uv, overwrite = TRUE)
+    Sys.chmod(uv, "755")
+  }
+  if (has_hash(uv, bundle$hash_of_uv) && uv_works(uv)) {
+    return(plan)
+  }
+  bundle$uv <- NULL
+  plan_from_bundle(bundle, plan$extras, call)
 }
+
+has_hash <- function(path, hash) file.exists(path) && identical(file_sha256(path), hash)

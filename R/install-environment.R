@@ -7,6 +7,7 @@ install_environment <- function(plan, call) {
   folder <- make_folder(call)
   whole <- FALSE
   on.exit(leave_folder(folder, whole))
+  plan <- take_bundled_uv(plan, call)
   cli::cli_inform(c(i = "Installing {describe_plan(plan)}: {describe_download(plan)}."))
   uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
   make_environment(folder, uv, plan, call)
@@ -114,7 +115,8 @@ install_packages <- function(folder, uv, plan, call) {
   }
 }
 
-# Import the server as it will be run, and look for what the extras bring.
+# Import the server as it will be run, and look for what the extras bring. An exit status of 0
+# alone says little: that of an empty file is 0, too.
 try_environment <- function(python, extras) {
   modules <- c(
     box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
@@ -124,10 +126,17 @@ try_environment <- function(python, extras) {
     "import importlib.util",
     "import gym_server.cli, gymnasium.envs.classic_control, pygame",
     sprintf("if not importlib.util.find_spec('%s'): raise SystemExit('%s is missing')",
-            modules, modules)
+            modules, modules),
+    sprintf("print('%s')", it_runs)
   )
-  run_tool(python, c("-c", paste(script, collapse = "\n")), env = c(
+  output <- run_tool(python, c("-c", paste(script, collapse = "\n")), env = c(
     PYTHONPATH = system.file("server", package = "gym"), PYTHONDONTWRITEBYTECODE = "1",
     PYGAME_HIDE_SUPPORT_PROMPT = "1"
   ))
+  if (!failed(output) && !it_runs %in% trimws(output)) {
+    attr(output, "status") <- -1L
+  }
+  output
 }
+
+it_runs <- "gym_server can be run"

@@ -6,11 +6,31 @@
 #                                     /installed    the marker, written last: what is in it
 #                                     /used-by/PID  the R sessions that use it or are making it
 
-install_root <- function() tools::R_user_dir("gym", "cache")
+install_root <- function() cache_of("gym")
+
+cache_of <- function(package) absolute_path(tools::R_user_dir(package, "cache"))
+
+# Tools run elsewhere and take "~" literally. normalizePath() would say another path once it
+# exists, where a folder above is a link.
+absolute_path <- function(path) {
+  path <- path.expand(path)
+  if (is_windows()) {
+    path <- chartr("\\", "/", path)
+  }
+  if (grepl("^(/|[A-Za-z]:/)", path)) path else file.path(getwd(), path)
+}
 
 install_folders <- function() {
   folders <- list.files(install_root(), "^[0-9a-f]{12}-[0-9]+$", full.names = TRUE)
   folders[order(folder_number(folders), decreasing = TRUE)]
+}
+
+# Of what could be renamed, but not deleted yet.
+given_up_end <- "-old"
+
+given_up_folders <- function() {
+  pattern <- paste0("^[0-9a-f]{12}-[0-9]+", given_up_end, "$")
+  list.files(install_root(), pattern, full.names = TRUE)
 }
 
 folder_number <- function(folders) as.integer(sub(".*-", "", basename(folders)))
@@ -163,6 +183,7 @@ folder_of <- function(python) dirname(dirname(dirname(python)))
 
 # Remove all folders but one, as far as no session uses them: the rest is for the next time.
 remove_other_folders <- function(keep) {
+  unlink(given_up_folders(), recursive = TRUE, force = TRUE)
   for (folder in setdiff(install_folders(), keep)) {
     # From here on nobody takes it for an environment.
     unlink(file.path(folder, "installed"))
@@ -175,7 +196,8 @@ remove_other_folders <- function(keep) {
 remove_folder <- function(folder) {
   if (is_windows()) {
     # Fails while a file in it is in use; deleting would leave half of it.
-    given_up <- paste0(folder, "-old")
+    given_up <- paste0(folder, given_up_end)
+    unlink(given_up, recursive = TRUE, force = TRUE)
     if (!suppressWarnings(file.rename(folder, given_up))) {
       return(invisible())
     }

@@ -6,9 +6,8 @@
 #' @param extras All extras that the environment will hold.
 #' @return A list: `how`, `"uv"` (with the uv found), `"python"` (a Python's venv and pip) or
 #'   `"download"` (uv itself is downloaded first); `tool`, the path of the uv or the Python,
-#'   `NULL` for a download; `folder`, the folder that will be made; `megabytes`, about how much
-#'   is downloaded and how much it takes on the disk, a numeric vector with the names `download`
-#'   and `disk`; `extras`.
+#'   `NULL` for a download; `megabytes`, about how much is downloaded and how much it takes on
+#'   the disk, a numeric vector with the names `download` and `disk`; `extras`.
 #' @noRd
 install_plan <- function(extras = character(), call = rlang::caller_env()) {
   uv <- find_uv(call)
@@ -20,8 +19,7 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
   }
   megabytes <- megabytes + switch(how, download = uv_megabytes, python = pip_megabytes, 0)
   list(
-    how = how, tool = if (is.null(uv)) python else uv, folder = next_folder(),
-    megabytes = megabytes, extras = extras
+    how = how, tool = if (is.null(uv)) python else uv, megabytes = megabytes, extras = extras
   )
 }
 
@@ -53,13 +51,7 @@ find_base_python <- function(with_venv, versions = lock_pythons) {
 # What a Python is: its version, whether the lock files are for it, and whether it can make
 # environments; NULL for what does not run.
 probe_python <- function(python) {
-  said <- tryCatch(
-    processx::run(
-      python, c("-I", "-c", probe), timeout = 60, error_on_status = FALSE,
-      env = tool_environment()
-    )$stdout,
-    error = function(cnd) ""
-  )
+  said <- run_quietly(python, c("-I", "-c", probe), timeout = 60, env = tool_environment())$stdout
   words <- strsplit(trimws(said), " ", fixed = TRUE)[[1L]]
   if (length(words) != 5L || words[[1L]] != "python") {
     return(NULL)

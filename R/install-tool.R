@@ -27,7 +27,7 @@ install_log <- function() file.path(install_root(), "install.log")
 #' @noRd
 run_tool <- function(command, arguments, env = character()) {
   write_log(paste(c(">", command, arguments), collapse = " "))
-  process <- keep_random_state(tryCatch(
+  process <- with_own_mark(tryCatch(
     processx::process$new(
       command, arguments,
       stdout = "|", stderr = "2>&1", env = tool_environment(env),

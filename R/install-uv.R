@@ -5,13 +5,19 @@ uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 # --managed-python came not long before.
 least_uv <- "0.7.0"
 
-# The first uv that runs and is new enough; NULL when there is none.
-find_uv <- function(call = rlang::caller_env()) {
+#' Find uv
+#' @param within Seconds in which all must have been asked, each in its share of them; `NULL`
+#'   gives each the time that a program may take on a busy machine.
+#' @return The path of the first that runs and is new enough; `NULL` when there is none.
+#' @noRd
+find_uv <- function(call = rlang::caller_env(), within = NULL) {
   named <- Sys.getenv("GYM_UV")
   if (!nzchar(named)) {
-    return(Find(uv_works, uv_candidates()))
+    candidates <- uv_candidates()
+    timeout <- if (is.null(within)) 30 else within / max(1L, length(candidates))
+    return(Find(function(uv) uv_works(uv, timeout), candidates))
   }
-  if (!uv_works(path.expand(named))) {
+  if (!uv_works(path.expand(named), within %||% 30)) {
     abort_install(
       c(
         paste0("The variable GYM_UV names ", named, ", which is no uv that can be used."),
@@ -32,17 +38,14 @@ uv_candidates <- function() {
     if (reticulate != "managed") path.expand(reticulate),
     unname(Sys.which("uv")),
     file.path(home, ".local", "bin", uv_name()),
-    file.path(tools::R_user_dir("reticulate", "cache"), "uv", "bin", uv_name()),
+    file.path(cache_of("reticulate"), "uv", "bin", uv_name()),
     brought_uv()
   )
   unique(places[file.exists(places) & !dir.exists(places)])
 }
 
-uv_works <- function(uv) {
-  said <- tryCatch(
-    processx::run(uv, "--version", timeout = 30, error_on_status = FALSE)$stdout,
-    error = function(cnd) ""
-  )
+uv_works <- function(uv, timeout = 30) {
+  said <- run_quietly(uv, "--version", timeout)$stdout
   version <- regmatches(said, regexpr("[0-9]+[.][0-9]+[.][0-9]+", said))
   startsWith(said, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
@@ -89,13 +92,14 @@ has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 # Where the pinned uv is put.
 brought_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Download the pinned uv, unless that was done before. Nothing of the archive is unpacked before
+# Download the pinned uv, unless that was done before and it still runs. Nothing of the archive is unpacked before
 # its checksum is known to be right. UV_DOWNLOAD_URL is what uv's own installer takes.
 bring_uv <- function(call) {
   uv <- brought_uv()
-  if (file.exists(uv)) {
+  if (file.exists(uv) && uv_works(uv)) {
     return(uv)
   }
+  unlink(uv)
   target <- uv_target()
   if (!target %in% names(uv_release$checksums)) {
     abort_install(
@@ -123,13 +127,22 @@ bring_uv <- function(call) {
 
 download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
-  handle <- curl::new_handle(failonerror = TRUE, followlocation = TRUE, connecttimeout = 30)
+  handle <- curl::new_handle(
+    failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
+    # Bytes in a second, and for how many seconds: one that stands still would never end.
+    low_speed_limit = 100, low_speed_time = 60,
+    noprogress = FALSE, progressfunction = function(down, up) {
+      keep_turn()
+      TRUE
+    }
+  )
   certificates <- Sys.getenv("SSL_CERT_FILE")
   if (nzchar(certificates)) {
     curl::handle_setopt(handle, cainfo = certificates)
   }
   tryCatch(
-    curl::curl_download(url, archive, handle = handle),
+    # Unlike curl_download() it leaves the handle's progress alone.
+    curl::curl_fetch_disk(url, archive, handle = handle),
     error = function(cnd) {
       write_log(conditionMessage(cnd))
       abort_tool(

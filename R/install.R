@@ -99,8 +99,13 @@ confirm_install <- function(plan, call = rlang::caller_env()) {
 }
 
 describe_plan <- function(plan) {
-  uv <- paste0(if (plan$how == "download") paste("downloading uv", uv_release$version),
-               if (plan$how == "uv") paste("with", plan$tool))
+  uv <- if (plan$how == "download") {
+    paste("downloading uv", uv_release$version)
+  } else if (is.null(plan$bundle$uv)) {
+    paste("with", plan$tool)
+  } else {
+    "with the bundle's uv"
+  }
   python <- if (!is.null(plan$base_python)) {
     paste(" for", plan$base_python)
   } else if (plan$how != "python") {

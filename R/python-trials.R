@@ -26,7 +26,7 @@ say_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys
 # Returns the running process and its files, NULL for what cannot be run.
 begin_trial <- function(python) {
   output <- tempfile("gym-python-", fileext = c(".out", ".err"))
-  process <- keep_random_state(tryCatch(
+  process <- with_own_mark(tryCatch(
     processx::process$new(
       python, c("-c", paste0(say_version, run_server), "--version"),
       stdout = output[[1L]], stderr = output[[2L]], env = server_environment(),

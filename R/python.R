@@ -40,8 +40,8 @@ named_python_words <- function(named, refusals, python) {
     paste0("The Python that ", by, " names cannot run the server."),
     x = paste0(named, ": ", refusals),
     i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
-      paste("What it lacks, in a terminal:", shQuote(named), "-m pip install",
-            shQuote(normalizePath(system.file("server", package = "gym"))))
+      paste("What it lacks, in a terminal:", quote_for_terminal(named), "-m pip install",
+            quote_for_terminal(normalizePath(system.file("server", package = "gym"))))
     },
     i = paste0(
       "Without ", by, unset,
@@ -49,6 +49,8 @@ named_python_words <- function(named, refusals, python) {
     )
   )
 }
+
+quote_for_terminal <- function(path) shQuote(path, if (is_windows()) "cmd" else "sh")
 
 # The Python that somebody chose, NULL when nobody did.
 named_python <- function(python) {
@@ -85,7 +87,7 @@ pythons_in <- function(places) {
 # On macOS /usr/bin/python3 is then a stand-in that opens a dialog.
 lacks_developer_tools <- function() {
   Sys.info()[["sysname"]] == "Darwin" &&
-    processx::run("/usr/bin/xcode-select", "-p", error_on_status = FALSE)$status != 0L
+    !identical(run_quietly("/usr/bin/xcode-select", "-p", timeout = 5)$status, 0L)
 }
 
 is_windows <- function() .Platform$OS.type == "windows"

@@ -12,8 +12,7 @@ run_server <- paste0(
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- tempfile("gym-server-", fileext = ".log")
   use_python(python)
-  # processx draws a name from R's generator.
-  process <- keep_random_state(tryCatch(
+  process <- with_own_mark(tryCatch(
     processx::process$new(
       python, arguments,
       stdin = "|", stdout = "|", stderr = log,
@@ -94,9 +93,9 @@ own_library_path <- function() {
   if (!nzchar(path) || !file.exists(script)) {
     return(NULL)
   }
-  added <- processx::run(
+  added <- run_quietly(
     "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
-    env = c("current", LD_LIBRARY_PATH = ""), error_on_status = FALSE
+    env = c("current", LD_LIBRARY_PATH = "")
   )$stdout
   # More than once where R has started R.
   while (nzchar(added) && startsWith(path, added)) {

@@ -10,7 +10,8 @@
 #'
 #' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
-#' @section Errors: `gym_error_server_start` when no server could be started.
+#' @section Errors: `gym_error_server_start` when no server could be started;
+#'   `gym_error_install` when a Python environment was to be installed first, and could not be.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' gym_client()
@@ -81,7 +82,8 @@ is_running <- function(base) {
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own words: no
-#'   Python can run it, the port is taken, it did not start in time;
+#'   Python can run it, the port is taken, it did not start in time; `gym_error_install`
+#'   when a Python environment was to be installed first, and could not be;
 #'   `gym_error_argument`.
 #' @seealso [gym_server_stop()], [gym_server_log()], [gym_client()]
 #' @export

@@ -69,11 +69,20 @@ folder_megabytes <- function(folder) {
 
 sitrep_uv <- function() {
   tryCatch(
-    finding("Python", "uv", find_uv() %||% "not found, it would be downloaded if needed"),
+    finding("Python", "uv", find_uv(within = 3) %||% no_uv_words()),
     gym_error = function(cnd) {
       finding("Python", "uv", conditionMessage(cnd), "wrong", "Sys.unsetenv(\"GYM_UV\")")
     }
   )
+}
+
+no_uv_words <- function() {
+  found <- uv_candidates()
+  if (length(found)) {
+    paste(paste(found, collapse = ", "), "cannot be used (too old, or without an answer)")
+  } else {
+    "not found, it would be downloaded if needed"
+  }
 }
 
 without_password <- function(address) sub("//[^/@]*@", "//***@", address)

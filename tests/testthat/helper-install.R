@@ -53,23 +53,27 @@ fake_installation <- function(number = 1L, extras = character(), hash = lock_has
     dir.create(file.path(folder, site, package), recursive = TRUE)
   }
   python <- environment_python(folder)
-  dir.create(dirname(python), showWarnings = FALSE)
-  writeLines("#!/bin/sh", python)
-  Sys.chmod(python, "755")
+  fake_program(python)
   write_marker(folder, extras, call = NULL)
   folder
+}
+
+# A program that is a shell script.
+fake_program <- function(path, ...) {
+  dir.create(dirname(path), recursive = TRUE, showWarnings = FALSE)
+  writeLines(c("#!/bin/sh", ...), path)
+  Sys.chmod(path, "755")
+  path
 }
 
 # A uv that fails in a given way.
 local_failing_uv <- function(words, frame = parent.frame()) {
   testthat::skip_on_os("windows")
   folder <- withr::local_tempdir(.local_envir = frame)
-  uv <- file.path(folder, "uv")
-  writeLines(c(
-    "#!/bin/sh", "if [ \"$1\" = --version ]; then echo 'uv 0.99.0'; exit; fi",
+  uv <- fake_program(
+    file.path(folder, "uv"), "if [ \"$1\" = --version ]; then echo 'uv 0.99.0'; exit; fi",
     "cat <<'END'", words, "END", "exit 2"
-  ), uv)
-  Sys.chmod(uv, "755")
+  )
   withr::local_envvar(GYM_UV = uv, .local_envir = frame)
   uv
 }

@@ -81,6 +81,31 @@ test_that("two sessions never make the same folder", {
   expect_identical(list.files(file.path(second, "used-by")), character())
 })
 
+test_that("the cache folder's path is whole, also before it exists", {
+  home <- withr::local_tempdir()
+  withr::local_dir(home)
+  withr::local_envvar(HOME = home, R_USER_CACHE_DIR = "~/my cache")
+  skip_on_os("windows")
+  expect_identical(install_root(), file.path(path.expand("~"), "my cache", "R", "gym"))
+  withr::local_envvar(R_USER_CACHE_DIR = "here")
+  expect_identical(install_root(), file.path(getwd(), "here", "R", "gym"))
+  expect_false(dir.exists("here"))
+  expect_identical(absolute_path("C:/x"), "C:/x")
+  # A tool writes where R looks.
+  dir.create(install_root(), recursive = TRUE)
+  run_tool("/bin/sh", c("-c", "echo x > \"$0\"", file.path(install_root(), "x")))
+  expect_true(file.exists(file.path(home, "here", "R", "gym", "x")))
+})
+
+test_that("what could only be renamed goes the next time", {
+  local_cache()
+  kept <- fake_installation(2)
+  given_up <- paste0(file.path(install_root(), paste0(lock_hash(), "-1")), "-old")
+  dir.create(file.path(given_up, "venv"), recursive = TRUE)
+  remove_other_folders(kept)
+  expect_identical(list.files(install_root()), basename(kept))
+})
+
 test_that("a cache folder that cannot be made is an error that says what to set", {
   file <- withr::local_tempfile(lines = "not a folder")
   withr::local_envvar(R_USER_CACHE_DIR = file)

@@ -1,9 +1,5 @@
 fake_uv <- function(folder, version = "0.9.0") {
-  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
-  uv <- file.path(folder, "uv")
-  writeLines(c("#!/bin/sh", paste0("echo 'uv ", version, " (abc)'")), uv)
-  Sys.chmod(uv, "755")
-  uv
+  fake_program(file.path(folder, "uv"), paste0("echo 'uv ", version, " (abc)'"))
 }
 
 # uv's release archive, served from a folder, with the checksum that it should have.
@@ -46,6 +42,43 @@ test_that("uv is looked for in the order that the help page tells", {
   expect_false("managed" %in% uv_candidates())
 })
 
+test_that("one that hangs is passed over, and all are asked within the limit", {
+  skip_on_os("windows")
+  local_cache()
+  folder <- withr::local_tempdir()
+  hangs <- fake_program(file.path(folder, "hangs", "uv"), "sleep 60")
+  local_binding("uv_candidates", function() c(hangs, fake_uv(file.path(folder, "works"))))
+  limits <- numeric()
+  local_binding("uv_works", function(uv, timeout) {
+    limits <<- c(limits, timeout)
+    uv != hangs
+  })
+  withr::local_envvar(GYM_UV = NA)
+  expect_identical(find_uv(within = 3), file.path(folder, "works", "uv"))
+  expect_equal(sum(limits), 3)
+  find_uv()
+  expect_equal(limits[3:4], c(30, 30))
+})
+
+test_that("a uv that does not answer is told of by gym_sitrep() soon", {
+  skip_on_os("windows")
+  local_cache()
+  folder <- withr::local_tempdir()
+  hangs <- fake_program(file.path(folder, "uv"), "sleep 60")
+  local_binding("uv_candidates", function() hangs)
+  withr::local_envvar(GYM_UV = NA)
+  asked <- NULL
+  real <- run_quietly
+  local_binding("run_quietly", function(command, arguments, timeout = 30, ...) {
+    asked <<- timeout
+    real(command, arguments, 0.5, ...)
+  })
+  row <- sitrep_uv()
+  expect_match(row$finding, paste(hangs, "cannot be used"), fixed = TRUE)
+  expect_identical(row$state, "ok")
+  expect_equal(asked, 3)
+})
+
 test_that("GYM_UV must name a uv that runs", {
   local_cache()
   withr::local_envvar(GYM_UV = "/no/such/uv")
@@ -81,6 +114,10 @@ test_that("uv is brought, and run only when its checksum is right", {
   expect_true(uv_works(brought))
   expect_identical(list.files(dirname(brought)), "uv")
   expect_silent(bring_uv(NULL))
+  # What does not run any more is brought anew.
+  writeLines(character(), brought)
+  expect_message(bring_uv(NULL), "Downloading uv")
+  expect_true(uv_works(brought))
 
   unlink(dirname(brought), recursive = TRUE)
   ran <- file.path(folder, "ran")

@@ -58,6 +58,15 @@ test_that("pip installs it where there is no uv", {
   expect_false(failed(try_environment(python, character())))
 })
 
+test_that("a Python that only ends in order cannot run the server", {
+  skip_on_os("windows")
+  local_cache()
+  there <- fake_installation()
+  expect_identical(installed_server()$folder, there)
+  expect_true(failed(try_environment(environment_python(there), character())))
+  expect_false(has_all(installed_server(), character()))
+})
+
 test_that("who says no gets nothing, and who says yes is asked once", {
   local_cache()
   local_failing_uv("error: Failed to fetch")
@@ -94,8 +103,7 @@ test_that("an installation that fails leaves what was there before", {
 test_that("a GYM_PYTHON that cannot run the server is named before anything is done", {
   local_cache()
   skip_on_os("windows")
-  old <- withr::local_tempfile(lines = c("#!/bin/sh", "echo python 3.9 CPython 64 venv"))
-  Sys.chmod(old, "755")
+  old <- fake_program(withr::local_tempfile(), "echo python 3.9 CPython 64 venv")
   withr::local_envvar(GYM_PYTHON = old)
   error <- expect_error(gym_server_install(), "which is Python 3.9", class = "gym_error_install")
   expect_match(conditionMessage(error), "Sys.unsetenv(\"GYM_PYTHON\")", fixed = TRUE)

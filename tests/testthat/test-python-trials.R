@@ -1,21 +1,14 @@
-fake_python <- function(folder, ..., name = "python3") {
-  path <- file.path(folder, name)
-  writeLines(c("#!/bin/sh", ...), path)
-  Sys.chmod(path, "755")
-  path
-}
-
 test_that("each Python is tried, and what it lacks is told", {
   skip_on_os("windows")
   working <- working_python()
   folder <- withr::local_tempdir()
-  bare <- fake_python(
-    folder, "echo 3.12.1",
+  bare <- fake_program(
+    file.path(folder, "python3"), "echo 3.12.1",
     "echo \"gym_server cannot run on this Python (3.12.1, /x (y)): No module named 'flask'\" >&2",
     "exit 78"
   )
-  hanging <- fake_python(folder, "echo 3.11.0; exec sleep 60", name = "hanging")
-  silent <- fake_python(folder, "exit 1", name = "silent")
+  hanging <- fake_program(file.path(folder, "hanging"), "echo 3.11.0; exec sleep 60")
+  silent <- fake_program(file.path(folder, "silent"), "exit 1")
   set.seed(1)
   before <- .Random.seed
   trials <- try_pythons(c(bare, working, silent, "/no/such/python"), timeout = 60)

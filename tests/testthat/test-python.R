@@ -18,6 +18,12 @@ test_that("Python is looked for in the order that the help page tells", {
   expect_identical(python_candidates("/my/python"), "/my/python")
 })
 
+test_that("what is to be typed in a terminal is quoted for the system's own", {
+  expect_identical(quote_for_terminal("a b"), if (is_windows()) "\"a b\"" else "'a b'")
+  local_binding("is_windows", function() TRUE)
+  expect_identical(quote_for_terminal("C:/a b"), "\"C:/a b\"")
+})
+
 test_that("the stand-in for Python of macOS without developer tools is left alone", {
   skip_on_os("windows")
   skip_if_not(any(file.exists(c("/usr/bin/python3", "/usr/bin/python"))), "no Python in /usr/bin")

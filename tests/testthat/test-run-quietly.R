@@ -1,0 +1,45 @@
+test_that("what a program says is returned, and R's generator stays as it was", {
+  skip_on_os("windows")
+  set.seed(1)
+  before <- .Random.seed
+  expect_identical(run_quietly("/bin/sh", c("-c", "echo $A; exit 3"), env = c("current", A = "a")),
+                   list(status = 3L, stdout = "a\n"))
+  expect_identical(run_quietly("/no/such/program", "x"), list(status = NA_integer_, stdout = ""))
+  # What it said before it hung is no answer.
+  expect_identical(run_quietly("/bin/sh", c("-c", "echo a; exec sleep 60"), timeout = 0.5),
+                   list(status = NA_integer_, stdout = ""))
+  expect_identical(.Random.seed, before)
+})
+
+test_that("finding out what there is leaves R's generator as it was", {
+  skip_on_os("windows")
+  local_cache()
+  # Where R's start put folders in front of it a shell is asked.
+  withr::local_envvar(LD_LIBRARY_PATH = "/somewhere")
+  set.seed(1)
+  before <- .Random.seed
+  find_uv()
+  probe_python("/bin/sh")
+  own_library_path()
+  python_candidates()
+  tool_environment()
+  expect_identical(.Random.seed, before)
+})
+
+test_that("the end of one process is not that of others", {
+  skip_on_os("windows")
+  folder <- withr::local_tempdir()
+  trials <- lapply(1:2, function(i) {
+    set.seed(1)
+    begin_trial(fake_program(file.path(folder, i), "exec sleep 60"))
+  })
+  trials[[1L]]$process$kill_tree()
+  expect_true(trials[[2L]]$process$is_alive())
+  trials[[2L]]$process$kill_tree()
+
+  set.seed(1)
+  server <- local_server()
+  set.seed(1)
+  run_quietly("/bin/sh", c("-c", "exit 0"))
+  expect_type(env_list_all(server), "list")
+})
