@@ -72,7 +72,7 @@ other_than_managed <- function(plan, output, call) {
     )
   }
   cli::cli_inform(c(
-    "!" = "uv could not bring a Python; {.path {python}} is taken instead.",
+    i = "uv could not bring a Python of its own; {.path {python}} serves as well.",
     " " = "Why is in {.path {install_log()}}."
   ))
   python

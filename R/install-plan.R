@@ -28,7 +28,7 @@ managed_python_megabytes <- c(download = 35, disk = 110)
 uv_megabytes <- c(download = 20, disk = 40)
 
 # pip itself, and the modules that it compiles.
-pip_megabytes <- c(download = 0, disk = 30)
+pip_megabytes <- c(download = 0, disk = 50)
 
 managed_python_version <- "3.12"
 

@@ -43,8 +43,12 @@ run_tool <- function(command, arguments, env = character()) {
   # Also when the user interrupts.
   on.exit(if (process$is_alive()) process$kill_tree())
   output <- character()
+  # Tells whoever waits that something is going on; moves in a terminal only.
+  spinner <- cli::make_spinner(static = "silent")
+  on.exit(spinner$finish(), add = TRUE)
   repeat {
-    process$poll_io(500L)
+    spinner$spin()
+    process$poll_io(200L)
     lines <- process$read_output_lines()
     if (length(lines)) write_log(lines)
     output <- c(output, lines)

@@ -47,16 +47,22 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   call <- rlang::current_env()
   check_named_python(call)
   wanted <- wanted_extras(extras)
+  # A bundle that does not fit is said to be one also where it is not needed.
+  plan <- if (!is.null(offline)) bundle_plan(offline, wanted, call)
   there <- installed_server()
   if (has_all(there, wanted)) {
-    cli::cli_inform(c(v = "The server is installed in {.path {there$folder}}."))
+    needed <- if (!is.null(plan)) "; the bundle was not needed"
+    cli::cli_inform(c(v = "The server is installed already, in {.path {there$folder}}{needed}."))
+    if (length(install_folders()) > 1L) {
+      in_turn(remove_other_folders(keep = there$folder))
+    }
     return(invisible(there$python))
   }
-  plan <- if (is.null(offline)) install_plan(wanted, call) else bundle_plan(offline, wanted, call)
+  plan <- plan %||% install_plan(wanted, call)
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
-  python <- in_turn({
+  python <- telling_of_interrupts(in_turn({
     there <- installed_server()
     if (has_all(there, wanted)) {
       cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
@@ -64,7 +70,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
     } else {
       install_environment(plan, call)
     }
-  })
+  }))
   tell_what_comes_first(python)
   invisible(python)
 }
@@ -77,6 +83,12 @@ check_no_dots <- function(..., call = rlang::caller_env()) {
       call = call
     )
   }
+}
+
+telling_of_interrupts <- function(code) {
+  withCallingHandlers(code, interrupt = function(cnd) {
+    cli::cli_inform(c("!" = "Interrupted: what was begun is taken away again."))
+  })
 }
 
 wanted_extras <- function(extras) {
@@ -95,7 +107,8 @@ confirm_install <- function(plan, call = rlang::caller_env()) {
     sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
-  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = TRUE, call = call)
+  # No by default: an empty line of a pasted script must not bring megabytes.
+  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = FALSE, call = call)
 }
 
 describe_plan <- function(plan) {
@@ -118,7 +131,7 @@ describe_plan <- function(plan) {
 }
 
 describe_packages <- function(extras) {
-  paste0("Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
+  paste0("the games of Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
 }
 
 describe_download <- function(plan) {

@@ -32,8 +32,10 @@ test_that("an installation runs the server, takes extras and mends itself", {
   local_env("LunarLander-v3", client = local_server())$reset()
 
   # All there: nothing is done, and what was asked for before is kept.
-  expect_message(third <- gym_server_install(), "is installed in")
+  expect_message(third <- gym_server_install(), "is installed already")
   expect_identical(third, second)
+  # What was left for that server goes with it.
+  expect_length(install_folders(), 1L)
 
   # A file inside a package, which only the trial notices.
   site <- file.path(installed_server()$folder, read_marker(installed_server()$folder)$site)
@@ -77,7 +79,7 @@ test_that("who says no gets nothing, and who says yes is asked once", {
   })
   expect_null(gym_server_install("video", ask = TRUE))
   expect_false(dir.exists(install_root()))
-  expect_match(asked, "Gymnasium (with video)", fixed = TRUE)
+  expect_match(asked, "games of Gymnasium (with video)", fixed = TRUE)
   expect_match(asked, "about [0-9]+ MB to download, [0-9]+ MB on the disk")
   expect_match(asked, install_root(), fixed = TRUE)
   expect_error(suppressMessages(gym_server_install(ask = TRUE)), class = "gym_error_install")
