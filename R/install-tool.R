@@ -43,11 +43,11 @@ run_tool <- function(command, arguments, env = character()) {
   # Also when the user interrupts.
   on.exit(if (process$is_alive()) process$kill_tree())
   output <- character()
-  # Tells whoever waits that something is going on; moves in a terminal only.
-  spinner <- cli::make_spinner(static = "silent")
-  on.exit(spinner$finish(), add = TRUE)
+  # Tells whoever waits that something is going on.
+  spinner <- if (cli::is_dynamic_tty()) cli::make_spinner()
+  on.exit(if (!is.null(spinner)) spinner$finish(), add = TRUE)
   repeat {
-    spinner$spin()
+    if (!is.null(spinner)) spinner$spin()
     process$poll_io(200L)
     lines <- process$read_output_lines()
     if (length(lines)) write_log(lines)
