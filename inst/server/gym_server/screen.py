@@ -120,12 +120,12 @@ class Screen:
                     return shot.body
                 try:
                     self._draw(lane)
-                except _Busy:
-                    return wire.dumps({"number": after, "state": "busy"})
                 finally:
                     with self._changed:
                         self._drawing = False
                         self._changed.notify_all()
+        except _Busy:
+            return wire.dumps({"number": after, "state": "busy"})
         finally:
             with self._changed:
                 self._asking -= 1
@@ -164,11 +164,13 @@ class Screen:
                 if stale and due and not self._drawing:
                     self._drawing = True
                     return None
-                if stale and not self._drawing:
+                if now >= deadline:
                     # One that was never drawn waits no longer than others.
-                    self._changed.wait(max(0.001, min(self._due, deadline) - now))
+                    raise _Busy
+                if stale and not self._drawing:
+                    self._changed.wait(min(self._due, deadline) - now)
                 elif self._drawing or self._wants_call(shot):
-                    self._changed.wait(max(0.001, deadline - now))
+                    self._changed.wait(deadline - now)
 
     def _wants_call(self, shot: Shot | None) -> bool:
         """Ask to be called at the next move; return False when that was just now."""

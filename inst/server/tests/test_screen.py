@@ -283,6 +283,23 @@ def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
     assert state(client, url)["step"] == 1
 
 
+def test_one_never_drawn_whose_turn_is_far_off_is_told_in_time(client, faulty, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    url = faulty("Drawing")
+    instance, _ = watch(url)
+    client.post(f"{url}/reset/")
+    instance.screen._due = time.monotonic() + 3600
+    waits = []
+    wait = instance.screen._changed.wait
+    monkeypatch.setattr(
+        instance.screen._changed, "wait", lambda seconds: (waits.append(seconds), wait(seconds))
+    )
+    thread, seen = in_background(state, client.application.test_client(), url)
+    thread.join(5)
+    assert seen == [{"number": None, "state": "busy"}]
+    assert len(waits) < 5
+
+
 # The end ------------------------------------------------------------------------------------
 
 
