@@ -189,17 +189,19 @@ gif_size <- function(file) {
 #' @export
 print.gym_animation <- function(x, ...) {
   cat(format(x), "\n", sep = "")
-  viewer <- getOption("gym.viewer") %||% if (rlang::is_interactive()) {
-    getOption("viewer") %||% utils::browseURL
-  }
-  if (is.function(viewer) && file.exists(x$file)) {
-    viewer(among_temporary_files(x$file))
+  viewer <- check_viewer()
+  if (file.exists(x$file)) {
+    open_address(among_temporary_files(x$file), viewer)
   }
   invisible(x)
 }
 
 # RStudio's viewer shows no others.
 among_temporary_files <- function(file) {
+  folders <- paste0(normalizePath(c(dirname(file), tempdir()), "/"), "/")
+  if (startsWith(folders[[1L]], folders[[2L]])) {
+    return(file)
+  }
   copy <- tempfile(fileext = ".gif")
   file.copy(file, copy)
   copy

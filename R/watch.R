@@ -34,7 +34,8 @@
 #' `options(gym.viewer = )` has it otherwise, in scripts too: a function, such as
 #' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
 #' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
-#' until the page is there, at most 5 seconds, so that nobody misses the beginning.
+#' until the page is there, at most 5 seconds, so that nobody misses the beginning. If it has
+#' not come by then, as when there is no browser, the address is printed as in a script.
 #'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.
@@ -65,15 +66,8 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
   viewer <- check_viewer(call)
   # A viewer that fails does so once.
   instance$shown <- TRUE
-  if (isFALSE(viewer)) {
-    return(invisible(address))
-  }
-  if (is.function(viewer)) {
-    viewer(address)
-    await_watcher(x, instance)
-  } else if (open_by_default(address)) {
-    await_watcher(x, instance)
-  } else {
+  comes <- open_address(address, viewer) && await_watcher(x, instance)
+  if (!comes && !isFALSE(viewer)) {
     rlang::inform(
       paste0("Watch ", instance$spec$id, " at ", address), class = "gym_message_watch"
     )
@@ -81,41 +75,21 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
   invisible(address)
 }
 
-# What the option says: a function of the address, FALSE for nothing at all, NULL.
-check_viewer <- function(call) {
-  viewer <- getOption("gym.viewer")
-  if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {
-    gym_abort(
-      paste0("The option `gym.viewer` must be a function of an address, or FALSE, not ",
-             describe_argument(viewer), "."),
-      class = "gym_error_argument", argument = "gym.viewer", value = viewer, call = call
-    )
-  }
-  viewer
-}
-
-# Whether it could be done: a machine may have no browser.
-open_by_default <- function(address) {
-  if (!rlang::is_interactive()) {
-    return(FALSE)
-  }
-  # RStudio's pane takes addresses of this machine.
-  pane <- if (is_loopback(address)) getOption("viewer")
-  viewer <- pane %||% utils::browseURL
-  tryCatch(
-    {
-      viewer(address)
-      TRUE
-    },
-    error = function(cnd) FALSE
-  )
-}
-
-# A browser takes a moment to start, and a fast environment would be past all that there
-# is to see.
+#' Wait until somebody watches
+#'
+#' A browser takes a moment to start, and a fast environment would be past all that there is to
+#' see.
+#' @return Whether somebody does, logical: what opens a browser may do nothing, and say nothing.
+#' @noRd
 await_watcher <- function(x, instance) {
   deadline <- Sys.time() + watcher_patience
-  while (Sys.time() < deadline && !isTRUE(get_answer(x, instance$route)$watched)) {
+  repeat {
+    if (isTRUE(get_answer(x, instance$route)$watched)) {
+      return(TRUE)
+    }
+    if (Sys.time() >= deadline) {
+      return(FALSE)
+    }
     Sys.sleep(0.1)
   }
 }

@@ -144,6 +144,36 @@ test_that("it prints where it is, and opens where somebody looks", {
   expect_output(print(animation), animation$file, fixed = TRUE)
 })
 
+test_that("it is printed also where it cannot be opened", {
+  skip_if_not_installed("magick")
+  animation <- animate(short_rollout(max_steps = 3), width = 60)
+  withr::local_options(
+    rlang_interactive = TRUE, gym.viewer = NULL, viewer = NULL,
+    browser = function(url) stop("no display")
+  )
+  expect_output(print(animation), animation$file, fixed = TRUE)
+  withr::local_options(gym.viewer = "firefox")
+  expect_output(
+    expect_error(print(animation), "gym.viewer", class = "gym_error_argument"),
+    animation$file, fixed = TRUE
+  )
+})
+
+test_that("only a file that is not temporary is copied for the viewer", {
+  temporary <- withr::local_tempfile(fileext = ".gif")
+  writeLines("gif", temporary)
+  expect_identical(among_temporary_files(temporary), temporary)
+  folder <- tempfile("gym-", dirname(tempdir()))
+  dir.create(folder)
+  withr::defer(unlink(folder, recursive = TRUE))
+  kept <- file.path(folder, "kept.gif")
+  writeLines("gif", kept)
+  copy <- among_temporary_files(kept)
+  withr::defer(unlink(copy))
+  expect_identical(normalizePath(dirname(copy)), normalizePath(tempdir()))
+  expect_identical(readLines(copy), "gif")
+})
+
 knitted <- function(animation, to) {
   folder <- withr::local_tempdir(.local_envir = parent.frame())
   withr::local_dir(folder)

@@ -99,6 +99,20 @@ test_that("an interactive session opens the pane where there is one, else the br
   expect_message(env$watch(), class = "gym_message_watch")
 })
 
+test_that("the address is printed when nobody came", {
+  local_binding("watcher_patience", 0.3)
+  # What xdg-open does without a display: nothing, and no error.
+  withr::local_options(
+    gym.viewer = NULL, rlang_interactive = TRUE, viewer = NULL, browser = function(url) NULL
+  )
+  env <- local_env()
+  expect_message(env$watch(), "Watch CartPole-v1 at http", class = "gym_message_watch")
+  withr::local_options(gym.viewer = function(address) NULL)
+  expect_message(env$watch(), class = "gym_message_watch")
+  withr::local_options(gym.viewer = FALSE)
+  expect_no_message(env$watch())
+})
+
 test_that("the option gym.viewer may ask for silence, and must make sense", {
   withr::local_options(gym.viewer = FALSE, rlang_interactive = TRUE)
   expect_no_message(env <- local_env(render_mode = "human"))

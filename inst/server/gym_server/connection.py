@@ -91,6 +91,7 @@ class Connection:
         self._passing = _NOT_KEPT in headers
         # In one piece: a body that follows its header is held back until that is acknowledged.
         self._socket.sendall("\r\n".join(head).encode("latin-1") + body)
+        self._passing = False
         return keep
 
     def _respond(self, request: _Request) -> tuple[str, list[tuple[str, str]], bytes]:

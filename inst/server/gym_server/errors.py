@@ -81,6 +81,13 @@ def wrong_length(name: str, found: int, lanes: int, what: str) -> GymServerError
     )
 
 
+def reset_needed(call: str) -> GymServerError:
+    """A call needs an episode, and none runs."""
+    return GymServerError(
+        "reset_needed", f"{call} needs a running episode", "reset the environment first"
+    )
+
+
 def environment_error(error: BaseException) -> GymServerError:
     """Wrap what an environment's own code raised."""
     last_line = traceback.format_exception_only(type(error), error)[-1].strip()

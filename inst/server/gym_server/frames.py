@@ -12,12 +12,20 @@ import sys
 import threading
 import zlib
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import TypeVar
 
 import numpy as np
 
 ResultT = TypeVar("ResultT")
+
+
+# How often who waits for the render thread is asked whether to wait on.
+_BETWEEN_QUESTIONS = 0.02
+
+
+class Occupied(Exception):  # noqa: N818
+    """The render thread has other things to do."""
 
 
 class RenderThread:
@@ -34,6 +42,25 @@ class RenderThread:
             # Drawing calls for drawing, as a monitor does of an environment that always draws.
             return draw(*args)
         return self._executor.submit(self._draw, draw, *args).result()
+
+    def run_while(
+        self, patient: Callable[[], bool], draw: Callable[..., ResultT], *args: object
+    ) -> ResultT:
+        """Run a function on the render thread, unless its turn takes too long to come.
+
+        Args:
+            patient: tells whether to wait on; asked every 20 ms until the function begins.
+            draw: the function.
+            *args: what it is called with.
+
+        Raises:
+            Occupied: it does not run.
+        """
+        future = self._executor.submit(self._draw, draw, *args)
+        while not wait([future], _BETWEEN_QUESTIONS).done:
+            if not patient() and future.cancel():
+                raise Occupied
+        return future.result()
 
     def _draw(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
         self._here.is_render_thread = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
 
@@ -12,21 +11,22 @@ import numpy as np
 from gym_server import spaces
 from gym_server.choices import Choices
 from gym_server.creation import ask
-from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
+from gym_server.errors import GymServerError, invalid_parameter, reset_needed, unknown_instance
 from gym_server.frames import RenderThread, picture
+from gym_server.hold import Hold
 from gym_server.monitor import Monitor
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.observed import entries
 from gym_server.plain import plain
 from gym_server.screen import Screen
-from gym_server.tally import LaneTally, Tally
+from gym_server.tally import LaneTally, Tally, told
 from gym_server.wrappers import draws_when_stepped
 
 
 class Instance:
     """One environment.
 
-    Every method that moves the environment waits for its lock; one that waited while the
+    Every method that moves the environment waits for its hold; one that waited while the
     instance was being closed raises ``unknown_instance``.
     """
 
@@ -51,11 +51,9 @@ class Instance:
         module, colon, name = str(choices.env_id).rpartition(":")
         self.env_id = f"{module}{colon}{env.spec.id if env.spec else name}"
         self._choices = choices
-        self._renderer = renderer
-        self._draws_when_stepped = self._find_out_whether_it_draws()
-        self._lock = threading.Lock()
-        self._held = _Held(self)
-        self.closed = False
+        self.renderer = renderer
+        self.draws_when_stepped = self._find_out_whether_it_draws()
+        self.hold = Hold(self)
         self._monitor: Monitor | None = None
         self._seed_for_reset = choices.seed
         self._was_reset = False
@@ -66,9 +64,9 @@ class Instance:
         # How often the environment has begun to move, and who wants to hear of the next time.
         self.moves = 0
         self.on_move: Callable[[], None] | None = None
-        self.screen = Screen(self, self._lock, (env.metadata or {}).get("render_fps"))
+        self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
         self._for_eyes = choices.render_mode == "human"
-        self._made = self._used = time.monotonic()
+        self._made = time.monotonic()
         if choices.seed is not None:
             self._seed_actions(choices.seed)
 
@@ -127,7 +125,7 @@ class Instance:
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         if self._for_eyes:
             self.screen.pace()
-        with self._held:
+        with self.hold:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed
             self._was_reset = False
@@ -172,7 +170,7 @@ class Instance:
         _refuse_mask("step_mask", mask)
         if for_eyes or self._for_eyes:
             self.screen.pace()
-        with self._held:
+        with self.hold:
             if not self._was_reset:
                 raise reset_needed("step()")
             try:
@@ -205,8 +203,8 @@ class Instance:
         if self.on_move is not None:
             call, self.on_move = self.on_move, None
             call()
-        if self._draws_when_stepped:
-            return self._renderer.run(move, *args)
+        if self.draws_when_stepped:
+            return self.renderer.run(move, *args)
         return move(*args)
 
     def _encode(self, observation: object, tensors: bool) -> object:
@@ -221,7 +219,7 @@ class Instance:
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
-        with self._held:
+        with self.hold:
             return spaces.encode(self.action_space, self.action_space.sample())
 
     def action_contains(self, claim: dict) -> bool:
@@ -239,7 +237,7 @@ class Instance:
             GymServerError: ``cannot_render``, ``reset_needed``, ``invalid_parameter``.
         """
         self.check_lane(lane)
-        with self._held:
+        with self.hold:
             return self._picture(lane)
 
     def check_lane(self, lane: int) -> None:
@@ -263,14 +261,18 @@ class Instance:
                 "cannot_render", f"What {self.env_id} draws is no picture: {error}"
             ) from error
 
+    def draws_on_render_thread(self) -> bool:
+        """Tell whether a picture takes the render thread."""
+        return self._env.render_mode == "rgb_array"
+
     def _draw(self, lane: int) -> object:
-        return self._renderer.run(self._env.render)
+        return self.renderer.run(self._env.render)
 
     def start_monitor(
         self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
-        with self._held:
+        with self.hold:
             if self._monitor is not None:
                 raise GymServerError(
                     "monitor_active",
@@ -278,7 +280,7 @@ class Instance:
                     "close that monitor first",
                 )
             self._monitor = Monitor.start(
-                self._env, root, directory, force, resume, video_every, self._renderer
+                self._env, root, directory, force, resume, video_every, self.renderer
             )
 
     def close_monitor(self) -> None:
@@ -287,7 +289,7 @@ class Instance:
         Raises:
             GymServerError: ``monitor_not_active``.
         """
-        with self._held:
+        with self.hold:
             if self._monitor is None:
                 raise GymServerError(
                     "monitor_not_active", f"Instance {self.instance_id} is not monitored"
@@ -296,8 +298,8 @@ class Instance:
 
     def close(self) -> None:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""
-        with self._held:
-            self.closed = True
+        with self.hold:
+            self.hold.closed = True
             self.screen.end(unknown_instance(self.instance_id))
             try:
                 if self._monitor is not None:
@@ -306,7 +308,7 @@ class Instance:
                 ask(self._close_env)
 
     def _close_env(self) -> None:
-        self._renderer.run(self._env.close)
+        self.renderer.run(self._env.close)
 
     def _finish_monitor(self) -> None:
         monitor, self._monitor = self._monitor, None
@@ -334,7 +336,7 @@ class Instance:
             "wrappers": [wrapper._asdict() for wrapper in self._choices.wrappers],
             "seed": self._choices.seed,
             "age_seconds": now - self._made,
-            "idle_seconds": now - self._used,
+            "idle_seconds": now - self.hold.used,
             "steps": self._steps,
             "episode_steps": self._tally.of(0).step,
             "needs_reset": self._done or not self._was_reset,
@@ -343,24 +345,18 @@ class Instance:
         }
 
     def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a lane; whoever calls it holds the lock.
+        """Return what a watcher sees of a lane; whoever calls it has the hold.
 
         Returns:
             JSON values, among them the observation where there is no picture and the reason
             why there is none; the picture or None.
         """
-        spec = self._env.spec
-        standing = self._tally.of(lane)
         facts = {
             "env_id": self.env_id,
             "lane": lane,
             "lanes": self._num_envs,
-            "state": "ended" if standing.ended else "running",
-            "episode": standing.episode,
-            "step": standing.step,
-            "return": standing.episode_return,
-            "returns": list(self._tally.returns),
-            "reward_threshold": spec.reward_threshold if spec else None,
+            **told(self._tally, lane),
+            "reward_threshold": getattr(self._env.spec, "reward_threshold", None),
             "steps": self._steps,
             "fps": self.screen.fps if self._for_eyes else None,
         }
@@ -376,34 +372,8 @@ class Instance:
         return self._observation
 
 
-class _Held:
-    """The right to move an environment; a context, in which nobody else has it."""
-
-    def __init__(self, instance: Instance) -> None:
-        self._instance = instance
-        self._lock = instance._lock
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-        if self._instance.closed:
-            self._lock.release()
-            raise unknown_instance(self._instance.instance_id)
-        self._instance._used = time.monotonic()
-
-    def __exit__(self, *_: object) -> None:
-        self._instance._used = time.monotonic()
-        self._lock.release()
-
-
 def _refuse_mask(name: str, mask: np.ndarray | None) -> None:
     if mask is not None:
         raise GymServerError(
             "not_supported", f"'{name}' is for environments with lanes", "create it with num_envs"
         )
-
-
-def reset_needed(call: str) -> GymServerError:
-    """A call needs an episode, and none runs."""
-    return GymServerError(
-        "reset_needed", f"{call} needs a running episode", "reset the environment first"
-    )

@@ -14,8 +14,9 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from gym_server import wire
-from gym_server.errors import GymServerError, unknown_instance
+from gym_server.errors import GymServerError
 from gym_server.frames import png
+from gym_server.glimpse import Busy, glimpse
 
 if TYPE_CHECKING:
     from gym_server.instance import Instance
@@ -37,16 +38,9 @@ _STAYS_SECONDS = 2.0
 # Pictures of lanes that nobody has asked for since.
 _KEPT_SECONDS = 10.0
 
-# How long a step may keep a watcher waiting before it hears of that.
-_PATIENCE = 2.0
-
 # What environments without a speed of their own move at, and the longest that one step waits.
 _USUAL_FPS = 30.0
 _LONGEST_PACE = 1.0
-
-
-class _Busy(Exception):  # noqa: N818
-    """A step takes so long that nothing can be drawn."""
 
 
 class Shot(NamedTuple):
@@ -68,16 +62,14 @@ class Shot(NamedTuple):
 class Screen:
     """Shows one environment to its watchers, and keeps its pace where that is wanted."""
 
-    def __init__(self, instance: Instance, lock: threading.Lock, fps: object) -> None:
+    def __init__(self, instance: Instance, fps: object) -> None:
         """Show nothing yet.
 
         Args:
             instance: what is watched.
-            lock: held while the instance is looked at.
             fps: how many steps a second the environment takes for human eyes.
         """
         self._instance = instance
-        self._lock = lock
         good = isinstance(fps, (int, float)) and 1 / _LONGEST_PACE <= fps <= 10_000
         self.fps = float(fps) if good else _USUAL_FPS  # type: ignore[arg-type]
         # Guards what follows; never held while drawing, sending or waiting for the instance.
@@ -104,7 +96,7 @@ class Screen:
         Returns:
             What there is to see, as JSON: what ``Instance.look()`` tells, a "number" and a
             "frame", a PNG in Base64.  What it has seen already when nothing moves for long; of
-            an environment that is busy with a step for long only the "state".
+            an environment that cannot be drawn for long only the "state".
 
         Raises:
             GymServerError: ``unknown_instance`` when the environment is closed meanwhile,
@@ -119,13 +111,16 @@ class Screen:
                 if shot is not None:
                     return shot.body
                 try:
-                    self._draw(lane)
-                except _Busy:
-                    return wire.dumps({"number": after, "state": "busy"})
+                    self._draw(lane, deadline)
                 finally:
                     with self._changed:
                         self._drawing = False
                         self._changed.notify_all()
+        except Busy:
+            with self._changed:
+                if self._ended is not None:
+                    raise self._ended from None
+            return wire.dumps({"number": after, "state": "busy"})
         finally:
             with self._changed:
                 self._asking -= 1
@@ -164,11 +159,13 @@ class Screen:
                 if stale and due and not self._drawing:
                     self._drawing = True
                     return None
-                if stale and not self._drawing:
+                if now >= deadline:
                     # One that was never drawn waits no longer than others.
-                    self._changed.wait(max(0.001, min(self._due, deadline) - now))
+                    raise Busy
+                if stale and not self._drawing:
+                    self._changed.wait(min(self._due, deadline) - now)
                 elif self._drawing or self._wants_call(shot):
-                    self._changed.wait(max(0.001, deadline - now))
+                    self._changed.wait(deadline - now)
 
     def _wants_call(self, shot: Shot | None) -> bool:
         """Ask to be called at the next move; return False when that was just now."""
@@ -182,42 +179,25 @@ class Screen:
 
     # Drawing --------------------------------------------------------------------------------
 
-    def _draw(self, lane: int) -> None:
-        self._hold()
-        began = time.monotonic()
-        try:
-            moves = self._instance.moves
-            facts, frame = self._instance.look(lane)
-        finally:
-            self._lock.release()
-            held = time.monotonic() - began
+    def _draw(self, lane: int, deadline: float) -> None:
+        seen = glimpse(self._instance, lane, deadline, self._is_patient)
+        facts, frame = seen.facts, seen.frame
         # The instance goes on while this is put into words.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
         body = wire.dumps({"number": self._numbers + 1, **facts})
         with self._changed:
-            share = _PACED_SHARE if self._next_tick > began - 1 else _SHARE
+            share = _PACED_SHARE if self._next_tick > seen.began - 1 else _SHARE
             # The first time it finds its screen, its fonts, its colours.
-            wait = held / share if self._numbers else 0.0
-            self._due = began + max(_LEAST_SECONDS, wait)
+            wait = seen.held / share if self._numbers else 0.0
+            self._due = seen.began + max(_LEAST_SECONDS, wait)
             self._numbers += 1
             now = time.monotonic()
-            self._shots[lane] = Shot(self._numbers, moves, body, now)
+            self._shots[lane] = Shot(self._numbers, seen.moves, body, now)
             for other in [key for key, s in self._shots.items() if s.seen < now - _KEPT_SECONDS]:
                 del self._shots[other]
 
-    def _hold(self) -> None:
-        """Take the instance's lock, unless a step has it for too long."""
-        patient_until = time.monotonic() + _PATIENCE
-        # In short waits: a step that hangs must not keep the server from its end.
-        while not self._lock.acquire(timeout=0.1):
-            with self._changed:
-                if self._ended is not None:
-                    raise self._ended
-            if time.monotonic() > patient_until:
-                raise _Busy
-        if self._instance.closed:
-            self._lock.release()
-            raise unknown_instance(self._instance.instance_id)
+    def _is_patient(self, until: float) -> bool:
+        return self._ended is None and time.monotonic() < until
 
     # For the instance -----------------------------------------------------------------------
 

@@ -121,3 +121,15 @@ class LaneTally:
             float(self._returns[lane]),
             bool(self._ended[lane]),
         )
+
+
+def told(tally: Tally | LaneTally, lane: int) -> dict:
+    """Return as JSON values what watchers of a lane are told of its episodes."""
+    standing = tally.of(lane)
+    return {
+        "state": "ended" if standing.ended else "running",
+        "episode": standing.episode,
+        "step": standing.step,
+        "return": standing.episode_return,
+        "returns": list(tally.returns),
+    }

@@ -12,9 +12,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gym_server import spaces
 from gym_server.choices import Choices
 from gym_server.creation import ask
-from gym_server.errors import GymServerError, wrong_length
+from gym_server.errors import GymServerError, reset_needed, wrong_length
 from gym_server.frames import RenderThread
-from gym_server.instance import Instance, reset_needed
+from gym_server.instance import Instance
 from gym_server.lanes import AsyncLanes, SyncLanes
 from gym_server.observed import lane_of
 from gym_server.plain import plain
@@ -106,7 +106,7 @@ class VectorInstance(Instance):
         """
         if self._for_eyes:
             self.screen.pace()
-        with self._held:
+        with self.hold:
             self._check_seed(seed)
             self._check_options(options)
             if mask is not None:
@@ -206,7 +206,7 @@ class VectorInstance(Instance):
         """
         if for_eyes or self._for_eyes:
             self.screen.pace()
-        with self._held:
+        with self.hold:
             if not self._was_reset:
                 raise reset_needed("step()")
             lanes = None if mask is None else self._lanes_of(mask)
@@ -295,7 +295,7 @@ class VectorInstance(Instance):
 
     def sample_action(self) -> object:
         """Draw an action for each lane from the batched action space's own generator."""
-        with self._held:
+        with self.hold:
             return spaces.encode_lanes(self._lane_action_space, self.action_space.sample())
 
     def action_contains(self, claim: dict) -> bool:
@@ -315,12 +315,15 @@ class VectorInstance(Instance):
             return False
         return True
 
+    def draws_on_render_thread(self) -> bool:
+        """Tell whether a picture takes the render thread; async lanes draw in theirs."""
+        return super().draws_on_render_thread() and not isinstance(self._env, AsyncLanes)
+
     def _draw(self, lane: int) -> object:
         if isinstance(self._env, AsyncLanes):
-            # It draws in its own process.
             return self._env.render_lane(lane)
         if isinstance(self._env, SyncLanes):
-            return self._renderer.run(self._env.render_lane, lane)
+            return self.renderer.run(self._env.render_lane, lane)
         if self._lanes > _MOST_DRAWN_AT_ONCE:
             raise GymServerError(
                 "cannot_render",
@@ -328,7 +331,7 @@ class VectorInstance(Instance):
                 f"this server lets it draw are {_MOST_DRAWN_AT_ONCE}",
                 "create the environment with vectorization_mode 'sync'",
             )
-        return self._renderer.run(self._env.render)[lane]
+        return self.renderer.run(self._env.render)[lane]
 
     def _observed(self, lane: int) -> object:
         if isinstance(self._env, SyncLanes):

@@ -152,3 +152,22 @@ def eventually():
             time.sleep(0.01)
 
     return eventually
+
+
+@pytest.fixture
+def watch(app):
+    """Return the instance of a URL and a function that counts what is drawn of it."""
+
+    def watch(url):
+        instance = app._instances.get(url.rsplit("/", 1)[1])
+        drawn = []
+        draw = instance._draw
+
+        def counting(lane):
+            drawn.append(lane)
+            return draw(lane)
+
+        instance._draw = counting
+        return instance, drawn
+
+    return watch

@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 import pytest
 
-from gym_server.frames import RenderThread, picture, png
+from gym_server.frames import Occupied, RenderThread, picture, png
 
 
 def decode(data):
@@ -82,3 +82,37 @@ def test_drawing_may_call_for_drawing():
     threads = renderer.run(lambda: (threading.get_ident(), renderer.run(threading.get_ident)))
     assert threads[0] == threads[1] != threading.get_ident()
     renderer.stop()
+
+
+@pytest.fixture
+def occupied():
+    """Return a render thread that is at work until the test lets it go on, and how to do that."""
+    renderer, over = RenderThread(), threading.Event()
+    blocker = threading.Thread(target=renderer.run, args=(over.wait, 30))
+    blocker.start()
+    yield renderer, over.set
+    over.set()
+    blocker.join(5)
+    renderer.stop()
+
+
+def test_who_loses_patience_is_not_drawn(occupied):
+    renderer, go_on = occupied
+    drawn = []
+    with pytest.raises(Occupied):
+        renderer.run_while(lambda: False, drawn.append, "never")
+    go_on()
+    renderer.run(drawn.append, "later")
+    assert drawn == ["later"]
+
+
+def test_what_has_begun_is_waited_for_without_patience():
+    renderer, asked = RenderThread(), threading.Event()
+    # It ends only after the question whether to wait on.
+    assert renderer.run_while(asked.set, asked.wait, 30)
+    renderer.stop()
+
+
+def test_the_patient_get_their_turn(occupied):
+    renderer, go_on = occupied
+    assert renderer.run_while(lambda: go_on() or True, lambda: "drawn") == "drawn"

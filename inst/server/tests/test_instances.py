@@ -57,10 +57,10 @@ def test_who_waits_for_an_instance_that_closes_learns_that_it_is_gone(
     url = faulty("Counting")
     client.post(f"{url}/reset/")
     instance = app._instances.get(url.rsplit("/", 1)[1])
-    with instance._lock:
+    with instance.hold:
         waiting = in_background(f"{url}/step/", {"action": 0})
         time.sleep(0.2)
-        instance.closed = True
+        instance.hold.closed = True
     assert waiting().json["message"] == f"Instance_id {instance.instance_id} unknown"
     assert instance.about()["steps"] == 0
 

@@ -9,26 +9,8 @@ import numpy as np
 import pytest
 from test_frames import decode
 
+from gym_server import glimpse
 from gym_server import screen as screens
-
-
-@pytest.fixture
-def watch(app):
-    """Return the instance of a URL and a function that counts what is drawn of it."""
-
-    def watch(url):
-        instance = app._instances.get(url.rsplit("/", 1)[1])
-        drawn = []
-        draw = instance._draw
-
-        def counting(lane):
-            drawn.append(lane)
-            return draw(lane)
-
-        instance._draw = counting
-        return instance, drawn
-
-    return watch
 
 
 def state(client, url, **query):
@@ -273,7 +255,7 @@ def test_lanes_that_nobody_looks_at_any_more_are_forgotten(client, create, watch
 
 
 def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
-    monkeypatch.setattr(screens, "_PATIENCE", 0.2)
+    monkeypatch.setattr(glimpse, "_PATIENCE", 0.2)
     url = faulty("Counting", seconds=1.5)
     client.post(f"{url}/reset/")
     thread, _ = in_background(play, app.test_client(), url)
@@ -281,6 +263,23 @@ def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
     assert state(client, url) == {"number": None, "state": "busy"}
     thread.join()
     assert state(client, url)["step"] == 1
+
+
+def test_one_never_drawn_whose_turn_is_far_off_is_told_in_time(client, faulty, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    url = faulty("Drawing")
+    instance, _ = watch(url)
+    client.post(f"{url}/reset/")
+    instance.screen._due = time.monotonic() + 3600
+    waits = []
+    wait = instance.screen._changed.wait
+    monkeypatch.setattr(
+        instance.screen._changed, "wait", lambda seconds: (waits.append(seconds), wait(seconds))
+    )
+    thread, seen = in_background(state, client.application.test_client(), url)
+    thread.join(5)
+    assert seen == [{"number": None, "state": "busy"}]
+    assert len(waits) < 5
 
 
 # The end ------------------------------------------------------------------------------------
@@ -360,7 +359,7 @@ def test_one_that_is_held_up_holds_up_no_other_and_is_seen(app, client, create):
 
 @pytest.mark.parametrize(("fps", "expected"), [(50, 50), (None, 30), (0, 30), ("x", 30), (0.1, 30)])
 def test_a_speed_that_makes_no_sense_is_the_usual_one(fps, expected):
-    assert screens.Screen(None, threading.Lock(), fps).fps == expected
+    assert screens.Screen(None, fps).fps == expected
 
 
 def test_being_watched_is_known_and_is_no_use_of_the_environment(client, create):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from gym_server.tally import LaneTally, Standing, Tally
+from gym_server.tally import LaneTally, Standing, Tally, told
 
 
 def play(tally, rewards, ends=True):
@@ -21,6 +21,19 @@ def test_an_episode_is_counted_from_its_reset():
     assert tally.of(0) == Standing(1, 2, 3.5, True)
     tally.begin()
     assert tally.of(0) == Standing(2, 0, 0.0, False)
+
+
+def test_watchers_are_told_of_the_episode_and_the_returns_before_it():
+    tally = Tally()
+    play(tally, [1, 2])
+    play(tally, [5], ends=False)
+    assert told(tally, 0) == {
+        "state": "running",
+        "episode": 2,
+        "step": 1,
+        "return": 5.0,
+        "returns": [3.0],
+    }
 
 
 def test_a_reset_that_follows_a_reset_begins_no_other_episode():

@@ -63,6 +63,17 @@ def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, pole):
     thread.join()
 
 
+def test_what_is_asked_after_watching_is_answered_at_the_stop(server):
+    url = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 4})
+    server.post(f"{url}/reset/")
+    with server.socket() as connection:
+        assert answered(connection, ask(url))[0] == 200
+        connection.sendall(request("POST", f"{url}/step/", b'{"action":0}'))
+        time.sleep(0.5)
+        server.process.terminate()
+        assert read_answer(connection)[0] == 200
+
+
 def ask_for_ever(connection, url):
     try:
         while True:

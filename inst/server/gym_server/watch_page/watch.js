@@ -60,7 +60,7 @@ async function askForNews() {
   const shot = await ask(`state/?${query}`);
   if (asked !== lane || playback.paused) return;
   if (shot.state === "busy") {
-    setState("busy", "busy: a step takes long");
+    setState("busy", "busy: a picture has to wait");
     return;
   }
   const isNew = shot.number !== after;

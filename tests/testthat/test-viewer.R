@@ -1,0 +1,56 @@
+# What was opened, and by what.
+local_viewers <- function(frame = parent.frame()) {
+  opened <- new.env(parent = emptyenv())
+  opened$by <- character()
+  opens <- function(name) {
+    function(address, ...) {
+      opened$by <- c(opened$by, name)
+      opened$address <- address
+    }
+  }
+  withr::local_options(
+    rlang_interactive = TRUE, gym.viewer = NULL, viewer = opens("pane"),
+    browser = opens("browser"), .local_envir = frame
+  )
+  opened$opens <- opens
+  opened
+}
+
+test_that("the pane shows what is on this machine, the browser the rest", {
+  opened <- local_viewers()
+  expect_true(open_address("http://127.0.0.1:5000/v1/envs/"))
+  expect_true(open_address(tempfile(fileext = ".gif")))
+  expect_true(open_address("http://lab.example.org:5000/"))
+  expect_identical(opened$by, c("pane", "pane", "browser"))
+  withr::local_options(viewer = NULL)
+  expect_true(open_address("http://127.0.0.1:5000/v1/envs/"))
+  expect_identical(opened$by[[4]], "browser")
+})
+
+test_that("nothing is opened in a script, unless the option says so", {
+  opened <- local_viewers()
+  withr::local_options(rlang_interactive = FALSE)
+  expect_false(open_address("http://127.0.0.1:5000/"))
+  withr::local_options(gym.viewer = opened$opens("option"))
+  expect_true(open_address("http://127.0.0.1:5000/"))
+  withr::local_options(rlang_interactive = TRUE, gym.viewer = FALSE)
+  expect_false(open_address("http://127.0.0.1:5000/"))
+  expect_identical(opened$by, "option")
+})
+
+test_that("a browser that fails is none, and the option's own function is heard", {
+  fails <- function(address) stop("no display")
+  withr::local_options(
+    rlang_interactive = TRUE, gym.viewer = NULL, viewer = NULL, browser = fails
+  )
+  expect_false(open_address("http://127.0.0.1:5000/"))
+  withr::local_options(gym.viewer = fails)
+  expect_error(open_address("http://127.0.0.1:5000/"), "no display")
+})
+
+test_that("the option gym.viewer must make sense", {
+  for (bad in list("firefox", TRUE, NA, 1)) {
+    withr::local_options(gym.viewer = bad)
+    expect_error(open_address("http://127.0.0.1/"), "gym.viewer", class = "gym_error_argument")
+  }
+})
