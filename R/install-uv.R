@@ -92,8 +92,9 @@ has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 # Where the pinned uv is put.
 brought_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Download the pinned uv, unless that was done before and it still runs. Nothing of the archive is unpacked before
-# its checksum is known to be right. UV_DOWNLOAD_URL is what uv's own installer takes.
+# Download the pinned uv, unless that was done before and it still runs. Nothing of the archive
+# is unpacked before its checksum is known to be right. UV_DOWNLOAD_URL is what uv's own
+# installer takes.
 bring_uv <- function(call) {
   uv <- brought_uv()
   if (file.exists(uv) && uv_works(uv)) {

@@ -69,19 +69,21 @@ folder_megabytes <- function(folder) {
 
 sitrep_uv <- function() {
   tryCatch(
-    finding("Python", "uv", find_uv(within = 3) %||% no_uv_words()),
+    sitrep_found_uv(find_uv(within = 3)),
     gym_error = function(cnd) {
       finding("Python", "uv", conditionMessage(cnd), "wrong", "Sys.unsetenv(\"GYM_UV\")")
     }
   )
 }
 
-no_uv_words <- function() {
-  found <- uv_candidates()
-  if (length(found)) {
-    paste(paste(found, collapse = ", "), "cannot be used (too old, or without an answer)")
+sitrep_found_uv <- function(uv) {
+  candidates <- uv_candidates()
+  if (is.null(uv) && length(candidates)) {
+    finding("Python", "uv", paste(
+      paste(candidates, collapse = ", "), "cannot be used (too old, or without an answer)"
+    ), "note")
   } else {
-    "not found, it would be downloaded if needed"
+    finding("Python", "uv", uv %||% "not found, it would be downloaded if needed")
   }
 }
 
