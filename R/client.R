@@ -29,7 +29,8 @@
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https
 #'   URL or the timeout not a positive number; `gym_error_server_start` when a server
-#'   that was to be started could not be.
+#'   that was to be started could not be, and `gym_error_install` when what it needs
+#'   could not be installed.
 #' @export
 #' @examples
 #' server <- create_GymClient("http://gym.example.org:5000")
