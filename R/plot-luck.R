@@ -27,7 +27,8 @@ plot.gym_searches <- function(x, mark = 3, main = luck_title(x), xlab = "rounds 
   data <- luck_plot_data(x, mark)
   bars <- data$bars
   open_plot(
-    list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n", yaxt = "n", yaxs = "i"),
+    list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n", yaxt = "n",
+         yaxs = "i"),
     list(...)
   )
   luck_axis(data)

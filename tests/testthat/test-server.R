@@ -21,7 +21,8 @@ test_that("options of the server are written as the command line reads them", {
     c("--max-num-envs", "100000", "--log-level", "info", "--no-auth")
   )
   expect_identical(
-    server_options(list(allow_module = c("a", "b"))), c("--allow-module", "a", "--allow-module", "b")
+    server_options(list(allow_module = c("a", "b"))),
+    c("--allow-module", "a", "--allow-module", "b")
   )
 })
 
