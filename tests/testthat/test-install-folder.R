@@ -6,7 +6,7 @@ test_that("an environment is found when it is whole, and by no other lock", {
   expect_identical(there$folder, folder)
   expect_identical(there$python, environment_python(folder))
   expect_identical(there$extras, c("box2d", "video"))
-  expect_identical(there$python, grep("gym", python_candidates(), value = TRUE)[1L])
+  expect_identical(there$python, Find(is_installed_python, python_candidates()))
   unlink(folder, recursive = TRUE)
   fake_installation(hash = "0123456789ab", extras = "atari")
   expect_null(installed_server())
