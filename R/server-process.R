@@ -113,7 +113,8 @@ await_start <- function(process, log, timeout, call) {
     if (left <= 0) {
       process$kill()
       abort_server_start(
-        paste0("The server did not start within ", timeout, " seconds."), log_tail(log), call
+        paste0("The server did not start within ", timeout, " seconds."), log_tail(log), call,
+        "`gym_server_start(timeout = )` gives it longer."
       )
     }
     process$poll_io(as.integer(ceiling(left * 1000)))

@@ -195,3 +195,11 @@ test_that("the server does not get the library path that R made for itself", {
   expect_match(lines[[2]], ".+:/opt/a:/opt/b$")
   expect_identical(strsplit(path_in_r(""), "\n")[[1]][[1]], "")
 })
+
+test_that("a server that takes too long to start is given up, and the error says how to wait", {
+  skip_if_no_server()
+  expect_error(
+    gym_server_start(timeout = 0.01), "within 0.01 seconds.*timeout = ",
+    class = "gym_error_server_start"
+  )
+})
