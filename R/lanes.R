@@ -13,16 +13,19 @@ sync_lanes <- 16L
 #' One that is named by its id is made first and closed when `use` is left.
 #' @param episodes How many episodes are played at most: no more lanes are made.
 #' @param frames Whether the lanes must draw: then there is a single one.
+#' @param make,block Makes the lanes of one that is named, given its id, `episodes` and the
+#'   client; how many episodes of these make a block, see [lanes_of()].
 #' @noRd
-with_lanes <- function(env, episodes, client, use, frames = FALSE) {
+with_lanes <- function(env, episodes, client, use, frames = FALSE, make = make_lanes,
+                       block = sync_lanes) {
   call <- rlang::caller_env()
   if (!is.character(env) && !inherits(env, "gym_wrapped")) {
     return(use(lanes_of(env, call = call, frames = frames)))
   }
-  env <- if (frames) gym_make(env, client = client) else make_lanes(env, episodes, client)
+  env <- if (frames) gym_make(env, client = client) else make(env, episodes, client)
   finished <- FALSE
   on.exit(close_made(env, finished))
-  value <- use(lanes_of(env, sync_lanes, call, frames))
+  value <- use(lanes_of(env, block, call, frames))
   finished <- TRUE
   value
 }

@@ -76,13 +76,16 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   check_seed(seed)
   check_flag(progress)
   env <- search$env %||% search$env_id
-  with_seeded_lanes(env, as.numeric(size)^2 * episodes, client, function(lanes) {
+  play <- function(lanes) {
     with_random_seed(seed, {
       directions <- draw_directions(search$policy$weights)
       plane <- new_plane(search$policy, directions, size, span)
       play_plane(lanes, plane, search, as.integer(episodes), progress)
     })
-  })
+  }
+  with_lanes(
+    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_lanes, block = NULL
+  )
 }
 
 check_odd <- function(size, call = rlang::caller_env()) {
@@ -143,22 +146,10 @@ new_plane <- function(policy, directions, size, span) {
 # So many that playing takes seconds; more gain little, as each lane is stepped alone.
 landscape_lanes <- 128L
 
-#' Call a function with lanes that each have a seed of their own, where that is possible
-#'
-#' Those of an environment that is given as an object are what they are.
-#' @noRd
-with_seeded_lanes <- function(env, episodes, client, use) {
-  call <- rlang::caller_env()
-  if (!is.character(env) && !inherits(env, "gym_wrapped")) {
-    return(use(lanes_of(env, call = call)))
-  }
+# Each with seeds of its own, so that all networks can play the same episodes.
+make_seeded_lanes <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_lanes))
-  env <- make_if_can(env, n, "sync", "Disabled", client) %||% gym_make(env, client = client)
-  finished <- FALSE
-  on.exit(close_made(env, finished))
-  value <- use(lanes_of(env, call = call))
-  finished <- TRUE
-  value
+  make_if_can(env_id, n, "sync", "Disabled", client) %||% gym_make(env_id, client = client)
 }
 
 #' Play the episodes of all points, side by side

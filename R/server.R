@@ -109,22 +109,19 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     server_options(options, call)
   )
   refusals <- character()
-  for (candidate in python_candidates(python)) {
-    server <- launch_server(candidate, arguments, timeout, call)
-    if (is.list(server)) {
-      return(register_server(server))
+  # With the first that can; NULL when none can.
+  launch_first <- function(pythons) {
+    for (candidate in pythons) {
+      server <- launch_server(candidate, arguments, timeout, call)
+      if (is.list(server)) {
+        return(register_server(server))
+      }
+      refusals[[candidate]] <<- server
     }
-    refusals[[candidate]] <- server
   }
-  installed <- if (install && is.null(named_python(python))) offered_python()
-  if (!is.null(installed)) {
-    server <- launch_server(installed, arguments, timeout, call)
-    if (is.list(server)) {
-      return(register_server(server))
-    }
-    refusals[[installed]] <- server
-  }
-  abort_no_python(python, refusals, call)
+  launch_first(python_candidates(python)) %||%
+    (if (install && is.null(named_python(python))) launch_first(offered_python())) %||%
+    abort_no_python(python, refusals, call)
 }
 
 register_server <- function(server) {

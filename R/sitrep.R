@@ -21,8 +21,7 @@
 #' @examples
 #' gym_sitrep()
 gym_sitrep <- function() {
-  # Processes get names that are drawn from R's generator.
-  found <- keep_random_state(sitrep_findings())
+  found <- sitrep_findings()
   class(found) <- c("gym_sitrep", class(found))
   print(found)
   invisible(found)

@@ -4,6 +4,18 @@ found <- function(env = fake_environment(reward = weights_matter), ...) {
 
 weights_matter <- function(seed, step, action) action * step + seed %% 7
 
+# Of an episode, played step by step.
+return_of <- function(seed, env, policy) {
+  observation <- env$reset(seed = seed)
+  total <- 0
+  repeat {
+    out <- env$step(act(policy, observation))
+    total <- total + out$reward
+    observation <- out$observation
+    if (out$terminated || out$truncated) return(total)
+  }
+}
+
 test_that("the middle is the best policy, its mean return that in the same episodes", {
   env <- fake_environment(reward = weights_matter)
   search <- found(env)
@@ -11,16 +23,7 @@ test_that("the middle is the best policy, its mean return that in the same episo
   expect_identical(nrow(landscape$grid), 25L)
   middle <- landscape$grid[13, ]
   expect_identical(c(middle$a, middle$b), c(0, 0))
-  returns <- vapply(landscape$seeds, function(seed) {
-    observation <- env$reset(seed = seed)
-    total <- 0
-    repeat {
-      out <- env$step(act(search$policy, observation))
-      total <- total + out$reward
-      observation <- out$observation
-      if (out$terminated) return(total)
-    }
-  }, 0)
+  returns <- vapply(landscape$seeds, return_of, 0, env = env, policy = search$policy)
   expect_length(returns, 3)
   expect_identical(landscape$best, mean(returns))
   expect_identical(middle$mean_return, mean(returns))
@@ -151,15 +154,6 @@ test_that("CartPole: the landscape's middle is the best policy, and nothing stay
   expect_true(landscape$common)
   expect_length(env_list_all(client), 0)
   env <- local_env("CartPole-v0", client = client)
-  returns <- vapply(landscape$seeds, function(seed) {
-    observation <- env$reset(seed = seed)
-    total <- 0
-    repeat {
-      out <- env$step(act(search$policy, observation))
-      total <- total + out$reward
-      observation <- out$observation
-      if (out$done) return(total)
-    }
-  }, 0)
+  returns <- vapply(landscape$seeds, return_of, 0, env = env, policy = search$policy)
   expect_identical(landscape$best, mean(returns))
 })
