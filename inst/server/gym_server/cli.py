@@ -13,8 +13,8 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gym_server import __version__
 from gym_server.app import Config, GymApp, create_app
+from gym_server.options import parser
 from gym_server.serve import Server, bind
 
 log = logging.getLogger("gym_server")
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status: 0 after a stop, 1 when the server cannot start.
     """
-    options = _parser().parse_args(argv)
+    options = parser().parse_args(argv)
     _set_up_logging(options.log_level)
     if not _is_loopback(options.host) and not options.no_auth:
         return _fail(
@@ -69,64 +69,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.dup2(2, 1)
     _serve(app, server)
     return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="gym-http-server", description="Gymnasium environments over HTTP."
-    )
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
-    parser.add_argument(
-        "--port",
-        type=_number(0, 65535),
-        default=5000,
-        help="port; 0 takes a free one (%(default)s)",
-    )
-    parser.add_argument(
-        "--log-level",
-        default="warning",
-        choices=("debug", "info", "warning", "error"),
-        help="what goes to standard error (%(default)s)",
-    )
-    parser.add_argument(
-        "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
-    )
-    parser.add_argument(
-        "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
-    )
-    parser.add_argument(
-        "--allow-module",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
-    )
-    parser.add_argument(
-        "--max-body-mb",
-        type=_number(1, 1024),
-        default=16,
-        help="size of the largest request (%(default)s)",
-    )
-    parser.add_argument(
-        "--max-num-envs",
-        type=_number(1, 1_000_000),
-        default=16384,
-        help="lanes of the largest vector environment (%(default)s)",
-    )
-    parser.add_argument(
-        "--no-auth", action="store_true", help="serve a --host that others can reach"
-    )
-    parser.add_argument("--version", action="version", version=__version__)
-    return parser
-
-
-def _number(least: int, greatest: int) -> Callable[[str], int]:
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not least <= int(text) <= greatest:
-            raise argparse.ArgumentTypeError(f"{text!r} is not between {least} and {greatest}")
-        return int(text)
-
-    return parse
 
 
 def _set_up_logging(level: str) -> None:

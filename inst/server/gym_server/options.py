@@ -1,0 +1,68 @@
+"""What can be said on the command line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from gym_server import __version__
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    options = argparse.ArgumentParser(
+        prog="gym-http-server", description="Gymnasium environments over HTTP."
+    )
+    options.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
+    options.add_argument(
+        "--port",
+        type=_number(0, 65535),
+        default=5000,
+        help="port; 0 takes a free one (%(default)s)",
+    )
+    options.add_argument(
+        "--log-level",
+        default="warning",
+        choices=("debug", "info", "warning", "error"),
+        help="what goes to standard error (%(default)s)",
+    )
+    options.add_argument(
+        "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
+    )
+    options.add_argument(
+        "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
+    )
+    options.add_argument(
+        "--allow-module",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
+    )
+    options.add_argument(
+        "--max-body-mb",
+        type=_number(1, 1024),
+        default=16,
+        help="size of the largest request (%(default)s)",
+    )
+    options.add_argument(
+        "--max-num-envs",
+        type=_number(1, 1_000_000),
+        default=16384,
+        help="lanes of the largest vector environment (%(default)s)",
+    )
+    options.add_argument(
+        "--no-auth", action="store_true", help="serve a --host that others can reach"
+    )
+    options.add_argument("--version", action="version", version=__version__)
+    return options
+
+
+def _number(least: int, greatest: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= greatest:
+            raise argparse.ArgumentTypeError(f"{text!r} is not between {least} and {greatest}")
+        return int(text)
+
+    return parse
