@@ -72,14 +72,14 @@ SEED = Kind(
     {
         "oneOf": [
             {"type": "integer", "minimum": 0},
-            {"type": "array", "items": {"type": ["integer", "null"], "minimum": 0}},
+            {"type": "array", "items": {"type": ["integer", "null"], "minimum": 0}, "minItems": 1},
         ]
     },
     "an integer, 0 or greater",
     _seed,
 )
 MASK = Kind(
-    {"type": "array", "items": {"type": "boolean"}},
+    {"type": "array", "items": {"type": "boolean"}, "minItems": 1},
     "a list of true or false for each lane",
     _mask,
     empty_is_absent=False,

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from gym_server import __version__, wire
+from gym_server.answers import ANSWERS
 from gym_server.tensors import TENSORS
 
 if TYPE_CHECKING:
@@ -25,12 +26,19 @@ _ERROR = {
 }
 
 
+# What classic clients send for a parameter that they do not set.
+_ABSENT = {"enum": [None, "", []], "description": "As if it were not there."}
+_ABSENT_REFERENCE = {"$ref": "#/components/schemas/Absent"}
+
+
 def document(routes: Iterable[Route]) -> dict:
     """Return the OpenAPI 3.1 document of some routes."""
+    routes = list(routes)
     paths: dict[str, dict] = {}
     for route in routes:
         path = re.sub(r"<(\w+)>", r"{\1}", route.path)
         paths.setdefault(path, {})[route.method.lower()] = _operation(route)
+    _link_created(paths)
     return {
         "openapi": "3.1.0",
         "info": {
@@ -39,7 +47,23 @@ def document(routes: Iterable[Route]) -> dict:
             "description": "Gymnasium environments over HTTP.",
         },
         "paths": paths,
-        "components": {"schemas": {"Error": _ERROR}},
+        "components": {"schemas": {"Error": _ERROR, "Absent": _ABSENT}},
+    }
+
+
+def _link_created(paths: dict[str, dict]) -> None:
+    """Say where the instance_id that creating answers is of use."""
+    created = paths.get("/v1/envs/", {}).get("post")
+    if created is None:
+        return
+    created["responses"]["200"]["links"] = {
+        operation["operationId"]: {
+            "operationId": operation["operationId"],
+            "parameters": {"instance_id": "$response.body#/instance_id"},
+        }
+        for path, operations in paths.items()
+        for operation in operations.values()
+        if "{instance_id}" in path
     }
 
 
@@ -81,7 +105,8 @@ def _answer(route: Route) -> dict:
             }
         return answer
     is_json = route.content_type == wire.JSON
-    content: dict = {route.content_type: {"schema": {"type": "object"}} if is_json else {}}
+    schema = ANSWERS.get(route.handler.__name__, {"type": "object"})
+    content: dict = {route.content_type: {"schema": schema} if is_json else {}}
     if route.tensors:
         # Raw bytes have no schema.
         content[TENSORS] = {}
@@ -99,9 +124,13 @@ def _query(field: Field) -> dict:
 
 
 def _request_body(route: Route, fields: Iterable[Field]) -> dict:
+    required = any(field.required for field in fields)
+    schema = _body(fields)
     body = {
-        "required": any(field.required for field in fields),
-        "content": {wire.JSON: {"schema": _body(fields)}},
+        "required": required,
+        "content": {
+            wire.JSON: {"schema": schema if required else {"anyOf": [schema, _ABSENT_REFERENCE]}}
+        },
     }
     if route.tensor_body:
         body["content"][TENSORS] = {}
@@ -116,11 +145,23 @@ def _request_body(route: Route, fields: Iterable[Field]) -> dict:
 def _body(fields: Iterable[Field]) -> dict:
     schema = {
         "type": "object",
-        "properties": {
-            field.name: {**field.kind.schema, "description": field.doc} for field in fields
-        },
+        "properties": {field.name: _property(field) for field in fields},
     }
     required = [field.name for field in fields if field.required]
     if required:
         schema["required"] = required
     return schema
+
+
+def _property(field: Field) -> dict:
+    """Return the schema of what is taken for a field, also of what is not meant to be there."""
+    schema = field.kind.schema
+    if field.required:
+        if field.kind.empty_is_absent and schema.get("type") == "string":
+            schema = {**schema, "minLength": 1}
+        if not schema:
+            schema = {"not": {"type": "null"}}
+    elif schema:
+        absent = _ABSENT_REFERENCE if field.kind.empty_is_absent else {"type": "null"}
+        schema = {"anyOf": [schema, absent]}
+    return {**schema, "description": field.doc}

@@ -201,7 +201,7 @@ def _wrappers(value: object) -> tuple[Wrapper, ...]:
     if not isinstance(value, list):
         raise ValueError
     wrappers = [
-        Wrapper(text(item.get("name")), _object(item.get("kwargs") or {}))
+        Wrapper(text(item.get("name")), _object({} if item.get("kwargs") is None else item["kwargs"]))
         for item in map(_object, value)
     ]
     return tuple(wrappers)
@@ -228,7 +228,12 @@ def _request_id(value: object) -> RequestId:
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
 ANY_ID = Kind({"type": "string"}, "a string", lambda value: value)
-BOOLEAN = Kind({"type": "boolean"}, "true or false", _boolean)
+# Also as words, which some classic clients send.
+_TRUE_OR_FALSE = [
+    {"type": "boolean"},
+    {"type": "string", "pattern": "^([Tt][Rr][Uu][Ee]|[Ff][Aa][Ll][Ss][Ee])$"},
+]
+BOOLEAN = Kind({"anyOf": _TRUE_OR_FALSE}, "true or false", _boolean)
 INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 TEXT = Kind({"type": "string"}, "a string", text)
 OBJECT = Kind({"type": "object"}, "an object", _object)
@@ -238,14 +243,14 @@ WRAPPERS = Kind(
         "items": {
             "type": "object",
             "required": ["name"],
-            "properties": {"name": {"type": "string"}, "kwargs": {"type": "object"}},
+            "properties": {"name": {"type": "string"}, "kwargs": {"type": ["object", "null"]}},
         },
     },
     'a list of objects of a "name" and "kwargs"',
     _wrappers,
 )
 VIDEO_CALLABLE = Kind(
-    {"type": ["boolean", "integer"], "minimum": 0},
+    {"anyOf": [*_TRUE_OR_FALSE, {"type": "integer", "minimum": 0}]},
     "true, false or an integer n for every n-th episode",
     _video_callable,
 )
