@@ -259,7 +259,11 @@ exchange <- function(client, line, handle, url, request) {
   response <- NULL
   problem <- tryCatch(
     {
-      response <- line$fetch(url, handle)
+      fetched <- line$fetch(url, handle)
+      if (ends_in_header(fetched)) {
+        stop("Connection died within the header of the answer")
+      }
+      response <- fetched
       response$answer <- parsed_body(response, client$state$layouts, request)
       NULL
     },
@@ -273,6 +277,15 @@ exchange <- function(client, line, handle, url, request) {
     rlang::cnd_signal(problem)
   }
   response
+}
+
+# libcurl takes the end of the connection there for the end of an answer without content.
+ends_in_header <- function(response) {
+  if (length(response$content)) {
+    return(FALSE)
+  }
+  end <- as.raw(c(0x0d, 0x0a, 0x0d, 0x0a))
+  !identical(utils::tail(response$headers, 4L), end)
 }
 
 max_attempts <- 4L
