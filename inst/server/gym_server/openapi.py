@@ -114,12 +114,15 @@ def _answer(route: Route) -> dict:
 
 
 def _query(field: Field) -> dict:
+    schema = field.kind.schema
+    if field.kind.empty_is_absent and schema.get("type") != "string":
+        schema = {"anyOf": [schema, {"const": "", "description": _ABSENT["description"]}]}
     return {
         "name": field.name,
         "in": "query",
         "required": field.required,
         "description": field.doc,
-        "schema": field.kind.schema,
+        "schema": schema,
     }
 
 

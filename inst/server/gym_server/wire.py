@@ -201,7 +201,9 @@ def _wrappers(value: object) -> tuple[Wrapper, ...]:
     if not isinstance(value, list):
         raise ValueError
     wrappers = [
-        Wrapper(text(item.get("name")), _object({} if item.get("kwargs") is None else item["kwargs"]))
+        Wrapper(
+            text(item.get("name")), _object({} if item.get("kwargs") is None else item["kwargs"])
+        )
         for item in map(_object, value)
     ]
     return tuple(wrappers)

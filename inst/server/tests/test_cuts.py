@@ -6,7 +6,6 @@
 import os
 
 import pytest
-
 from cutting import Cutter, NumberedClient
 
 EVERY = 1 if os.environ.get("GYM_TEST_CUTS") == "all" else 23
