@@ -7,10 +7,16 @@ import itertools
 import json
 import math
 import os
+import tempfile
 import time
+from pathlib import Path
 
 import pytest
 
+# Nothing generated may lie below inst/server.
+os.environ.setdefault(
+    "HYPOTHESIS_STORAGE_DIRECTORY", str(Path(tempfile.gettempdir()) / "gym-hypothesis")
+)
 hypothesis = pytest.importorskip("hypothesis", reason="the extra `dev` brings hypothesis")
 
 from hypothesis import strategies as st  # noqa: E402
@@ -110,7 +116,7 @@ def files(draw):
     if draw(st.booleans()):
         header["__metadata__"] = draw(METADATA)
     faults = draw(st.sampled_from([0, 1, 1, 2]))
-    kinds = [draw(st.sampled_from(["entry", "entry", "length", "bytes"])) for _ in range(faults)]
+    kinds = [draw(st.sampled_from(["entry", "entry", "length", "data", "bytes"])) for _ in range(faults)]
     if "entry" in kinds and header:
         entry = header[draw(st.sampled_from(list(header)))]
         field = draw(st.sampled_from(["dtype", "shape", "data_offsets", "more"]))
@@ -129,6 +135,8 @@ def files(draw):
     if draw(st.integers(0, 3)):
         # Bytes that any dtype may have, also a boolean.
         data = bytes(byte & 1 for byte in data)
+    if "data" in kinds:
+        data = draw(st.sampled_from([data[:-1], data + b"\0", data + data, b""]))
     raw = length.to_bytes(8, "little") + text + data
     return mutated(draw, raw) if "bytes" in kinds else raw
 

@@ -1,0 +1,111 @@
+# The header of a safetensors file: what lies where. Nothing is believed that does not add up.
+
+header_size <- function(bytes) {
+  if (length(bytes) < 8L) {
+    abort_tensors("the file has fewer than 8 bytes")
+  }
+  size <- readBin(bytes, "integer", 2L, size = 4L, endian = "little")
+  if (anyNA(size) || size[[2L]] != 0L || size[[1L]] < 2L || size[[1L]] > length(bytes) - 8L) {
+    abort_tensors("the header is longer than the file")
+  }
+  size[[1L]]
+}
+
+known_layout <- function(header, layouts) {
+  for (known in layouts$seen) {
+    start <- if (known$metadata_last) header[seq_along(known$start)] else header
+    if (identical(start, known$start)) {
+      return(known)
+    }
+  }
+  layout <- read_layout(header)
+  if (!is.null(layouts)) {
+    layouts$seen <- utils::head(c(list(layout), layouts$seen), max_layouts)
+  }
+  layout
+}
+
+# As many as there are kinds of answer of a few environments.
+max_layouts <- 8L
+
+# Quotes inside of names and texts are escaped, so nothing else looks like this.
+metadata_key <- ",\"__metadata__\":"
+
+#' Parse a header
+#' @return A list of `entries`, one for each tensor; `metadata` that stands before them;
+#'   `end`, where the last one ends; `start`, what all headers of this layout begin with:
+#'   the whole header, or all up to the metadata where it comes last.
+#' @noRd
+read_layout <- function(header) {
+  table <- rawToChar(header)
+  at <- regexpr(metadata_key, table, fixed = TRUE, useBytes = TRUE)
+  metadata_last <- at > 0L
+  if (metadata_last) {
+    table <- paste0(rawToChar(header[seq_len(at - 1L)]), "}")
+    header <- header[seq_len(at - 1L + nchar(metadata_key))]
+  }
+  entries <- tryCatch(
+    from_json(table),
+    error = function(cnd) abort_tensors("the header is no JSON")
+  )
+  if (!is.list(entries) || is.null(names(entries)) && length(entries)) {
+    abort_tensors("the header is no JSON object")
+  }
+  tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry)
+  list(
+    entries = tensors,
+    metadata = entries[["__metadata__"]],
+    end = max(0, vapply(tensors, function(entry) entry$begin + entry$size, 0)),
+    start = header,
+    metadata_last = metadata_last
+  )
+}
+
+last_metadata <- function(header, layout) {
+  if (layout$metadata_last) {
+    metadata <- rawToChar(header[-seq_along(layout$start)])
+    tryCatch(
+      from_json(paste0("{\"last\":", metadata))$last,
+      error = function(cnd) abort_tensors("the metadata are no JSON")
+    )
+  }
+}
+
+read_entry <- function(entry) {
+  if (!is.list(entry) || !all(c("dtype", "shape", "data_offsets") %in% names(entry))) {
+    abort_tensors("the header lacks the place of a tensor")
+  }
+  type <- if (rlang::is_string(entry$dtype)) tensor_types[[entry$dtype, exact = TRUE]]
+  if (is.null(type)) {
+    abort_tensors(paste("the dtype", to_json(entry$dtype), "is not known"))
+  }
+  shape <- naturals_from_json(entry$shape)
+  offsets <- naturals_from_json(entry$data_offsets)
+  if (is.null(shape) || any(shape > .Machine$integer.max) || length(offsets) != 2L) {
+    abort_tensors("the header lacks the place of a tensor")
+  }
+  n <- prod(shape)
+  size <- offsets[[2L]] - offsets[[1L]]
+  if (size != n * type$size) {
+    abort_tensors("an offset does not fit its tensor")
+  }
+  list(read = type$read, n = n, shape = as.integer(shape), begin = offsets[[1L]], size = size)
+}
+
+# The elements of a JSON array of whole numbers from 0 on, NULL for anything else.
+naturals_from_json <- function(elements) {
+  is_number <- function(x) is.numeric(x) && length(x) == 1L
+  if (!is.list(elements) || !is.null(names(elements)) || !all(vapply(elements, is_number, NA))) {
+    return(NULL)
+  }
+  numbers <- as.double(unlist(elements))
+  if (all(is.finite(numbers) & numbers >= 0 & numbers == floor(numbers))) numbers
+}
+
+abort_tensors <- function(problem) {
+  gym_abort(
+    paste0("The tensors that came cannot be read: ", problem, "."),
+    class = "gym_error_connection",
+    call = NULL
+  )
+}
