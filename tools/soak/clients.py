@@ -1,0 +1,160 @@
+"""R and Python clients at once, and whether each of their trajectories is Gymnasium's own.
+
+    tools/in-env python tools/soak/clients.py [CLIENTS [STEPS]]
+
+All play at the same time on one server; what they saw is compared with the same environments
+made and played in this process, number by number.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from serving import SERVER, Client, ServerProcess
+
+HERE = Path(__file__).parent
+
+# Lanes come as tensors, and so do the observations of all that R plays.
+KINDS = [
+    {"env_id": "CartPole-v1"},
+    {"env_id": "Pendulum-v1"},
+    {"env_id": "FrozenLake-v1"},
+    {"env_id": "CartPole-v1", "num_envs": 8},
+    {"env_id": "Acrobot-v1"},
+    {"env_id": "Pendulum-v1", "num_envs": 4},
+    {"env_id": "MountainCar-v0", "num_envs": 3},
+    {"env_id": "faulty_envs:Counting-v0"},
+]
+
+
+def plan(number: int, steps: int, folder: Path) -> dict:
+    """Write down what one client plays; two that follow each other play the same, R and Python."""
+    kind = KINDS[number // 2 % len(KINDS)]
+    lanes = kind.get("num_envs", 1)
+    rng = np.random.default_rng(number)
+    env = gymnasium.make(kind["env_id"])
+    box = isinstance(env.action_space, gymnasium.spaces.Box)
+    actions = rng.uniform(-2, 2, (steps, lanes)) if box else rng.integers(0, 2, (steps, lanes))
+    # As the server has them, which rounds to the action space's dtype.
+    actions = actions.astype(np.float32 if box else np.int64).astype(np.float64)
+    env.close()
+    actions.tofile(folder / f"{number}.actions")
+    told = {**kind, "lanes": lanes, "box": box, "seed": 1000 + number, "steps": steps}
+    told |= {"actions": str(folder / f"{number}.actions"), "seen": str(folder / f"{number}.seen")}
+    (folder / f"{number}.json").write_text(json.dumps(told))
+    return told
+
+
+def play_here(told: dict) -> np.ndarray:
+    """Return what is to be seen, from Gymnasium in this process."""
+    lanes, box = told["lanes"], told["box"]
+    vector = "num_envs" in told
+    if vector:
+        # As the server chooses: the environment's own class where it has one.
+        own = gymnasium.spec(told["env_id"]).vector_entry_point is not None
+        mode = "vector_entry_point" if own else "sync"
+        env = gymnasium.make_vec(told["env_id"], num_envs=lanes, vectorization_mode=mode)
+    else:
+        env = gymnasium.make(told["env_id"])
+    seen = []
+    observation, _ = env.reset(seed=told["seed"])
+    for row in np.fromfile(told["actions"]).reshape(-1, lanes):
+        if box:
+            action = row.astype(np.float32).reshape((lanes, 1) if vector else (1,))
+        else:
+            action = row.astype(np.int64) if vector else int(row[0])
+        observation, reward, terminated, truncated, _ = env.step(action)
+        seen += [observation, reward, terminated, truncated]
+        if not vector and (terminated or truncated):
+            observation, _ = env.reset()
+            seen.append(observation)
+    env.close()
+    return np.concatenate([np.asarray(part, np.float64).ravel() for part in seen])
+
+
+def play_there(port: int, told: dict) -> None:
+    """Play over HTTP, as this client would."""
+    lanes, box = told["lanes"], told["box"]
+    client = Client(port)
+    fields = {name: told[name] for name in ("env_id", "num_envs") if name in told}
+    url = f"/v1/envs/{client.post('/v1/envs/', **fields)['instance_id']}"
+    seen = []
+    if "num_envs" in told:
+        client.post(f"{url}/reset/", seed=told["seed"])
+        for row in np.fromfile(told["actions"]).reshape(-1, lanes):
+            action = [[number] for number in row] if box else [int(number) for number in row]
+            answer = client.post_for_tensors(f"{url}/step/", action=action)
+            seen += map(_numbers, ("observation", "reward", "terminated", "truncated"), [answer] * 4)
+    else:
+        client.post(f"{url}/reset/", seed=told["seed"])
+        for (number,) in np.fromfile(told["actions"]).reshape(-1, 1):
+            answer = client.post(f"{url}/step/", action=[number] if box else int(number))
+            seen += [answer[name] for name in ("observation", "reward", "terminated", "truncated")]
+            if answer["done"]:
+                seen.append(client.post(f"{url}/reset/")["observation"])
+    client.post(f"{url}/close/")
+    flat = [np.asarray(part, np.float64).ravel() for part in seen]
+    np.concatenate(flat).tofile(told["seen"])
+
+
+_DTYPES = {"F32": "<f4", "F64": "<f8", "BOOL": "?", "I64": "<i8"}
+
+
+def _numbers(name: str, answer: dict) -> np.ndarray:
+    dtype, shape, data = answer[name]
+    return np.frombuffer(data, _DTYPES[dtype]).reshape(shape)
+
+
+def start(number: int, port: int, folder: Path) -> subprocess.Popen:
+    """Start one client: every other one is R."""
+    told = folder / f"{number}.json"
+    if number % 2:
+        command = [sys.executable, __file__, "play", str(port), str(told)]
+    else:
+        command = ["Rscript", "--no-init-file", str(HERE / "clients.R"), str(port), str(told)]
+    return subprocess.Popen(command)
+
+
+def main(clients: int, steps: int) -> int:
+    """Play and compare; return the exit status."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        plans = [plan(number, -(-steps // clients), folder) for number in range(clients)]
+        server = ServerProcess()
+        began = time.monotonic()
+        players = [start(number, server.port, folder) for number in range(clients)]
+        failed = sum(player.wait() != 0 for player in players)
+        seconds = time.monotonic() - began
+        left = Client(server.port).get("/v1/health/")["instances"]
+        server.stop()
+        differing = [told for told in plans if not _is_same(told)]
+    for told in differing:
+        print(f"differs: {told}", flush=True)
+    taken = sum(told["steps"] for told in plans)
+    print(
+        f"clients: {taken} steps of {clients} clients in {seconds:.0f} s, trajectories that differ "
+        f"{len(differing)}, clients that failed {failed}, environments left {left}"
+    )
+    return int(bool(differing or failed or left))
+
+
+def _is_same(told: dict) -> bool:
+    if not os.path.exists(told["seen"]):
+        return False
+    return np.array_equal(np.fromfile(told["seen"]), play_here(told), equal_nan=True)
+
+
+if __name__ == "__main__":
+    sys.path.append(str(SERVER / "tests"))
+    if sys.argv[1:2] == ["play"]:
+        play_there(int(sys.argv[2]), json.loads(Path(sys.argv[3]).read_text()))
+    else:
+        sys.exit(main(*map(int, sys.argv[1:])) if sys.argv[1:] else main(32, 200_000))
