@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo bench test check lint document clean
+.PHONY: help demo bench test soak check lint document clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -15,6 +15,8 @@ help:
 	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
 	@echo '               some ten minutes, or a glance: make bench QUICK=1'
 	@echo 'make test      every test: of the server (pytest) and of the R package (testthat)'
+	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
+	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
 	@echo 'make lint      lintr for R, ruff for Python'
 	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
@@ -34,6 +36,11 @@ bench:
 test:
 	@tools/setup test
 	@tools/in-env tools/test
+
+soak:
+	@tools/setup test
+	@tools/in-env .venv/bin/python tools/soak.py $(if $(QUICK),--quick) \
+	  $(if $(SECONDS),--seconds $(SECONDS)) $(PARTS)
 
 check:
 	@tools/setup check

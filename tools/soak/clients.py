@@ -22,6 +22,8 @@ from serving import SERVER, Client, ServerProcess
 
 HERE = Path(__file__).parent
 
+SEEN = ("observation", "reward", "terminated", "truncated")
+
 # Lanes come as tensors, and so do the observations of all that R plays.
 KINDS = [
     {"env_id": "CartPole-v1"},
@@ -92,12 +94,12 @@ def play_there(port: int, told: dict) -> None:
         for row in np.fromfile(told["actions"]).reshape(-1, lanes):
             action = [[number] for number in row] if box else [int(number) for number in row]
             answer = client.post_for_tensors(f"{url}/step/", action=action)
-            seen += map(_numbers, ("observation", "reward", "terminated", "truncated"), [answer] * 4)
+            seen += [_numbers(*answer[name]) for name in SEEN]
     else:
         client.post(f"{url}/reset/", seed=told["seed"])
         for (number,) in np.fromfile(told["actions"]).reshape(-1, 1):
             answer = client.post(f"{url}/step/", action=[number] if box else int(number))
-            seen += [answer[name] for name in ("observation", "reward", "terminated", "truncated")]
+            seen += [answer[name] for name in SEEN]
             if answer["done"]:
                 seen.append(client.post(f"{url}/reset/")["observation"])
     client.post(f"{url}/close/")
@@ -108,8 +110,7 @@ def play_there(port: int, told: dict) -> None:
 _DTYPES = {"F32": "<f4", "F64": "<f8", "BOOL": "?", "I64": "<i8"}
 
 
-def _numbers(name: str, answer: dict) -> np.ndarray:
-    dtype, shape, data = answer[name]
+def _numbers(dtype: str, shape: list[int], data: bytes) -> np.ndarray:
     return np.frombuffer(data, _DTYPES[dtype]).reshape(shape)
 
 

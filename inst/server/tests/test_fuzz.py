@@ -96,6 +96,7 @@ NAMES = st.sampled_from(["action", "action/0", "action/a~1b", "", "é", "x"])
 
 BYTES = {"F64": 8, "I64": 8, "U64": 8, "F32": 4, "I32": 4, "F16": 2, "U8": 1, "BOOL": 1}
 SHAPES = st.lists(st.integers(0, 5), max_size=3)
+FAULTS = ["entry", "entry", "length", "data", "bytes"]
 METADATA = st.dictionaries(
     st.sampled_from(["request", "render", "texts", "step_mask", "format"]),
     st.sampled_from(["{}", "true", '{"key":"k","number":1}', "[", "NaN", '{"a":1}', '{"a":"b"}']),
@@ -116,7 +117,7 @@ def files(draw):
     if draw(st.booleans()):
         header["__metadata__"] = draw(METADATA)
     faults = draw(st.sampled_from([0, 1, 1, 2]))
-    kinds = [draw(st.sampled_from(["entry", "entry", "length", "data", "bytes"])) for _ in range(faults)]
+    kinds = draw(st.lists(st.sampled_from(FAULTS), min_size=faults, max_size=faults))
     if "entry" in kinds and header:
         entry = header[draw(st.sampled_from(list(header)))]
         field = draw(st.sampled_from(["dtype", "shape", "data_offsets", "more"]))

@@ -1,0 +1,157 @@
+"""Prove what takes long to prove: run the parts one after the other, and print a table.
+
+    make soak                    all of it, some two hours
+    make soak QUICK=1            a glance at each part
+    make soak SECONDS=60         parts that go on for a time go on for so long
+    make soak PARTS="cuts idle"  some of the parts
+
+A part is a command that prints a line "PART: figures" (or several, such as "PART-json: ...") and
+fails by its exit status. GYM_SOAK_SERVER has more options for the servers of clients, soak and
+idle, such as "--isolate all".
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+TOP = Path(__file__).resolve().parents[1]
+SOAK = TOP / "tools" / "soak"
+SERVER = TOP / "inst" / "server"
+
+
+class Part(NamedTuple):
+    """One part.
+
+    Attributes:
+        command: what is run.
+        where: the folder in which.
+        variables: what is added to the environment.
+        is_here: whether there is anything to run.
+    """
+
+    command: list[str]
+    where: Path = TOP
+    variables: dict[str, str] | None = None
+    is_here: bool = True
+
+
+def python(name: str, *arguments: object) -> Part:
+    """Return a part that is a script in Python."""
+    script = SOAK / f"{name}.py"
+    return Part([sys.executable, str(script), *map(str, arguments)], is_here=script.exists())
+
+
+def r(name: str, *arguments: object) -> Part:
+    """Return a part that is a script in R."""
+    script = SOAK / f"{name}.R"
+    command = ["Rscript", "--no-init-file", str(script), *map(str, arguments)]
+    return Part(command, is_here=script.exists())
+
+
+def pytest(test: str, **variables: object) -> Part:
+    """Return a part that is tests of the server's, at greater length."""
+    how = ("-q", "--color=no", "-p", "no:cacheprovider")
+    return Part(
+        [sys.executable, "-m", "pytest", *how, *test.split()],
+        SERVER,
+        {name: str(value) for name, value in variables.items()},
+    )
+
+
+def testthat(name: str, **variables: object) -> Part:
+    """Return a part that is one of the package's test files, at greater length."""
+    test = (
+        "library(testthat); library(gym); "
+        f"test_file('tests/testthat/test-{name}.R', package = 'gym', "
+        "load_package = 'installed', reporter = 'check', stop_on_failure = TRUE)"
+    )
+    return Part(
+        ["Rscript", "--no-init-file", "-e", test],
+        TOP,
+        {"NOT_CRAN": "true", **{name: str(value) for name, value in variables.items()}},
+    )
+
+
+def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
+    """Return the parts by their names."""
+
+    def lasting(long: float, short: float) -> float:
+        return seconds or (short if quick else long)
+
+    fuzz = lasting(600, 10)
+    return {
+        "clients": python("clients", 32, 8_000 if quick else 200_000),
+        "schemathesis": pytest(
+            "tests/test_schemathesis.py", GYM_TEST_SCHEMA_CASES=500 if quick else 5000
+        ),
+        "fuzz": pytest("tests/test_fuzz.py", GYM_TEST_FUZZ_SECONDS=fuzz),
+        "fuzz-r": r("fuzz", fuzz),
+        "cuts": pytest("tests/test_cuts.py", GYM_TEST_CUTS="all"),
+        "cuts-r": testthat("cuts", GYM_TEST_CUTS="some" if quick else "all"),
+        "kill-server": r("kill-server", 5 if quick else 50),
+        "kill-r": r("kill-r", 3 if quick else 20),
+        "idle": python("idle", 1000),
+        "os-exit": pytest("tests -k os_exit"),
+        "soak": python("soak", lasting(1800, 60)),
+    }
+
+
+def run(name: str, part: Part) -> tuple[str, list[str]]:
+    """Run a part; return how it went and its figures."""
+    if not part.is_here:
+        return "MISSING", []
+    process = subprocess.Popen(
+        part.command,
+        cwd=part.where,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **(part.variables or {})},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    figures = []
+    tests = ""
+    for line in process.stdout:
+        print(line, end="", flush=True)
+        if found := re.match(rf"{name}[-\w]*: (.*)", line):
+            figures.append(found[1])
+        elif re.match(r"\d+ (passed|failed|skipped|error)\b.* in [\d.]+s", line):
+            tests = line.strip()
+    # A test that was skipped has shown nothing.
+    held = process.wait() == 0 and (not tests or "passed" in tests)
+    return "held" if held else "FAILED", figures or [tests]
+
+
+def main() -> int:
+    """Run what was asked for; return the exit status."""
+    options = argparse.ArgumentParser()
+    options.add_argument("--quick", action="store_true")
+    options.add_argument("--seconds", type=float)
+    options.add_argument("parts", nargs="*")
+    asked = options.parse_args()
+    known = parts(asked.quick, asked.seconds)
+    unknown = set(asked.parts) - set(known)
+    if unknown:
+        options.error(f"no such parts: {', '.join(unknown)}; there are {', '.join(known)}")
+    rows = []
+    for name in asked.parts or known:
+        print(f"\n######## {name}", flush=True)
+        began = time.monotonic()
+        outcome, figures = run(name, known[name])
+        rows.append((name, outcome, f"{time.monotonic() - began:.0f} s", "; ".join(figures)))
+    print("\n| part | outcome | took | figures |\n|---|---|---:|---|")
+    for row in rows:
+        print(f"| {' | '.join(row)} |")
+    return int(any(outcome != "held" for _, outcome, *_ in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
