@@ -172,7 +172,8 @@ def main(seconds: float) -> int:
     grown = {what: end[what] - start[what] for what in end}
     print(
         f"soak: {seconds / 60:.0f} min, {lives} clients, {killed} killed, "
-        f"unexpected errors {failed}, grown by {grown} (memory {end['MB'] - warm['MB']} MB since the first sixth), "
+        f"unexpected errors {failed}, grown by {grown} "
+        f"(memory {end['MB'] - warm['MB']} MB since the first sixth), "
         f"exit status {status}"
     )
     problems = [
