@@ -98,7 +98,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
-        "os-exit": pytest("tests -k os_exit"),
+        "os-exit": pytest("tests/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }
 

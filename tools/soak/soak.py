@@ -181,7 +181,8 @@ def main(seconds: float) -> int:
         status != 0,
         reaps and grown["environments"] > 0,
         grown["threads"] > 8,
-        grown["files"] > 8,
+        # The queues of lanes in processes of their own go when Python collects its garbage.
+        grown["files"] > 32,
         grown["processes"] > 2,
         end["MB"] > 1.25 * warm["MB"] + 20,
     ]
