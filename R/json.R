@@ -123,7 +123,8 @@ from_json <- function(text) {
 
 # An even number of backslashes before it stand for themselves.
 refuse_nul <- function(text) {
-  if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE)) {
+  # By bytes: what is no UTF-8 is refused by the parser.
+  if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE, useBytes = TRUE)) {
     gym_abort(
       "A text from the server has the character NUL, which no string in R can hold.",
       class = "gym_error_space",

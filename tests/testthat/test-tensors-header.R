@@ -45,3 +45,9 @@ test_that("a file that ends too early is refused in words", {
     expect_error(read_tensors(file[seq_len(size)]), class = "gym_error_connection", info = size)
   }
 })
+
+test_that("a header that is no UTF-8 is refused without a warning", {
+  bytes <- c(charToRaw("{\"x\\u0000"), as.raw(0xe8), charToRaw("\":1}"))
+  file <- c(writeBin(c(length(bytes), 0L), raw(), size = 4L, endian = "little"), bytes)
+  expect_no_warning(expect_error(read_tensors(file), class = "gym_error_connection"))
+})
