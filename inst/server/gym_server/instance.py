@@ -68,7 +68,7 @@ class Instance:
         self.on_move: Callable[[], None] | None = None
         self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
         self._for_eyes = choices.render_mode == "human"
-        self._made = time.monotonic()
+        self._made = self.hold.used
         if choices.seed is not None:
             self._seed_actions(choices.seed)
 
