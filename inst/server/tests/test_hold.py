@@ -112,8 +112,11 @@ def test_it_can_be_taken_away_from_a_thread_that_is_stuck(hold):
     assert hold._instance.cleared == []
     with pytest.raises(GymServerError, match="too long"):
         hold.take(0)
-    hold.settle()
     may_end.set()
+    # Its next request might get the answer that is still on its way for this one.
+    stuck.join(0.2)
+    assert stuck.is_alive()
+    hold.settle()
     stuck.join(10)
     assert outcomes == ["too long", "too long"]
     assert hold._instance.cleared == [True]
