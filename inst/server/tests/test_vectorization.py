@@ -188,7 +188,7 @@ def test_processes_are_fewer(client):
     refusal = refused(client, 429, num_envs=65, vectorization_mode="async")
     assert refusal["code"] == "too_many_lanes"
     assert "--max-num-envs" in refusal["hint"]
-    refusal = refused(client, num_envs=16385)
+    refusal = refused(client, 429, num_envs=16385)
     assert refusal["message"] == "This server takes at most 16384 lanes, not 16385"
 
 
