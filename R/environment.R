@@ -40,15 +40,27 @@
 #'   count; `"SameStep"`, it is reset within the step, and its last observation is in
 #'   the info, see [env_step()]; `"Disabled"`, it wants [env_reset()] with a `mask`
 #'   before it steps again. `NULL`, the default, is `"NextStep"`. Only with `num_envs`.
+#' @param name What you call it, a string of at most 100 printable characters, by
+#'   which [env_list()] shows it to those who share the server; `NULL`, the default,
+#'   for no name.
 #' @return The instance's id, a string of 8 hexadecimal digits.
 #' @section Errors: `gym_error_http_400` for an id that the server does not
 #'   know, with the nearest ones as a hint, for arguments that the environment
 #'   does not take (code `invalid_kwargs`), for a wrapper that the server does not
-#'   allow (code `wrapper_not_allowed`; the hint lists those that it does), for more
-#'   lanes than it allows (code `too_many_lanes`) or a `vectorization_mode` that cannot
-#'   do what else is asked for (code `not_supported`; the hint says what can), and
-#'   when a part of the server is not installed (code `missing_dependency`; the
-#'   hint says how); `gym_error_argument`; `gym_error_connection`.
+#'   allow (code `wrapper_not_allowed`; the hint lists those that it does), for a
+#'   `vectorization_mode` that cannot do what else is asked for (code `not_supported`;
+#'   the hint says what can), and when a part of the server is not installed (code
+#'   `missing_dependency`; the hint says how); `gym_error_http_429` for more lanes than
+#'   the server allows (code `too_many_lanes`) or when it has as many environments as
+#'   it allows (code `too_many_instances`); `gym_error_http_504` when making it takes
+#'   longer than the server allows a call to take (code `call_too_long`);
+#'   `gym_error_argument`; `gym_error_connection`.
+#'
+#'   The server gives an environment up on which a call takes too long, and closes one
+#'   that nobody has used or watched for a day, unless it was started with other limits
+#'   (`max_call_seconds` and `idle_minutes` of [gym_server_start()]). Every later call
+#'   then says so: `gym_error_http_504` with code `call_too_long`, `gym_error_http_410`
+#'   with code `instance_idle_closed`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -63,17 +75,18 @@
 #' env_close(client, lanes)
 env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NULL,
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
-                       autoreset_mode = NULL) {
+                       autoreset_mode = NULL, name = NULL) {
   check_client(x)
   check_named_list(kwargs)
   create_instance(
-    x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode
+    x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
+    name
   )
 }
 
 #' List the environments running on a server
 #'
-#' [env_registry()] lists those that could be made.
+#' [env_list()] tells more of each; [env_registry()] lists those that could be made.
 #'
 #' @inheritParams env_create
 #' @return A named list: instance id to environment id, both strings. It holds

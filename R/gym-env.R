@@ -63,13 +63,13 @@
 #' poles$close()
 gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                      wrappers = list(), client = gym_client(), vectorization_mode = NULL,
-                     autoreset_mode = NULL) {
+                     autoreset_mode = NULL, name = NULL) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1")
   check_client(client)
   instance_id <- create_instance(
     client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
-    autoreset_mode
+    autoreset_mode, name
   )
   env <- NULL
   on.exit(if (is.null(env)) close_if_there(client, instance_id))

@@ -1,7 +1,7 @@
 # The environments on a server, as a client knows them.
 
 create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
-                            vectorization_mode = NULL, autoreset_mode = NULL,
+                            vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
                             call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
   if (inherits(env_id, "gym_wrapped")) {
@@ -13,6 +13,7 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   check_count(num_envs, allow_null = TRUE, call = call)
   check_lane_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
   check_lane_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
     num_envs = if (!is.null(num_envs)) whole_text(num_envs),
@@ -21,7 +22,8 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     seed = encode_seed(seed, num_envs, call),
     render_mode = if (!is.null(render_mode)) json_string(render_mode),
     kwargs = if (length(kwargs)) to_json(kwargs),
-    wrappers = if (length(wrappers)) wrappers_json(wrappers)
+    wrappers = if (length(wrappers)) wrappers_json(wrappers),
+    name = if (!is.null(name)) json_string(name)
   )
   for_eyes <- identical(render_mode, "human")
   if (for_eyes) {
@@ -51,11 +53,14 @@ close_instance <- function(x, instance_id, call = rlang::caller_env()) {
 close_if_there <- function(x, instance_id, call = rlang::caller_env()) {
   tryCatch(
     close_instance(x, instance_id, call),
-    gym_error_http_400 = function(cnd) {
-      if (!identical(cnd$code, "unknown_instance")) rlang::cnd_signal(cnd)
+    gym_error_http = function(cnd) {
+      if (!isTRUE(cnd$code %in% gone_codes)) rlang::cnd_signal(cnd)
     }
   )
 }
+
+# By which the server says that an instance is gone, be it by its owner's doing or not.
+gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "environment_died")
 
 # What the client knows of an instance; asked of the server once.
 known_instance <- function(x, instance_id, call = rlang::caller_env()) {

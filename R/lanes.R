@@ -91,8 +91,8 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
       env_id, num_envs = num_envs, vectorization_mode = vectorization_mode,
       autoreset_mode = autoreset_mode, client = client
     ),
-    gym_error_http_400 = function(cnd) {
-      if (!cnd$code %in% c("not_supported", "too_many_lanes", "unsupported_space")) {
+    gym_error_http = function(cnd) {
+      if (!isTRUE(cnd$code %in% c("not_supported", "too_many_lanes", "unsupported_space"))) {
         rlang::cnd_signal(cnd)
       }
     }

@@ -78,7 +78,12 @@ is_running <- function(base) {
 #' @param ... Further options of the server, by name: `monitor_dir = "runs"` is
 #'   its `--monitor-dir runs`. `log_level = "info"` logs what is made and closed,
 #'   `allow_module = c("a", "b")` names Python modules whose environments may be
-#'   made.
+#'   made. Limits for all clients together are `max_instances` (environments, 1,000),
+#'   `max_num_envs` (lanes of one, 16,384), `max_total_lanes` (four times as many),
+#'   `max_watchers` (100), `max_body_mb` (of a request, 16), `max_call_seconds` (that a
+#'   call may take before its environment is given up, 300, 0 for ever) and
+#'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
+#'   0 for never).
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own words: no

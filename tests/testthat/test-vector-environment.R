@@ -203,7 +203,7 @@ test_that("a number of lanes that is none is refused before anything is made", {
                  class = "gym_error_argument")
   }
   error <- expect_error(gym_make("CartPole-v1", num_envs = 1e6, client = client), "1000000",
-                        class = "gym_error_http_400")
+                        class = "gym_error_http_429")
   expect_identical(error$code, "too_many_lanes")
   expect_length(env_list_all(client), before)
 })

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import blake2b
 from http import HTTPStatus
 from pathlib import Path
@@ -19,13 +19,15 @@ from gym_server import (
     watch_routes,  # noqa: F401, declares them
     wire,
 )
-from gym_server.errors import answer_to
+from gym_server.errors import GymServerError, answer_to
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
 from gym_server.instances import Instances
+from gym_server.limits import Limits, Watchers
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
 from gym_server.tensors import TENSORS
+from gym_server.watchdog import Watchdog
 from gym_server.wire import Answer
 
 # The routes of each step; the id is one that an instance can have.
@@ -45,7 +47,7 @@ class Config:
         temporary_monitors: whether they may also write below the system's temporary directory.
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
-        max_num_envs: how many lanes an environment may have.
+        limits: how much of everything there is for all clients together.
         stop: asks the server to stop once the requests under way are answered.
     """
 
@@ -53,12 +55,19 @@ class Config:
     temporary_monitors: bool = True
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
-    max_num_envs: int = 16384
+    limits: Limits = field(default_factory=Limits)
     stop: Callable[[], None] = lambda: None
 
 
 class GymApp(Flask):
-    """The application, with what it has to put in order at the end."""
+    """The application, with what it has to put in order at the end.
+
+    Attributes:
+        answer_for: sends a status, headers and a body on behalf of a thread that is stuck in an
+            environment, to the client that it serves; set by what has the connections.
+    """
+
+    answer_for: Callable[[int, str, list[tuple[str, str]], bytes], None]
 
     def __init__(self, config: Config) -> None:
         """Set up the services and the routes."""
@@ -66,13 +75,15 @@ class GymApp(Flask):
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(config.allowed_modules, self._renderer, config.max_num_envs)
+        self._instances = Instances(config.allowed_modules, self._renderer, config.limits)
         services = Services(
             self._instances,
             self._monitor_root,
             config.stop,
+            Watchers(config.limits.max_watchers),
         )
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
+        self._exactly_once = exactly_once
         self._hot_handlers: dict[str, _Handler] = {}
         for route in ROUTES:
             handler = _Handler(route, services, exactly_once)
@@ -87,6 +98,10 @@ class GymApp(Flask):
             if route.handler in (env_reset, env_step):
                 self._hot_handlers[route.path.split("/")[-2]] = handler
         self.register_error_handler(Exception, lambda error: _response(_failure(error, None)))
+        self.answer_for = lambda *_: None
+        self._watchdog = Watchdog(
+            self._instances, config.limits, self._give_up, exactly_once.forget
+        )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
         """Answer by WSGI, resets and steps without Flask's dispatch: it takes longer than they."""
@@ -109,13 +124,14 @@ class GymApp(Flask):
             environ.get("HTTP_ACCEPT", ""),
         )
         answer = self._hot_handlers[hot[2]].answer(request)
-        headers = [
-            ("Content-Type", answer.content_type),
-            ("Content-Length", str(len(answer.body))),
-            *answer.headers,
-        ]
-        start_response(f"{answer.status} {HTTPStatus(answer.status).phrase}", headers)
+        start_response(*_head(answer))
         return (answer.body,)
+
+    def _give_up(self, thread: int, why: GymServerError) -> None:
+        """Answer what a thread does that is stuck in an environment."""
+        answer = self._exactly_once.give_up(thread, lambda number: _failure(why, number))
+        answer = answer or _failure(why, None)
+        self.answer_for(thread, *_head(answer), answer.body)
 
     def end_watching(self) -> None:
         """Send all watchers away, who would wait for more than the server's last moment."""
@@ -123,6 +139,7 @@ class GymApp(Flask):
 
     def close(self) -> None:
         """Close every environment and monitor."""
+        self._watchdog.stop()
         self._instances.close_all()
         self._renderer.stop()
         self._monitor_root.close()
@@ -235,6 +252,16 @@ def _failure(error: Exception, request_id: RequestId | None) -> Answer:
     if isinstance(error, MethodNotAllowed):
         answer = answer._replace(headers=(("Allow", ", ".join(sorted(error.valid_methods))),))
     return answer
+
+
+def _head(answer: Answer) -> tuple[str, list[tuple[str, str]]]:
+    """Return an answer's status and headers in WSGI's words."""
+    headers = [
+        ("Content-Type", answer.content_type),
+        ("Content-Length", str(len(answer.body))),
+        *answer.headers,
+    ]
+    return f"{answer.status} {HTTPStatus(answer.status).phrase}", headers
 
 
 def _response(answer: Answer) -> Response:

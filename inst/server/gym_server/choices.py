@@ -22,6 +22,7 @@ class Choices:
         num_envs: how many lanes; None for a single environment.
         vectorization_mode: what runs the lanes; None leaves it to us.
         autoreset_mode: what becomes of a lane whose episode ended; None for NEXT_STEP.
+        name: what its owner calls it.
     """
 
     env_id: object
@@ -32,3 +33,4 @@ class Choices:
     num_envs: int | None = None
     vectorization_mode: str | None = None
     autoreset_mode: AutoresetMode | None = None
+    name: str | None = None

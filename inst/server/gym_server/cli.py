@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gym_server.app import Config, GymApp, create_app
+from gym_server.limits import Limits
+from gym_server.open_files import allow_many_open_files
 from gym_server.options import parser
 from gym_server.serve import Server, bind
 
@@ -42,6 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"--host {options.host} lets anybody on the network run environments on this machine "
             "and write files; give --no-auth if that is meant"
         )
+    allow_many_open_files()
     stop = _Stop()
     max_body_bytes = options.max_body_mb * 2**20
     try:
@@ -55,12 +58,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             temporary_monitors=_is_loopback(options.host),
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
-            max_num_envs=options.max_num_envs,
+            limits=Limits(
+                options.max_instances,
+                options.max_num_envs,
+                options.max_total_lanes,
+                options.max_watchers,
+                options.max_call_seconds,
+                options.idle_minutes,
+            ),
             stop=stop,
         )
     )
     server = Server(app, listener, max_body_bytes, on_stop=app.end_watching)
     stop.server = server
+    app.answer_for = server.answer_for
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()

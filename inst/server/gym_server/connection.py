@@ -10,6 +10,7 @@ import email.utils
 import io
 import socket
 import sys
+import threading
 import time
 from collections.abc import Callable
 from functools import lru_cache
@@ -23,6 +24,9 @@ from gym_server.errors import GymServerError, answer_to
 # Seconds that a connection may be idle, and that the next bytes of a begun request may take.
 _IDLE_SECONDS = 3600.0
 _REST_SECONDS = 60.0
+
+# For the answer of a thread that is stuck.
+_LAST_WORD_SECONDS = 1.0
 
 # The header of answers that are worth nothing later.
 _NOT_KEPT = ("Cache-Control", "no-store")
@@ -58,10 +62,17 @@ class Connection:
         self._answering = False
         # Whether what is sent is of this moment only.
         self._passing = False
+        # The request that wants an answer. Whoever takes it out, which only one thread can, is
+        # the one to send it.
+        self._owed: list[_Request] = []
+        # Who serves it, and since when it has waited for its client, in the clock's seconds.
+        self.thread = 0
+        self.silent_since = time.monotonic()
 
     def serve(self) -> None:
         """Answer until the client leaves, is silent for too long, or the server stops."""
         # Whoever is not there any more needs no answer.
+        self.thread = threading.get_ident()
         with contextlib.suppress(OSError), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._socket.settimeout(_IDLE_SECONDS)
@@ -70,6 +81,7 @@ class Connection:
                 self._answering = True
                 if not self._answer_all(self._reader.feed(data)):
                     break
+                self.silent_since = time.monotonic()
                 self._answering = False
                 if self._reader.began != in_part:
                     in_part = self._reader.began
@@ -80,19 +92,38 @@ class Connection:
 
     def _answer(self, request: _Request) -> bool:
         """Answer one request; return whether another may follow."""
+        self._owed.append(request)
         status, headers, body = self._respond(request)
+        try:
+            self._owed.pop()
+        except IndexError:
+            # It took so long that somebody else has answered.
+            return False
         keep = request.keep_alive and not self._stopping
-        head = [f"HTTP/1.1 {status}"]
-        head += [f"{name}: {value}" for name, value in headers]
-        head.append(f"Date: {_date(int(time.time()))}")
-        if not keep:
-            head.append("Connection: close")
-        head.append("\r\n")
         self._passing = _NOT_KEPT in headers
         # In one piece: a body that follows its header is held back until that is acknowledged.
-        self._socket.sendall("\r\n".join(head).encode("latin-1") + body)
+        self._socket.sendall(_head(status, headers, keep) + body)
         self._passing = False
         return keep
+
+    def answer_for(self, status: str, headers: list[tuple[str, str]], body: bytes) -> None:
+        """Answer on behalf of the thread that serves it and is stuck; then leave.
+
+        Args:
+            status: as for WSGI.
+            headers: as for WSGI.
+            body: what follows them.
+        """
+        try:
+            request = self._owed.pop()
+        except IndexError:
+            # It has just come back.
+            return
+        with contextlib.suppress(OSError), self._socket:
+            self._socket.settimeout(_LAST_WORD_SECONDS)
+            data = b"" if request.method == "HEAD" else body
+            self._socket.sendall(_head(status, headers, keep=False) + data)
+            self._socket.shutdown(socket.SHUT_WR)
 
     def _respond(self, request: _Request) -> tuple[str, list[tuple[str, str]], bytes]:
         if request.refusal is not None:
@@ -126,6 +157,14 @@ class Connection:
             "wsgi.errors": sys.stderr,
         }
 
+    def give_way(self) -> bool:
+        """Leave, if nothing but the client is waited for; return whether that is so."""
+        if self._answering:
+            return False
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RD)
+        return True
+
     def stop(self, half_sent: bool) -> None:
         """Make ``serve()`` end when the requests that have arrived are answered.
 
@@ -149,6 +188,17 @@ def _refuse(refusal: GymServerError) -> tuple[str, list[tuple[str, str]], bytes]
     reason = {400: "Bad Request", 413: "Content Too Large"}[status]
     headers = [("Content-Type", wire.JSON), ("Content-Length", str(len(data)))]
     return f"{status} {reason}", headers, data
+
+
+def _head(status: str, headers: list[tuple[str, str]], keep: bool) -> bytes:
+    """Return what comes before the body."""
+    head = [f"HTTP/1.1 {status}"]
+    head += [f"{name}: {value}" for name, value in headers]
+    head.append(f"Date: {_date(int(time.time()))}")
+    if not keep:
+        head.append("Connection: close")
+    head.append("\r\n")
+    return "\r\n".join(head).encode("latin-1")
 
 
 @lru_cache(maxsize=2)

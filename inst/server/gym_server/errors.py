@@ -16,11 +16,16 @@ _STATUS = {
     "not_found": 404,
     "method_not_allowed": 405,
     "request_conflict": 409,
+    "instance_idle_closed": 410,
     "upload_closed": 410,
     "body_too_large": 413,
+    "too_many_instances": 429,
+    "too_many_lanes": 429,
+    "too_many_watchers": 429,
     "environment_error": 500,
     "internal_error": 500,
     "shutting_down": 503,
+    "call_too_long": 504,
 }
 
 
@@ -48,10 +53,38 @@ class GymServerError(Exception):
         """The HTTP status of the answer."""
         return _STATUS.get(self.code, 400)
 
+    def again(self) -> GymServerError:
+        """Return a copy: one that is raised over and over keeps where each time."""
+        return GymServerError(self.code, self.message, self.hint, self.extra)
+
 
 def unknown_instance(instance_id: str) -> GymServerError:
     """No environment has this instance_id, or it was closed."""
     return GymServerError("unknown_instance", f"Instance_id {instance_id} unknown")
+
+
+def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError:
+    """Nobody has used an instance for so long that the server closed it."""
+    return GymServerError(
+        "instance_idle_closed",
+        f"Instance {instance_id} of {env_id} was closed: nobody used it for {minutes:g} minutes",
+        "create it again; the server's option --idle-minutes sets the limit",
+    )
+
+
+def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError:
+    """A call took longer than the server allows.
+
+    Args:
+        what: what took so long, to begin a sentence with.
+        seconds: the limit.
+        consequence: what has become of it.
+    """
+    return GymServerError(
+        "call_too_long",
+        f"{what} took more than {seconds:g} seconds, so {consequence}",
+        "create another; the server's option --max-call-seconds sets the limit",
+    )
 
 
 def shutting_down() -> GymServerError:

@@ -29,6 +29,9 @@ class _Latest(Generic[AnswerT]):
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
+        # What the thread that has the lock is doing. Whoever takes the entry out, which only
+        # one thread can, stores the answer and releases the lock.
+        self.doing: dict[int, tuple[RequestId, Hashable]] = {}
         self.number = -1
         self.content: Hashable = None
         self.answer: AnswerT | None = None
@@ -38,13 +41,16 @@ class _Latest(Generic[AnswerT]):
 class ExactlyOnce(Generic[AnswerT]):
     """The last answer of each key."""
 
-    def __init__(self, forget_after: float = 15 * 60) -> None:
+    def __init__(self, forget_after: float = 15 * 60, most: int = 10_000) -> None:
         """Start with no keys.
 
         Args:
-            forget_after: seconds of idleness after which a key is dropped when another comes.
+            forget_after: seconds of idleness after which a key is dropped by ``forget()``, and
+                when another comes.
+            most: how many keys are kept; the one that was used last goes last.
         """
         self._forget_after = forget_after
+        self._most = most
         self._lock = threading.Lock()
         self._keys: dict[str, _Latest[AnswerT]] = {}
 
@@ -65,18 +71,53 @@ class ExactlyOnce(Generic[AnswerT]):
         latest = self._latest(request_id.key)
         # Held while the environment moves: a repetition that arrives meanwhile waits for the
         # answer of the first.
-        with latest.lock:
+        latest.lock.acquire()
+        thread = threading.get_ident()
+        latest.doing[thread] = request_id, content
+        try:
             if request_id.number < latest.number:
                 raise _conflict(request_id, f"came after number {latest.number}")
             if request_id.number == latest.number:
                 if content != latest.content:
                     raise _conflict(request_id, "was already used for another request")
-            else:
-                latest.answer = act()
-                latest.number = request_id.number
-                latest.content = content
-            latest.used = time.monotonic()
-            return latest.answer  # type: ignore[return-value]
+                return latest.answer  # type: ignore[return-value]
+            answer = act()
+            if latest.doing.pop(thread, None) is not None:
+                self._store(latest, request_id, content, answer)
+            return answer
+        finally:
+            if latest.doing.pop(thread, None) is not None:
+                latest.lock.release()
+
+    def give_up(self, thread: int, refuse: Callable[[RequestId], AnswerT]) -> AnswerT | None:
+        """Answer what a thread is doing, which may never come back with an answer.
+
+        Args:
+            thread: the thread.
+            refuse: makes the answer, for repetitions as well.
+
+        Returns:
+            The answer; None when the thread does nothing that is numbered.
+        """
+        with self._lock:
+            keys = list(self._keys.values())
+        for latest in keys:
+            doing = latest.doing.pop(thread, None)
+            if doing is not None:
+                request_id, content = doing
+                answer = refuse(request_id)
+                self._store(latest, request_id, content, answer)
+                return answer
+        return None
+
+    def _store(
+        self, latest: _Latest[AnswerT], request_id: RequestId, content: Hashable, answer: AnswerT
+    ) -> None:
+        latest.answer = answer
+        latest.number = request_id.number
+        latest.content = content
+        latest.used = time.monotonic()
+        latest.lock.release()
 
     def _latest(self, key: str) -> _Latest[AnswerT]:
         now = time.monotonic()
@@ -84,14 +125,28 @@ class ExactlyOnce(Generic[AnswerT]):
             latest = self._keys.get(key)
             if latest is None:
                 self._forget_before(now - self._forget_after)
+                if len(self._keys) >= self._most:
+                    self._forget_oldest()
                 latest = self._keys[key] = _Latest()
             latest.used = now
             return latest
+
+    def forget(self) -> None:
+        """Drop the keys that have been idle for so long that nothing is repeated any more."""
+        with self._lock:
+            self._forget_before(time.monotonic() - self._forget_after)
 
     def _forget_before(self, oldest: float) -> None:
         for key, latest in list(self._keys.items()):
             if latest.used < oldest and not latest.lock.locked():
                 del self._keys[key]
+
+    def _forget_oldest(self) -> None:
+        # A tenth at once: a look at all of them for each new one would take too long.
+        idle = [item for item in self._keys.items() if not item[1].lock.locked()]
+        idle.sort(key=lambda item: item[1].used)
+        for key, _ in idle[: max(1, self._most // 10)]:
+            del self._keys[key]
 
 
 def _conflict(request_id: RequestId, reason: str) -> GymServerError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
 from collections.abc import Callable
 
@@ -11,7 +13,7 @@ import numpy as np
 from gym_server import spaces
 from gym_server.choices import Choices
 from gym_server.creation import ask
-from gym_server.errors import GymServerError, invalid_parameter, reset_needed, unknown_instance
+from gym_server.errors import GymServerError, invalid_parameter, reset_needed
 from gym_server.frames import RenderThread, picture
 from gym_server.hold import Hold
 from gym_server.monitor import Monitor
@@ -27,7 +29,7 @@ class Instance:
     """One environment.
 
     Every method that moves the environment waits for its hold; one that waited while the
-    instance was being closed raises ``unknown_instance``.
+    instance was being closed raises ``unknown_instance``, or why it was closed.
     """
 
     # Given when the instance is listed.
@@ -53,7 +55,7 @@ class Instance:
         self._choices = choices
         self.renderer = renderer
         self.draws_when_stepped = self._find_out_whether_it_draws()
-        self.hold = Hold(self)
+        self.hold = Hold(self, renderer)
         self._monitor: Monitor | None = None
         self._seed_for_reset = choices.seed
         self._was_reset = False
@@ -66,7 +68,7 @@ class Instance:
         self.on_move: Callable[[], None] | None = None
         self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
         self._for_eyes = choices.render_mode == "human"
-        self._made = time.monotonic()
+        self._made = self.hold.used
         if choices.seed is not None:
             self._seed_actions(choices.seed)
 
@@ -300,12 +302,45 @@ class Instance:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""
         with self.hold:
             self.hold.closed = True
-            self.screen.end(unknown_instance(self.instance_id))
+            self.screen.end(self.hold.gone())
             try:
                 if self._monitor is not None:
                     self._finish_monitor()
             finally:
                 ask(self._close_env)
+
+    def condemn(self, why: GymServerError) -> int | None:
+        """Give the instance up: a call on it has taken too long.
+
+        Args:
+            why: what everybody hears who waits for it.
+
+        Returns:
+            The thread that is stuck in the environment and cannot answer for itself, or None.
+        """
+        stuck = self.hold.condemn(why)
+        self.screen.end(why)
+        self._end_processes()
+        if stuck is None:
+            # It has just come back.
+            threading.Thread(target=self._clear_away_when_free, daemon=True).start()
+            return None
+        return None if self.renderer.give_up(stuck, why) else stuck
+
+    def _clear_away_when_free(self) -> None:
+        with self.hold.when_free():
+            self.clear_away()
+
+    def clear_away(self) -> None:
+        """Close what was condemned, once the call that took too long has come back."""
+        with contextlib.suppress(Exception):
+            if self._monitor is not None:
+                self._finish_monitor()
+        with contextlib.suppress(Exception):
+            self._close_env()
+
+    def _end_processes(self) -> None:
+        """End the processes that the environment runs in, which ends what hangs in them."""
 
     def _close_env(self) -> None:
         self.renderer.run(self._env.close)
@@ -322,6 +357,7 @@ class Instance:
         return {
             "instance_id": self.instance_id,
             "env_id": self.env_id,
+            "name": self._choices.name,
             "observation_space": self._lane_observation_space_info,
             "action_space": self._lane_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,

@@ -6,39 +6,94 @@ import contextlib
 import logging
 import secrets
 import threading
-from collections.abc import Collection
+import time
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
 
 import gymnasium
 from gymnasium.vector import VectorEnv
 
 from gym_server import creation, registry, vectorization, wrappers
 from gym_server.choices import Choices
-from gym_server.errors import GymServerError, shutting_down, unknown_instance
+from gym_server.departed import Departed
+from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
+from gym_server.limits import Limits
 from gym_server.vector_instance import VectorInstance
 
 log = logging.getLogger(__name__)
+
+# What the list of instances tells of each.
+_LISTED = (
+    "instance_id",
+    "env_id",
+    "name",
+    "num_envs",
+    "age_seconds",
+    "idle_seconds",
+    "steps",
+    "watched",
+)
+
+
+# As in hold.py.
+_SETTLED_SECONDS = 5.0
+
+
+@dataclass
+class _Making:
+    """An environment that is being made.
+
+    Attributes:
+        choices: what its client wants.
+        condemn: ends what the making thread waits for, so that it answers for itself; None
+            where that cannot be done.
+        began: in the clock's seconds.
+        settled: whether it was answered for, once it is given up.
+    """
+
+    choices: Choices
+    condemn: Callable[[GymServerError], None] | None = None
+    began: float = field(default_factory=time.monotonic)
+    settled: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def lanes(self) -> int:
+        return self.choices.num_envs or 1
+
+    def too_long(self, seconds: float) -> GymServerError:
+        return call_too_long(
+            f"Making {self.choices.env_id}", seconds, "the server does not wait for it any more"
+        )
 
 
 class Instances:
     """All instances of a server."""
 
     def __init__(
-        self, allowed_modules: Collection[str], renderer: RenderThread, max_num_envs: int = 16384
+        self,
+        allowed_modules: Collection[str],
+        renderer: RenderThread,
+        limits: Limits | None = None,
     ) -> None:
         """Start with none.
 
         Args:
             allowed_modules: names of the modules that an env_id may import.
             renderer: the process's render thread.
-            max_num_envs: how many lanes one of them may have.
+            limits: how many of them there may be, and how large.
         """
-        self._max_num_envs = max_num_envs
+        self._limits = limits or Limits()
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
         self._instances: dict[str, Instance] = {}
+        # By instance_id; by the thread that makes it; by instance_id.
+        self._lanes: dict[str, int] = {}
+        self._creating: dict[int, _Making] = {}
+        self._closing: dict[str, Instance] = {}
+        self._departed = Departed()
         self._stopping = False
 
     def create(self, choices: Choices) -> str:
@@ -46,43 +101,74 @@ class Instances:
 
         Raises:
             GymServerError: see ``creation.make()``, ``wrappers.wrap()`` and ``Instance``;
-                ``shutting_down``.
+                ``shutting_down``, ``too_many_instances``, ``too_many_lanes``; ``call_too_long``.
         """
         # Before an environment is made for nothing.
         wrappers.check_names(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)
         make = self._make_single if choices.num_envs is None else self._make_vector
-        with contextlib.ExitStack() as undo:
+        with self._room_for(choices) as making, contextlib.ExitStack() as undo:
             instance = make(choices, undo)
-            with self._lock:
-                if self._stopping:
-                    raise shutting_down()
-                instance.instance_id = self._new_id()
-                self._instances[instance.instance_id] = instance
+            if not self._enlist(instance, making):
+                undo.close()
+                making.settled.wait(_SETTLED_SECONDS)
+                raise making.too_long(self._limits.max_call_seconds)
             undo.pop_all()
         log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
         return instance.instance_id
+
+    def _enlist(self, instance: Instance, making: _Making) -> bool:
+        """Put an instance on the list, unless its making was given up meanwhile."""
+        with self._lock:
+            if self._stopping:
+                raise shutting_down()
+            if self._creating.pop(threading.get_ident(), None) is None:
+                return False
+            instance.instance_id = self._new_id()
+            self._instances[instance.instance_id] = instance
+            self._lanes[instance.instance_id] = making.lanes
+            return True
+
+    @contextlib.contextmanager
+    def _room_for(self, choices: Choices) -> Iterator[_Making]:
+        """Keep room for an environment while it is made."""
+        making, thread = _Making(choices), threading.get_ident()
+        with self._lock:
+            others = list(self._creating.values())
+            lanes = sum(self._lanes.values()) + sum(other.lanes for other in others)
+            self._limits.check_room(len(self._instances) + len(others), lanes, making.lanes)
+            self._creating[thread] = making
+        try:
+            yield making
+        finally:
+            self._creating.pop(thread, None)
 
     def _make_single(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
         env = creation.make(
             choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
         )
-        undo.callback(self._close_quietly, env)
+        undo.push(self._closing_quietly(env))
         env = wrappers.wrap(env, choices.wrappers, self._renderer)
         return Instance(env, choices, self._renderer)
 
     def _make_vector(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
         env, mode = vectorization.make(
-            choices, self._allowed_modules, self._max_num_envs, self._renderer
+            choices, self._allowed_modules, self._limits.max_num_envs, self._renderer
         )
-        undo.callback(self._close_quietly, env)
+        undo.push(self._closing_quietly(env))
         return VectorInstance(env, mode, choices, self._renderer)
 
-    def _close_quietly(self, env: gymnasium.Env | VectorEnv) -> None:
-        # What the client must hear of is why it gets no instance.
-        with contextlib.suppress(Exception):
-            self._renderer.run(env.close)
+    def _closing_quietly(self, env: gymnasium.Env | VectorEnv) -> Callable[..., None]:
+        def close(kind: type | None, error: BaseException | None, *_: object) -> None:
+            # The render thread hangs in it, and must be left to that.
+            if isinstance(error, GymServerError) and error.code == "call_too_long":
+                return
+            # What the client must hear of is why it gets no instance.
+            with contextlib.suppress(Exception):
+                self._renderer.run(env.close)
+
+        return close
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
@@ -92,12 +178,12 @@ class Instances:
         """Return an instance.
 
         Raises:
-            GymServerError: ``unknown_instance``.
+            GymServerError: ``unknown_instance``, or why the server closed it.
         """
         try:
             return self._instances[instance_id]
         except KeyError:
-            raise unknown_instance(instance_id) from None
+            raise self._departed.why(instance_id) from None
 
     def env_ids(self) -> dict[str, str]:
         """Return every instance's env_id by its instance_id."""
@@ -106,12 +192,117 @@ class Instances:
 
     def close(self, instance_id: str) -> None:
         """Close an instance; from now on it is unknown."""
+        instance = self._take_off(instance_id)
+        if instance is None:
+            raise self._departed.why(instance_id)
+        self._close(instance)
+        log.info("Closed instance %s", instance_id)
+
+    def _take_off(self, instance_id: str, why: GymServerError | None = None) -> Instance | None:
+        """Take an instance off the list, with the reason for those who will ask for it."""
         with self._lock:
             instance = self._instances.pop(instance_id, None)
-        if instance is None:
-            raise unknown_instance(instance_id)
-        instance.close()
-        log.info("Closed instance %s", instance_id)
+            if instance is None:
+                return None
+            del self._lanes[instance_id]
+            if why is not None:
+                instance.hold.why = why
+                self._departed.add(instance_id, why)
+            # From now on nobody else would notice that this takes too long.
+            self._closing[instance_id] = instance
+            return instance
+
+    def _close(self, instance: Instance) -> None:
+        try:
+            instance.close()
+        finally:
+            self._closing.pop(instance.instance_id, None)
+
+    def _close_and_log(self, instance: Instance) -> None:
+        try:
+            self._close(instance)
+        except GymServerError as error:
+            log.warning("Closing instance %s: %s", instance.instance_id, error)
+
+    def list(self) -> list[dict]:
+        """Return what can be told of every instance at once, the oldest first."""
+        with self._lock:
+            instances = list(self._instances.values())
+        listed = []
+        for instance in instances:
+            # One that has ended meanwhile is not there any more.
+            with contextlib.suppress(GymServerError):
+                about = instance.about()
+                listed.append({name: about[name] for name in _LISTED})
+        return listed
+
+    def give_up_overdue(
+        self, seconds: float, answer_for: Callable[[int, GymServerError], None]
+    ) -> None:
+        """Give up the instances on which a call takes too long; the others go on.
+
+        Args:
+            seconds: how long it may take.
+            answer_for: answers for a thread that is stuck and cannot.
+        """
+        before = time.monotonic() - seconds
+        for thread, making in list(self._creating.items()):
+            began = self._renderer.began(thread) or making.began
+            if began < before and self._creating.pop(thread, None) is not None:
+                why = making.too_long(seconds)
+                log.warning("%s", why.message)
+                if making.condemn is not None:
+                    making.condemn(why)
+                elif not self._renderer.give_up(thread, why):
+                    answer_for(thread, why)
+                making.settled.set()
+        with self._lock:
+            instances = [*self._instances.values(), *self._closing.values()]
+        for instance in instances:
+            since = instance.hold.busy_since
+            if since is not None and since < before:
+                why = self._dismiss(instance, seconds)
+                stuck = instance.condemn(why)
+                if stuck is not None:
+                    answer_for(stuck, why)
+                instance.hold.settle()
+
+    def _dismiss(self, instance: Instance, seconds: float) -> GymServerError:
+        """Take an instance off the list on which a call takes too long; return what to say."""
+        instance_id = instance.instance_id
+        why = call_too_long(
+            f"A call on instance {instance_id} of {instance.env_id}",
+            seconds,
+            "the instance is gone",
+        )
+        log.warning("%s", why.message)
+        self.bury(instance_id, why)
+        return why
+
+    def bury(self, instance_id: str, why: GymServerError) -> None:
+        """Take an instance off the list that is not to be closed any more; keep the reason."""
+        self._take_off(instance_id, why)
+        # Also where it was being closed.
+        self._departed.add(instance_id, why)
+        self._closing.pop(instance_id, None)
+
+    def close_idle(self, minutes: float) -> None:
+        """Close the instances that nobody has used or watched for so long."""
+        now = time.monotonic()
+        with self._lock:
+            instances = list(self._instances.values())
+        for instance in instances:
+            hold = instance.hold
+            if max(hold.used, hold.watched) > now - minutes * 60 or hold.busy_since is not None:
+                continue
+            if instance.about()["watched"]:
+                hold.watched = now
+                continue
+            why = idle_closed(instance.instance_id, instance.env_id, minutes)
+            if self._take_off(instance.instance_id, why) is not None:
+                log.info("%s", why.message)
+                closer = threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
+                closer.start()
 
     def end_watching(self) -> None:
         """Send all watchers away: the server is about to stop."""
@@ -126,9 +317,11 @@ class Instances:
             self._stopping = True
             instances = list(self._instances.values())
             self._instances.clear()
+            self._lanes.clear()
         # One that never comes back must not keep the others from finishing their monitors.
         threads = [
-            threading.Thread(target=_close, args=(instance,), daemon=True) for instance in instances
+            threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
+            for instance in instances
         ]
         for thread in threads:
             thread.start()
@@ -138,12 +331,5 @@ class Instances:
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
-            if instance_id not in self._instances:
+            if instance_id not in self._instances and instance_id not in self._departed:
                 return instance_id
-
-
-def _close(instance: Instance) -> None:
-    try:
-        instance.close()
-    except GymServerError as error:
-        log.warning("Closing instance %s: %s", instance.instance_id, error)

@@ -233,6 +233,13 @@ class AsyncLanes(AsyncVectorEnv):
             raise RuntimeError("a lane failed, and could not send why") from None
         raise failure
 
+    def kill(self) -> None:
+        """End every process at once; whoever waits for one learns that it is gone."""
+        for process in self.processes:
+            # One that was closed meanwhile is no process any more.
+            with contextlib.suppress(ValueError):
+                process.kill()
+
     def close_extras(self, **_: Any) -> None:
         """Ask every process to end, and end those that do not."""
         for pipe in getattr(self, "parent_pipes", ()):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import math
 from collections.abc import Callable
 from pathlib import Path
 
 from gym_server import __version__
+from gym_server.limits import Limits
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,23 +43,68 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
     )
-    options.add_argument(
-        "--max-body-mb",
-        type=_number(1, 1024),
-        default=16,
-        help="size of the largest request (%(default)s)",
-    )
-    options.add_argument(
-        "--max-num-envs",
-        type=_number(1, 1_000_000),
-        default=16384,
-        help="lanes of the largest vector environment (%(default)s)",
-    )
+    _add_limits(options)
     options.add_argument(
         "--no-auth", action="store_true", help="serve a --host that others can reach"
     )
     options.add_argument("--version", action="version", version=__version__)
     return options
+
+
+def _add_limits(options: argparse.ArgumentParser) -> None:
+    limits = options.add_argument_group("limits, for all clients together")
+    limits.add_argument(
+        "--max-body-mb",
+        type=_number(1, 1024),
+        default=16,
+        help="size of the largest request (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-instances",
+        type=_number(1, 1_000_000),
+        default=Limits.max_instances,
+        help="environments at a time (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-num-envs",
+        type=_number(1, 1_000_000),
+        default=Limits.max_num_envs,
+        help="lanes of the largest vector environment (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-total-lanes",
+        type=_number(1, 100_000_000),
+        default=Limits.max_total_lanes,
+        help="lanes of all environments together (four times --max-num-envs)",
+    )
+    limits.add_argument(
+        "--max-watchers",
+        type=_number(1, 1_000_000),
+        default=Limits.max_watchers,
+        help="watch pages at a time (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-call-seconds",
+        type=_duration,
+        default=Limits.max_call_seconds,
+        metavar="SECONDS",
+        help="that a call may take before its environment is given up; 0 for ever (%(default)g)",
+    )
+    limits.add_argument(
+        "--idle-minutes",
+        type=_duration,
+        default=Limits.idle_minutes,
+        metavar="MINUTES",
+        help="after which an environment that nobody uses or watches is closed; 0 for never "
+        "(%(default)g, a day)",
+    )
+
+
+def _duration(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0 <= float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 0")
 
 
 def _number(least: int, greatest: int) -> Callable[[str], int]:

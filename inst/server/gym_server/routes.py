@@ -17,6 +17,7 @@ from gym_server.errors import GymServerError
 from gym_server.frames import png
 from gym_server.instance import Instance
 from gym_server.instances import Instances
+from gym_server.limits import Watchers
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.tensors import TENSORS, Tensor
 from gym_server.tensors import write as write_tensors
@@ -31,11 +32,13 @@ class Services:
         instances: the environments.
         monitor_root: where monitors may write.
         stop: asks the server to stop once the requests under way are answered.
+        watchers: those who wait for a picture.
     """
 
     instances: Instances
     monitor_root: MonitorRoot
     stop: Callable[[], None]
+    watchers: Watchers
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,7 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
         lane_fields.AUTORESET_MODE,
         "What becomes of a lane whose episode ended, in Gymnasium's words; absent for NextStep.",
     ),
+    Field("name", wire.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
     once=True,
 )
@@ -160,6 +164,17 @@ def env_create(call: Call) -> dict:
 def env_list_all(call: Call) -> dict:
     """List the environments."""
     return {"all_envs": call.services.instances.env_ids()}
+
+
+@declare(
+    "GET",
+    "/v1/instances/",
+    answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
+    "watched of each, the oldest first",
+)
+def instance_list(call: Call) -> dict:
+    """List the environments, with who uses them how much."""
+    return {"instances": call.services.instances.list()}
 
 
 @declare("GET", INSTANCE, answer="all about the environment; needs_reset also after done")

@@ -19,6 +19,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from itertools import islice
 
 from gym_server.connection import Connection
 
@@ -26,6 +27,9 @@ log = logging.getLogger(__name__)
 
 # Threads that only wait for their client cost some memory.
 _MOST_CONNECTIONS = 4000
+
+# How many of them leave at once for others.
+_MAKES_ROOM = 100
 
 # A client that sent half a request when the stop came may be gone.
 _HALF_SENT_SECONDS = 2.0
@@ -139,12 +143,27 @@ class Server:
                 self._changed.wait(0.05)
             return not self._connections
 
-    def _accept(self) -> None:
+    def answer_for(
+        self, thread: int, status: str, headers: list[tuple[str, str]], body: bytes
+    ) -> None:
+        """Answer on behalf of a thread that is stuck in the application.
+
+        Args:
+            thread: its identity.
+            status: as for WSGI.
+            headers: as for WSGI.
+            body: what follows them.
+        """
         with self._changed:
-            if len(self._connections) >= _MOST_CONNECTIONS:
-                # The others wait in the queue of the listening socket.
-                self._changed.wait(1.0)
-                return
+            stuck = [one for one in self._connections if one.thread == thread]
+        for connection in stuck:
+            connection.answer_for(status, headers, body)
+            self._forget(connection)
+
+    def _accept(self) -> None:
+        if len(self._connections) >= _MOST_CONNECTIONS:
+            self._make_room()
+            return
         try:
             client, address = self._listener.accept()
         except OSError as error:
@@ -166,6 +185,18 @@ class Server:
         except Exception:
             log.exception("A connection ended by a fault of the server's own")
         finally:
-            with self._changed:
-                self._connections.discard(connection)
-                self._changed.notify()
+            self._forget(connection)
+
+    def _forget(self, connection: Connection) -> None:
+        with self._changed:
+            self._connections.discard(connection)
+            self._changed.notify()
+
+    def _make_room(self) -> None:
+        """Send those away whose clients have been silent for longest; they may come again."""
+        with self._changed:
+            silent = sorted(self._connections, key=lambda connection: connection.silent_since)
+            leaving = list(islice((one for one in silent if one.give_way()), _MAKES_ROOM))
+            # The others wait in the queue of the listening socket.
+            if len(self._connections) >= _MOST_CONNECTIONS:
+                self._changed.wait(0.1 if leaving else 1.0)

@@ -339,6 +339,10 @@ class VectorInstance(Instance):
             return self._env.observation_of(lane)
         return lane_of(self._lane_observation_space, self._observation, lane)
 
+    def _end_processes(self) -> None:
+        if isinstance(self._env, AsyncLanes):
+            self._env.kill()
+
     def _close_env(self) -> None:
         if isinstance(self._env, AsyncLanes):
             self._env.close()

@@ -77,7 +77,8 @@ def env_watch_state(call: Call) -> Content:
     """Wait for something new to see; drawing takes place only for those who wait here."""
     lane = call.fields["lane"] or 0
     call.instance.check_lane(lane)
-    body = call.instance.screen.see(lane, call.fields["after"])
+    with call.services.watchers.one_more():
+        body = call.instance.screen.see(lane, call.fields["after"])
     return Content(body, JSON, headers=(_NOT_KEPT,))
 
 

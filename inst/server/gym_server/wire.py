@@ -216,6 +216,21 @@ def _video_callable(value: object) -> int:
     return integer(value)
 
 
+# Whatever can be seen on a line of its own, and does not turn the direction of the others.
+_NAME = (
+    "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069"
+    "\\ud800-\\udfff\\ufeff]*$"
+)
+_LONGEST_NAME = 100
+
+
+def _name(value: object) -> str:
+    value = text(value)
+    if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
+        raise ValueError
+    return value
+
+
 _KEY = re.compile("[!-~]{1,64}")
 
 
@@ -238,6 +253,11 @@ _TRUE_OR_FALSE = [
 BOOLEAN = Kind({"anyOf": _TRUE_OR_FALSE}, "true or false", _boolean)
 INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 TEXT = Kind({"type": "string"}, "a string", text)
+NAME = Kind(
+    {"type": "string", "maxLength": _LONGEST_NAME, "pattern": _NAME},
+    f"a text of 1 to {_LONGEST_NAME} printable characters",
+    _name,
+)
 OBJECT = Kind({"type": "object"}, "an object", _object)
 WRAPPERS = Kind(
     {

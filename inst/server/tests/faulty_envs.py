@@ -45,6 +45,34 @@ class Hanging(Counting):
         time.sleep(3600)
 
 
+class HangsWhere(Counting):
+    """Hangs for some seconds where its kwarg says: in "init", "reset", "render" or "close"."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+    closed = 0
+
+    def __init__(self, where, hours=1.0, render_mode=None):
+        super().__init__()
+        self.where, self.hours, self.render_mode = where, hours, render_mode
+        self.hang("init")
+
+    def hang(self, here):
+        if self.where == here:
+            time.sleep(3600 * self.hours)
+
+    def reset(self, *, seed=None, options=None):
+        self.hang("reset")
+        return super().reset(seed=seed, options=options)
+
+    def render(self):
+        self.hang("render")
+        return np.zeros((2, 2, 3), dtype=np.uint8)
+
+    def close(self):
+        self.hang("close")
+        type(self).closed += 1
+
+
 class Echo(Counting):
     """Observes the action that it got; its Box is what the kwargs say."""
 
@@ -294,6 +322,7 @@ for _kind in (
     Echo,
     ExitsInStep,
     Hanging,
+    HangsWhere,
     KillsItself,
     Letters,
     LongDouble,

@@ -110,3 +110,50 @@ def test_a_key_that_is_in_use_is_not_forgotten():
 
     once.answer(RequestId("a", 1), "step", meanwhile)
     assert once.answer(RequestId("a", 1), "step", act) == "slow"
+
+
+def test_a_key_is_forgotten_once_it_has_been_idle():
+    once, act = ExactlyOnce(forget_after=0), Counter()
+    once.answer(RequestId("a", 1), "step", act)
+    once.forget()
+    assert once.answer(RequestId("a", 1), "step", act) == 2
+
+
+def test_only_so_many_keys_are_kept():
+    once, act = ExactlyOnce(most=20), Counter()
+    for number in range(30):
+        once.answer(RequestId(str(number), 1), "step", act)
+    assert len(once._keys) <= 20
+    # The latest are among them.
+    assert once.answer(RequestId("29", 1), "step", act) == 30
+    assert once.answer(RequestId("0", 1), "step", act) == 31
+
+
+def test_what_never_comes_back_is_answered_by_another_thread():
+    once, act = ExactlyOnce(), Counter()
+    began, may_end = threading.Event(), threading.Event()
+
+    def stuck():
+        began.set()
+        assert may_end.wait(10)
+        return "too late"
+
+    thread = threading.Thread(target=once.answer, args=(RequestId("a", 1), "step", stuck))
+    thread.start()
+    assert began.wait(10)
+    repetition = []
+    waiting = threading.Thread(
+        target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
+    )
+    waiting.start()
+    assert once.give_up(thread.ident, lambda request_id: f"gave up {request_id.number}") == (
+        "gave up 1"
+    )
+    waiting.join(10)
+    assert repetition == ["gave up 1"]
+    assert once.answer(RequestId("a", 2), "step", act) == 1
+    may_end.set()
+    thread.join(10)
+    # What came too late is nobody's answer.
+    assert once.answer(RequestId("a", 2), "step", act) == 1
+    assert once.give_up(thread.ident, str) is None

@@ -116,3 +116,28 @@ def test_what_has_begun_is_waited_for_without_patience():
 def test_the_patient_get_their_turn(occupied):
     renderer, go_on = occupied
     assert renderer.run_while(lambda: go_on() or True, lambda: "drawn") == "drawn"
+
+
+def test_another_thread_draws_on_when_one_hangs():
+    renderer, began, may_end = RenderThread(), threading.Event(), threading.Event()
+    outcomes = []
+
+    def ask():
+        try:
+            renderer.run(lambda: (began.set(), may_end.wait(10), threading.get_ident()))
+        except ValueError as why:
+            outcomes.append(str(why))
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    assert began.wait(10)
+    assert not renderer.give_up(threading.get_ident(), ValueError("not mine"))
+    assert renderer.give_up(asking.ident, ValueError("it hangs"))
+    asking.join(10)
+    assert outcomes == ["it hangs"]
+    first = renderer.run(threading.get_ident)
+    # The one that comes back draws no more.
+    may_end.set()
+    assert {renderer.run(threading.get_ident) for _ in range(20)} == {first}
+    assert not renderer.give_up(first, ValueError("it does not hang"))
+    renderer.stop()

@@ -195,6 +195,7 @@ def test_all_about_an_instance(client, create):
     assert about == {
         "instance_id": url.rsplit("/", 1)[1],
         "env_id": "CartPole-v0",
+        "name": None,
         "reward_threshold": 195.0,
         "max_episode_steps": 200,
         "render_fps": 50,

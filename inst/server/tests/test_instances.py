@@ -118,3 +118,36 @@ def test_at_the_end_everything_is_closed_and_nothing_more_is_made(app, client, c
 def test_an_environment_that_fails_to_close_does_not_keep_the_others_open(app, faulty, create):
     faulty("RaisesInClose"), create()
     app._instances.close_all()
+
+
+def test_instances_are_listed_with_who_uses_them_how_much(client, create):
+    url = create("CartPole-v1", name="Änne's pole")
+    lanes = create("CartPole-v1", num_envs=3)
+    client.post(f"{lanes}/reset/")
+    client.post(f"{lanes}/step/", json={"action": [0, 0, 0]})
+    client.get(f"{lanes}/watch/presence/")
+    first, second = client.get("/v1/instances/").json["instances"]
+    assert first["age_seconds"] >= first.pop("idle_seconds") >= 0
+    assert first.pop("age_seconds") >= second["age_seconds"]
+    assert first == {
+        "instance_id": url.rsplit("/", 1)[1],
+        "env_id": "CartPole-v1",
+        "name": "Änne's pole",
+        "num_envs": None,
+        "steps": 0,
+        "watched": False,
+    }
+    expected = {"name": None, "num_envs": 3, "steps": 3, "watched": True}
+    assert {key: second[key] for key in expected} == expected
+    assert client.get(url).json["name"] == "Änne's pole"
+    # Strictly typed classic clients know no more than this.
+    assert set(client.get("/v1/envs/").json) == {"all_envs"}
+
+
+@pytest.mark.parametrize(
+    "name", ["x" * 101, "two\nlines", "\x1b[31mred", "nul\0", "\u202eright to left", 7, ["a"]]
+)
+def test_a_name_is_a_short_text_on_one_line(client, name):
+    refusal = client.post("/v1/envs/", json={"env_id": "CartPole-v1", "name": name})
+    assert (refusal.status_code, refusal.json["code"]) == (400, "invalid_parameter")
+    assert "1 to 100 printable characters" in refusal.json["message"]

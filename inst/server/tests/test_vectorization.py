@@ -4,6 +4,7 @@ from faulty_envs import Counting
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server.app import Config, create_app
+from gym_server.limits import Limits
 
 
 class OwnLanes(VectorEnv):
@@ -170,7 +171,7 @@ def test_what_is_for_lanes_needs_lanes(client, fields):
 
 @pytest.fixture
 def small_server():
-    app = create_app(Config(max_num_envs=100))
+    app = create_app(Config(limits=Limits(max_num_envs=100)))
     yield app.test_client()
     app.close()
 
@@ -178,16 +179,16 @@ def small_server():
 def test_a_server_has_a_largest_number_of_lanes(small_server):
     assert chosen(small_server, num_envs=100)[0] == "vector_entry_point"
     answer = small_server.post("/v1/envs/", json={"env_id": "CartPole-v1", "num_envs": 101})
-    assert (answer.status_code, answer.json["code"]) == (400, "too_many_lanes")
+    assert (answer.status_code, answer.json["code"]) == (429, "too_many_lanes")
     assert answer.json["message"] == "This server takes at most 100 lanes, not 101"
     assert "--max-num-envs" in answer.json["hint"]
 
 
 def test_processes_are_fewer(client):
-    refusal = refused(client, num_envs=65, vectorization_mode="async")
+    refusal = refused(client, 429, num_envs=65, vectorization_mode="async")
     assert refusal["code"] == "too_many_lanes"
     assert "--max-num-envs" in refusal["hint"]
-    refusal = refused(client, num_envs=16385)
+    refusal = refused(client, 429, num_envs=16385)
     assert refusal["message"] == "This server takes at most 16384 lanes, not 16385"
 
 

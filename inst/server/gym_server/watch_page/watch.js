@@ -11,6 +11,10 @@ const HERE = new URL(location.pathname.replace(/\/?$/, "/"), location.href);
 const GONE_PAUSE = 1000;
 const PRESENCE_PAUSE = 700;
 const STILL_AFTER = 1500;
+// With these there is nothing to wait for.
+const CLOSED = new Set([
+  "unknown_instance", "instance_idle_closed", "call_too_long", "environment_died",
+]);
 
 const observation = new Observation($("observation"));
 const playback = new Playback(show);
@@ -37,8 +41,8 @@ async function follow() {
       }
     } catch (problem) {
       if (problem.name === "AbortError") continue;
-      if (problem.code === "unknown_instance") {
-        await tellClosed();
+      if (CLOSED.has(problem.code)) {
+        await tellClosed(problem);
         return;
       }
       if (problem.code === "invalid_parameter" && lane > 0) {
@@ -46,7 +50,7 @@ async function follow() {
         continue;
       }
       after = null;
-      if (problem.status === 500) tell("faulty", "This cannot be shown", problem.message);
+      if (problem.status === 500 || problem.status === 429) tell("faulty", "This cannot be shown", problem.message);
       else tell("gone", "The server is gone", "This page goes on by itself when it is back.");
       await sleep(GONE_PAUSE);
     }
@@ -223,8 +227,9 @@ function hideMessage() {
   $("message").hidden = true;
 }
 
-async function tellClosed() {
-  tell("closed", "This environment is closed", "");
+async function tellClosed(problem) {
+  const byItsOwner = problem.code === "unknown_instance";
+  tell("closed", byItsOwner ? "This environment is closed" : problem.message, "");
   $("pause").disabled = true;
   $("pace").textContent = "";
   if (!shown) $("env").textContent = "Closed";

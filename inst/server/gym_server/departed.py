@@ -1,0 +1,32 @@
+"""Why instances are gone that their owners did not close, for those who still ask for them."""
+
+from __future__ import annotations
+
+import threading
+
+from gym_server.errors import GymServerError, unknown_instance
+
+
+class Departed:
+    """The reasons, by instance_id; only the latest ones are kept."""
+
+    def __init__(self, most: int = 10_000) -> None:
+        """Keep so many."""
+        self._most = most
+        self._lock = threading.Lock()
+        self._reasons: dict[str, GymServerError] = {}
+
+    def add(self, instance_id: str, why: GymServerError) -> None:
+        """Note why an instance is gone."""
+        with self._lock:
+            self._reasons[instance_id] = why
+            while len(self._reasons) > self._most:
+                del self._reasons[next(iter(self._reasons))]
+
+    def why(self, instance_id: str) -> GymServerError:
+        """Return what to tell who asks for an instance; ``unknown_instance`` without a reason."""
+        reason = self._reasons.get(instance_id)
+        return unknown_instance(instance_id) if reason is None else reason.again()
+
+    def __contains__(self, instance_id: str) -> bool:
+        return instance_id in self._reasons

@@ -1,0 +1,95 @@
+"""How much of everything a server gives to those who use it together."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from gym_server.errors import GymServerError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a server allows; the defaults leave a lab's server on one machine standing.
+
+    Attributes:
+        max_instances: how many environments there may be.
+        max_num_envs: how many lanes one of them may have.
+        max_total_lanes: how many all of them may have together, where one without lanes counts
+            as one; None for four times as many as one may have.
+        max_watchers: how many pages may be shown something at a time.
+        max_call_seconds: how long one call may take before its instance is given up; 0 for ever.
+            Longer than any one call that means well, and short enough that somebody who comes
+            back from a coffee finds it said.
+        idle_minutes: how long nobody may have used or watched an instance before it is closed;
+            0 for ever. A day: what is left in the evening is still there in the morning.
+    """
+
+    max_instances: int = 1000
+    max_num_envs: int = 16384
+    max_total_lanes: int | None = None
+    max_watchers: int = 100
+    max_call_seconds: float = 300.0
+    idle_minutes: float = 24 * 60.0
+
+    def check_room(self, instances: int, lanes: int, more: int) -> None:
+        """Refuse an environment for which there is no room.
+
+        Args:
+            instances: how many there are.
+            lanes: how many they have.
+            more: how many the new one is to have.
+
+        Raises:
+            GymServerError: ``too_many_instances``, ``too_many_lanes``.
+        """
+        if instances >= self.max_instances:
+            raise GymServerError(
+                "too_many_instances",
+                f"This server has {self.max_instances} environments, and takes no more",
+                "close some, GET /v1/instances/ lists them; the server's option --max-instances "
+                "sets the limit",
+            )
+        most = self.max_total_lanes or 4 * self.max_num_envs
+        # One that is too large for itself hears of that.
+        if lanes + more > most and more <= self.max_num_envs:
+            raise GymServerError(
+                "too_many_lanes",
+                f"All environments together may have {most} lanes, and {max(0, most - lanes)} "
+                f"are left, not {more}",
+                "close some, GET /v1/instances/ lists them; the server's option "
+                "--max-total-lanes sets the limit",
+            )
+
+
+class Watchers:
+    """Those who wait for a picture, of whatever environment."""
+
+    def __init__(self, most: int) -> None:
+        """Let in so many at a time."""
+        self._most = most
+        self._lock = threading.Lock()
+        self._count = 0
+
+    @contextlib.contextmanager
+    def one_more(self) -> Iterator[None]:
+        """Let another one in for a while.
+
+        Raises:
+            GymServerError: ``too_many_watchers``.
+        """
+        with self._lock:
+            if self._count >= self._most:
+                raise GymServerError(
+                    "too_many_watchers",
+                    f"This server shows environments to {self._most} watchers, and takes no more",
+                    "close a page; the server's option --max-watchers sets the limit",
+                )
+            self._count += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._count -= 1

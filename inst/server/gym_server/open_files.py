@@ -1,0 +1,31 @@
+"""How many files and connections this process may have open."""
+
+from __future__ import annotations
+
+import contextlib
+
+# More than the connections that the server takes, with their environments' pipes and files; what
+# programs of ours that close every file before they begin still get through in no time.
+_ENOUGH = 65536
+
+# What macOS lets a process have, whatever it says.
+_LEAST = 10240
+
+
+def allow_many_open_files() -> None:
+    """Raise the limit of open files, which is 1,024 on many systems, as far as is allowed.
+
+    Windows has none that matters here.
+    """
+    try:
+        import resource
+    except ImportError:
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    for most in (_ENOUGH, _LEAST):
+        wanted = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        if soft == resource.RLIM_INFINITY or soft >= wanted:
+            return
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+            return

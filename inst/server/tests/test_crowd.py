@@ -1,0 +1,61 @@
+"""More connections than a server takes."""
+
+import json
+import socket
+import threading
+
+import pytest
+
+from gym_server import serve
+from gym_server.app import create_app
+
+GET = b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+MOST = 10
+
+
+@pytest.fixture
+def crowded(monkeypatch):
+    """Run a server that takes few connections; return a function that makes one."""
+    monkeypatch.setattr(serve, "_MOST_CONNECTIONS", MOST)
+    monkeypatch.setattr(serve, "_MAKES_ROOM", 2)
+    app = create_app()
+    server = serve.Server(app, serve.bind("127.0.0.1", 0), 2**20, on_stop=app.end_watching)
+    running = threading.Thread(target=server.run, args=(5,))
+    running.start()
+    connections = []
+
+    def connect():
+        connection = socket.create_connection(("127.0.0.1", server.port), timeout=20)
+        connections.append(connection)
+        return connection
+
+    yield connect
+    for connection in connections:
+        connection.close()
+    server.stop()
+    running.join(20)
+    app.close()
+
+
+def is_well(connection):
+    connection.sendall(GET)
+    answer = b""
+    while b"\r\n\r\n" not in answer or not answer.endswith(b"}"):
+        answer += connection.recv(65536)
+    return json.loads(answer.partition(b"\r\n\r\n")[2])["status"] == "ok"
+
+
+def test_silent_connections_leave_for_new_ones(crowded):
+    silent = [crowded() for _ in range(MOST)]
+    assert all(is_well(connection) for connection in silent)
+    assert is_well(silent[0])
+    assert all(is_well(crowded()) for _ in range(2))
+    # The one that was silent for longest left; the one that asked last stays.
+    assert silent[1].recv(1) == b""
+    assert is_well(silent[0])
+
+
+def test_half_sent_requests_leave_as_well(crowded):
+    for _ in range(MOST):
+        crowded().sendall(GET[:20])
+    assert is_well(crowded())

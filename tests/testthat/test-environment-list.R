@@ -1,0 +1,80 @@
+test_that("who has which environment is a data frame, the oldest first", {
+  server <- local_server()
+  none <- env_list(server)
+  expect_identical(
+    vapply(none, typeof, ""),
+    c(instance_id = "character", name = "character", env_id = "character", num_envs = "integer",
+      age = "double", idle = "double", steps = "double", watched = "logical")
+  )
+  expect_identical(nrow(none), 0L)
+  first <- env_create(server, "CartPole-v1", name = "J\u00fcrgen's \"pole\"")
+  lanes <- gym_make("CartPole-v1", num_envs = 3, name = "three", client = server)
+  third <- gym_make("Pendulum-v1", client = server)
+  lanes$reset()
+  lanes$step(c(0, 0, 1))
+  listed <- env_list(server)
+  expect_identical(vapply(listed, typeof, ""), vapply(none, typeof, ""))
+  expect_identical(listed$instance_id, c(first, lanes$instance_id, third$instance_id))
+  expect_identical(listed$name, c("J\u00fcrgen's \"pole\"", "three", NA))
+  expect_identical(listed$env_id, c("CartPole-v1", "CartPole-v1", "Pendulum-v1"))
+  expect_identical(listed$num_envs, c(NA, 3L, NA))
+  expect_identical(listed$steps, c(0, 3, 0))
+  expect_identical(listed$watched, c(FALSE, FALSE, FALSE))
+  expect_true(all(listed$age >= listed$idle & listed$idle >= 0))
+  expect_false(is.unsorted(-listed$age))
+  expect_error(env_list(3), "client", class = "gym_error_argument")
+})
+
+test_that("a name is a short string", {
+  client <- test_client()
+  for (bad in list(3, NA_character_, "", c("a", "b"))) {
+    expect_error(gym_make("CartPole-v1", name = bad, client = client), "`name`",
+                 class = "gym_error_argument")
+  }
+  for (bad in c(strrep("x", 101), "two\nlines")) {
+    expect_error(env_create(client, "CartPole-v1", name = bad), "1 to 100 printable",
+                 class = "gym_error_http_400")
+  }
+})
+
+test_that("a server's limits say what to do about them", {
+  server <- local_server(max_instances = 2, max_num_envs = 4, max_total_lanes = 5)
+  env <- gym_make("CartPole-v1", num_envs = 4, client = server)
+  error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server), "max-total-lanes",
+                        class = "gym_error_http_429")
+  expect_identical(error$code, "too_many_lanes")
+  gym_make("CartPole-v1", client = server)
+  error <- expect_error(gym_make("CartPole-v1", client = server), "max-instances",
+                        class = "gym_error_http_429")
+  expect_identical(error$code, "too_many_instances")
+  # Lanes for a rollout are taken where there is room for them only.
+  env$close()
+  expect_s3_class(rollout("CartPole-v1", policy_random(), episodes = 2, client = server),
+                  "gym_rollout")
+})
+
+test_that("an environment that nobody uses is closed, which its calls say, and close() takes", {
+  server <- local_server(idle_minutes = 0.01)
+  env <- gym_make("CartPole-v1", client = server)
+  deadline <- Sys.time() + 20
+  while (nrow(env_list(server)) && Sys.time() < deadline) Sys.sleep(0.1)
+  error <- expect_error(env$reset(), "nobody used it for 0.01 minutes",
+                        class = "gym_error_http_410")
+  expect_identical(error$code, "instance_idle_closed")
+  expect_silent(env$close())
+})
+
+test_that("a call that takes too long fails in time, and the others go on", {
+  server <- local_server(max_call_seconds = 1)
+  other <- gym_make("CartPole-v1", client = server)
+  # As many lanes one after the other take longer than that, on any machine.
+  many <- gym_make("CartPole-v1", num_envs = 65, vectorization_mode = "async", client = server) |>
+    expect_error(class = "gym_error_http_429")
+  expect_identical(many$code, "too_many_lanes")
+  slow <- expect_error(
+    gym_make("CartPole-v1", num_envs = 16384, vectorization_mode = "sync", client = server),
+    class = "gym_error_http_504"
+  )
+  expect_identical(slow$code, "call_too_long")
+  expect_length(other$reset(), 4L)
+})
