@@ -23,6 +23,7 @@ from gym_server.errors import answer_to
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
 from gym_server.instances import Instances
+from gym_server.isolation import Isolation
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
 from gym_server.tensors import TENSORS
@@ -46,6 +47,9 @@ class Config:
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
         max_num_envs: how many lanes an environment may have.
+        isolate: which environments get a process of their own: "none", "foreign" (those of
+            other modules than Gymnasium's and ale_py's) or "all".
+        max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
     """
 
@@ -54,6 +58,8 @@ class Config:
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
     max_num_envs: int = 16384
+    isolate: str = "foreign"
+    max_worker_mb: int = 0
     stop: Callable[[], None] = lambda: None
 
 
@@ -66,7 +72,12 @@ class GymApp(Flask):
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(config.allowed_modules, self._renderer, config.max_num_envs)
+        self._instances = Instances(
+            config.allowed_modules,
+            self._renderer,
+            config.max_num_envs,
+            Isolation(config.isolate, config.max_worker_mb),
+        )
         services = Services(
             self._instances,
             self._monitor_root,

@@ -56,6 +56,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
             max_num_envs=options.max_num_envs,
+            isolate=options.isolate,
+            max_worker_mb=options.max_worker_mb,
             stop=stop,
         )
     )

@@ -342,6 +342,7 @@ class Instance:
             "needs_reset": self._done or not self._was_reset,
             "monitor": monitor.about() if monitor else None,
             "watched": self.screen.is_watched,
+            "isolated": False,
         }
 
     def look(self, lane: int) -> tuple[dict, np.ndarray | None]:

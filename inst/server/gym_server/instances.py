@@ -7,25 +7,32 @@ import logging
 import secrets
 import threading
 from collections.abc import Collection
+from itertools import islice
 
-import gymnasium
-from gymnasium.vector import VectorEnv
-
-from gym_server import creation, registry, vectorization, wrappers
+from gym_server import registry, vectorization, wrappers
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError, shutting_down, unknown_instance
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
-from gym_server.vector_instance import VectorInstance
+from gym_server.isolated_instance import IsolatedInstance
+from gym_server.isolation import Isolation
+from gym_server.making import make
 
 log = logging.getLogger(__name__)
+
+# Why instances ended that nobody closed.
+_KEPT_REASONS = 10_000
 
 
 class Instances:
     """All instances of a server."""
 
     def __init__(
-        self, allowed_modules: Collection[str], renderer: RenderThread, max_num_envs: int = 16384
+        self,
+        allowed_modules: Collection[str],
+        renderer: RenderThread,
+        max_num_envs: int = 16384,
+        isolation: Isolation | None = None,
     ) -> None:
         """Start with none.
 
@@ -33,28 +40,30 @@ class Instances:
             allowed_modules: names of the modules that an env_id may import.
             renderer: the process's render thread.
             max_num_envs: how many lanes one of them may have.
+            isolation: which of them get a process of their own; None for none.
         """
+        self._isolation = isolation or Isolation()
         self._max_num_envs = max_num_envs
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
-        self._instances: dict[str, Instance] = {}
+        self._instances: dict[str, Instance | IsolatedInstance] = {}
+        self._gone: dict[str, GymServerError] = {}
         self._stopping = False
 
     def create(self, choices: Choices) -> str:
         """Make an environment and return its instance_id, 8 hex digits.
 
         Raises:
-            GymServerError: see ``creation.make()``, ``wrappers.wrap()`` and ``Instance``;
-                ``shutting_down``.
+            GymServerError: see ``making.make()``; ``shutting_down``, ``environment_died``.
         """
         # Before an environment is made for nothing.
         wrappers.check_names(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)
-        make = self._make_single if choices.num_envs is None else self._make_vector
+        isolated = self._isolation.wants(choices.env_id, self._allowed_modules)
         with contextlib.ExitStack() as undo:
-            instance = make(choices, undo)
+            instance = self._make_isolated(choices, undo) if isolated else self._make(choices, undo)
             with self._lock:
                 if self._stopping:
                     raise shutting_down()
@@ -64,40 +73,52 @@ class Instances:
         log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
         return instance.instance_id
 
-    def _make_single(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
-        env = creation.make(
-            choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
-        )
-        undo.callback(self._close_quietly, env)
-        env = wrappers.wrap(env, choices.wrappers, self._renderer)
-        return Instance(env, choices, self._renderer)
+    def _make(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
+        return make(choices, self._allowed_modules, self._max_num_envs, self._renderer, undo)
 
-    def _make_vector(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
-        env, mode = vectorization.make(
-            choices, self._allowed_modules, self._max_num_envs, self._renderer
+    def _make_isolated(self, choices: Choices, undo: contextlib.ExitStack) -> IsolatedInstance:
+        surroundings = self._isolation.surroundings(
+            choices.env_id, self._allowed_modules, self._max_num_envs
         )
-        undo.callback(self._close_quietly, env)
-        return VectorInstance(env, mode, choices, self._renderer)
-
-    def _close_quietly(self, env: gymnasium.Env | VectorEnv) -> None:
-        # What the client must hear of is why it gets no instance.
-        with contextlib.suppress(Exception):
-            self._renderer.run(env.close)
+        instance = IsolatedInstance(
+            choices, surroundings, lambda one, why: self.bury(one.instance_id, why)
+        )
+        undo.callback(instance.condemn, shutting_down())
+        instance.create()
+        return instance
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
+        if self._isolation.mode != "none" and self._allowed_modules:
+            return self._isolation.search(search, self._allowed_modules)
         return registry.search(search, self._allowed_modules)
 
-    def get(self, instance_id: str) -> Instance:
+    def get(self, instance_id: str) -> Instance | IsolatedInstance:
         """Return an instance.
 
         Raises:
-            GymServerError: ``unknown_instance``.
+            GymServerError: ``unknown_instance``, or why it is gone.
         """
         try:
             return self._instances[instance_id]
         except KeyError:
-            raise unknown_instance(instance_id) from None
+            raise self._reason(instance_id) from None
+
+    def _reason(self, instance_id: str) -> GymServerError:
+        why = self._gone.get(instance_id)
+        if why is None:
+            return unknown_instance(instance_id)
+        # Each its own: what is raised collects where it came by.
+        return GymServerError(why.code, why.message, why.hint)
+
+    def bury(self, instance_id: str, why: GymServerError) -> None:
+        """Forget an instance that is gone; later calls get the reason."""
+        with self._lock:
+            if self._instances.pop(instance_id, None) is None:
+                return
+            self._gone[instance_id] = why
+            for oldest in list(islice(self._gone, max(0, len(self._gone) - _KEPT_REASONS))):
+                del self._gone[oldest]
 
     def env_ids(self) -> dict[str, str]:
         """Return every instance's env_id by its instance_id."""
@@ -109,7 +130,7 @@ class Instances:
         with self._lock:
             instance = self._instances.pop(instance_id, None)
         if instance is None:
-            raise unknown_instance(instance_id)
+            raise self._reason(instance_id)
         instance.close()
         log.info("Closed instance %s", instance_id)
 
@@ -138,11 +159,11 @@ class Instances:
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
-            if instance_id not in self._instances:
+            if instance_id not in self._instances and instance_id not in self._gone:
                 return instance_id
 
 
-def _close(instance: Instance) -> None:
+def _close(instance: Instance | IsolatedInstance) -> None:
     try:
         instance.close()
     except GymServerError as error:
