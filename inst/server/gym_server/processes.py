@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import multiprocessing
 import os
 import signal
@@ -16,8 +15,6 @@ from multiprocessing.context import BaseContext
 START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 _PRELOADED = ["gym_server.worker"]
-
-_PR_SET_PDEATHSIG = 1
 
 
 def context() -> BaseContext:
@@ -37,9 +34,7 @@ def end_with_the_server(group: bool = False) -> None:
     if server is None:
         return
     if group and sys.platform == "linux":
-        # Also when code that never lets another thread run keeps the one below from its work.
-        # (The forkserver, whose child this is, ends with the server.)
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        _be_killed_by(server.sentinel)
 
     def end() -> None:
         server.join()
@@ -49,3 +44,16 @@ def end_with_the_server(group: bool = False) -> None:
         os._exit(1)
 
     threading.Thread(target=end, daemon=True).start()
+
+
+def _be_killed_by(sentinel: int) -> None:
+    """Let the system end this process group when the other end of a pipe closes.
+
+    That needs no thread: code that never lets another one run would keep it from its work.
+    """
+    import fcntl
+
+    fcntl.fcntl(sentinel, fcntl.F_SETSIG, signal.SIGKILL)
+    fcntl.fcntl(sentinel, fcntl.F_SETOWN, -os.getpgrp())
+    flags = fcntl.fcntl(sentinel, fcntl.F_GETFL)
+    fcntl.fcntl(sentinel, fcntl.F_SETFL, flags | fcntl.FASYNC)

@@ -52,7 +52,10 @@ class Surroundings:
 def keep_instance(
     moves: Connection, questions: Connection, choices: Choices, surroundings: Surroundings
 ) -> None:
-    """Make an environment and serve it until it is closed; never returns.
+    """Make an environment and serve it until it is closed.
+
+    What keeps this process from its end then, a thread of the environment's or an exit handler,
+    is ended by the server.
 
     Args:
         moves: asks for one move or look after the other; the first answer is how it was made.
@@ -66,16 +69,14 @@ def keep_instance(
     if asked.instance is not None:
         threading.Thread(target=_serve, args=(questions, asked), daemon=True).start()
         _serve(moves, asked)
-    _leave()
 
 
 def list_registry(
     answers: Connection, _: Connection, search: str | None, surroundings: Surroundings
 ) -> None:
-    """Answer what can be created with the allowed modules; never returns."""
+    """Answer what can be created with the allowed modules."""
     _settle(surroundings)
     _answer(answers, 0, partial(registry.search, search, surroundings.allowed_modules))
-    _leave()
 
 
 def _settle(surroundings: Surroundings) -> None:
@@ -107,24 +108,14 @@ def _limit_memory(size: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (size, size))
 
 
-def _leave() -> None:
-    # Whatever threads and exit handlers the environment has: nothing is waited for.
-    with contextlib.suppress(Exception):
-        logging.shutdown()
-        sys.stdout.flush()
-    os._exit(0)
-
-
 def _serve(channel: Connection, asked: _Asked) -> None:
-    while True:
+    while not asked.is_closed:
         try:
             number, method, args = read_question(channel.recv_bytes())
         except (EOFError, OSError):
             # The server let go of it, or is gone.
             os._exit(1)
         _answer(channel, number, getattr(asked, method), *args)
-        if asked.is_closed:
-            _leave()
 
 
 def _answer(channel: Connection, number: int, call: Callable, *args: object) -> None:

@@ -73,7 +73,9 @@ class ServerProcess:
         environment = {
             **os.environ,
             **variables,
-            "PYTHONPATH": os.pathsep.join([str(SERVER), str(TESTS)]),
+            "PYTHONPATH": os.pathsep.join(
+                [str(SERVER), str(TESTS), variables.get("PYTHONPATH", "")]
+            ),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
         self.process = subprocess.Popen(
