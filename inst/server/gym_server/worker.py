@@ -28,6 +28,7 @@ from gym_server.instance import Instance
 from gym_server.making import make
 from gym_server.monitor_directory import MonitorDirectory, claim
 from gym_server.worker_messages import read_question, refusal_of, value_of
+from gym_server.worker_pipe import Pipe
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,11 @@ def keep_instance(
     """
     _settle(surroundings)
     asked = _Asked(choices, surroundings)
-    _answer(moves, 0, asked.make)
+    channel = Pipe(moves)
+    _answer(channel, 0, asked.make)
     if asked.instance is not None:
-        threading.Thread(target=_serve, args=(questions, asked), daemon=True).start()
-        _serve(moves, asked)
+        threading.Thread(target=_serve, args=(Pipe(questions), asked), daemon=True).start()
+        _serve(channel, asked)
 
 
 def list_registry(
@@ -76,7 +78,7 @@ def list_registry(
 ) -> None:
     """Answer what can be created with the allowed modules."""
     _settle(surroundings)
-    _answer(answers, 0, partial(registry.search, search, surroundings.allowed_modules))
+    _answer(Pipe(answers), 0, partial(registry.search, search, surroundings.allowed_modules))
 
 
 def _settle(surroundings: Surroundings) -> None:
@@ -108,17 +110,17 @@ def _limit_memory(size: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (size, size))
 
 
-def _serve(channel: Connection, asked: _Asked) -> None:
+def _serve(channel: Pipe, asked: _Asked) -> None:
     while not asked.is_closed:
         try:
-            number, method, args = read_question(channel.recv_bytes())
+            number, method, args = read_question(channel.receive())
         except (EOFError, OSError):
             # The server let go of it, or is gone.
             os._exit(1)
         _answer(channel, number, getattr(asked, method), *args)
 
 
-def _answer(channel: Connection, number: int, call: Callable, *args: object) -> None:
+def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
         if isinstance(result, wire.Answer):
@@ -130,7 +132,7 @@ def _answer(channel: Connection, number: int, call: Callable, *args: object) -> 
     except Exception as error:
         message = refusal_of(number, answer_to(error)[1])
     try:
-        channel.send_bytes(message)
+        channel.send(message)
     except (OSError, ValueError):
         os._exit(1)
 

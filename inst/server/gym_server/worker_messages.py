@@ -7,12 +7,9 @@ looked at before it is believed, and nothing in them names code.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
 import pickle
-import socket
 import struct
 import threading
 from multiprocessing.connection import Connection
@@ -24,6 +21,7 @@ from gym_server import wire
 from gym_server.errors import GymServerError
 from gym_server.tensors import TENSORS
 from gym_server.wire import JSON, Answer, Ready
+from gym_server.worker_pipe import Nonsense, Pipe
 
 # The question's number, what kind of answer it is, and how long its text is.
 _HEAD = struct.Struct("<QBI")
@@ -32,7 +30,6 @@ _REFUSAL, _VALUE, _JSON, _TENSORS = range(4)
 
 _CONTENT_TYPES = {_JSON: JSON, _TENSORS: TENSORS}
 
-_LARGEST_ANSWER = 2**31 - 1
 _LONGEST_TEXT = 100_000
 
 
@@ -41,10 +38,6 @@ class Seen(NamedTuple):
 
     value: object
     frame: np.ndarray | None
-
-
-class Nonsense(Exception):  # noqa: N818
-    """What came from the other process is no answer."""
 
 
 # The process's side -------------------------------------------------------------------------
@@ -82,12 +75,9 @@ class Channel:
 
     def __init__(self, connection: Connection) -> None:
         """Take over the server's end of a pipe."""
-        self._connection = connection
+        self._pipe = Pipe(connection)
         self._lock = threading.Lock()
         self._number = 0
-        self._waker = None
-        if os.name == "posix":
-            self._waker = socket.socket(fileno=os.dup(connection.fileno()))
 
     def ask(self, method: str, *args: object, seconds: float | None = None) -> Ready | Seen:
         """Call a method in the process.
@@ -110,7 +100,7 @@ class Channel:
             raise TimeoutError
         try:
             self._number += 1
-            self._connection.send_bytes(pickle.dumps((self._number, method, args), 5))
+            self._pipe.send(pickle.dumps((self._number, method, args), 5))
             return self._hear(seconds)
         finally:
             self._lock.release()
@@ -122,9 +112,9 @@ class Channel:
 
     def _hear(self, seconds: float | None) -> Ready | Seen:
         while True:
-            if seconds is not None and not self._connection.poll(seconds):
+            if seconds is not None and not self._pipe.has_come(seconds):
                 raise TimeoutError
-            raw = self._connection.recv_bytes(_LARGEST_ANSWER)
+            raw = self._pipe.receive()
             number = _HEAD.unpack_from(raw)[0] if len(raw) >= _HEAD.size else -1
             if number == self._number:
                 return _read_answer(raw)
@@ -133,17 +123,13 @@ class Channel:
                 raise Nonsense("an answer that nobody asked for")
 
     def wake(self) -> None:
-        """Let whoever waits here find that the process is gone, whoever else has its end."""
-        if self._waker is not None:
-            with contextlib.suppress(OSError):
-                self._waker.shutdown(socket.SHUT_RDWR)
+        """Let whoever waits here find that the process is gone."""
+        self._pipe.wake()
 
     def close(self) -> None:
         """Close the pipe when nobody waits here any more; ``wake()`` sees to that."""
         with self._lock:
-            self._connection.close()
-        if self._waker is not None:
-            self._waker.close()
+            self._pipe.close()
 
 
 def _read_answer(raw: bytes) -> Ready | Seen:

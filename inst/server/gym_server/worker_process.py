@@ -14,12 +14,16 @@ from multiprocessing.connection import wait
 from gym_server import processes
 from gym_server.errors import GymServerError, environment_died
 from gym_server.wire import Ready
-from gym_server.worker_messages import Channel, Nonsense, Seen
+from gym_server.worker_messages import Channel, Seen
+from gym_server.worker_pipe import Nonsense
 
 log = logging.getLogger(__name__)
 
 # Once its end of the pipe is closed it has nothing to do any more.
 _LEAVES_SECONDS = 2.0
+
+# What a process that is gone, or no longer what it was, is known by.
+_FAULTS = (EOFError, OSError, ValueError, Nonsense)
 
 
 class WorkerProcess:
@@ -76,7 +80,10 @@ class WorkerProcess:
 
     def first_word(self) -> Seen:
         """Wait for what it says unasked; see ``move()``."""
-        return self._ask(self._moves.hear)
+        try:
+            return self._moves.hear()
+        except _FAULTS as fault:
+            raise self._end_after(fault) from None
 
     def stay(self) -> None:
         """Take no end of it from now on for what was asked for."""
@@ -89,7 +96,12 @@ class WorkerProcess:
         Raises:
             GymServerError: what it refused with, or why it has ended.
         """
-        return self._ask(self._moves.ask, method, *args)
+        if self.why is not None:
+            raise self.why
+        try:
+            return self._moves.ask(method, *args)
+        except _FAULTS as fault:
+            raise self._end_after(fault) from None
 
     def question(self, method: str, *args: object, seconds: float | None = None) -> Seen:
         """Ask what can be said while it moves.
@@ -98,26 +110,26 @@ class WorkerProcess:
             GymServerError: as for ``move()``.
             TimeoutError: it took more than these seconds.
         """
-        return self._ask(self._questions.ask, method, *args, seconds=seconds)
-
-    def _ask(self, ask: Callable, *args: object, **how: object):
         if self.why is not None:
             raise self.why
         try:
-            return ask(*args, **how)
+            return self._questions.ask(method, *args, seconds=seconds)
         except TimeoutError:
             raise
-        except Nonsense as nonsense:
-            self._nonsense = f"it sent {nonsense}"
+        except _FAULTS as fault:
+            raise self._end_after(fault) from None
+
+    def _end_after(self, fault: Exception) -> GymServerError:
+        """Return why a process that is of no use has ended, after seeing to that."""
+        if isinstance(fault, Nonsense):
+            self._nonsense = f"it sent {fault}"
             self._kill()
-        except (EOFError, OSError, ValueError):
-            pass
-        # It has ended, or closed its end of the pipe and is of no use.
-        if not self._ended.wait(_LEAVES_SECONDS):
-            self._nonsense = self._nonsense or "it closed its connection to the server"
+        elif not self._ended.wait(_LEAVES_SECONDS):
+            self._nonsense = "it closed its connection to the server"
             self._kill()
-            self._ended.wait()
-        raise self.why  # type: ignore[misc]
+        self._ended.wait(_LEAVES_SECONDS)
+        # None of one that the system itself cannot end.
+        return self.why or self._died(None)
 
     def condemn(self, why: GymServerError) -> None:
         """End it at once; whoever waits for it gets the reason."""
