@@ -52,6 +52,10 @@ class GymServerError(Exception):
         """The HTTP status of the answer."""
         return _STATUS.get(self.code, 400)
 
+    def again(self) -> GymServerError:
+        """Return another of the same: one that is raised twice collects where it came by."""
+        return GymServerError(self.code, self.message, self.hint, self.extra)
+
 
 def unknown_instance(instance_id: str) -> GymServerError:
     """No environment has this instance_id, or it was closed."""

@@ -106,10 +106,7 @@ class Instances:
 
     def _reason(self, instance_id: str) -> GymServerError:
         why = self._gone.get(instance_id)
-        if why is None:
-            return unknown_instance(instance_id)
-        # Each its own: what is raised collects where it came by.
-        return GymServerError(why.code, why.message, why.hint)
+        return why.again() if why else unknown_instance(instance_id)
 
     def bury(self, instance_id: str, why: GymServerError) -> None:
         """Forget an instance that is gone; later calls get the reason."""

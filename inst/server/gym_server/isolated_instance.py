@@ -241,7 +241,10 @@ class IsolatedInstance:
                 self._release()
 
     def condemn(self, why: GymServerError) -> None:
-        """End the process at once; a call that waits for it, and those behind, get the reason."""
+        """End the process at once.
+
+        Who waits for it hears why, and so does everybody who comes later: none is stuck.
+        """
         self._worker.condemn(why)
         self.screen.end(why)
         self._release()

@@ -97,7 +97,7 @@ class WorkerProcess:
             GymServerError: what it refused with, or why it has ended.
         """
         if self.why is not None:
-            raise self.why
+            raise self.why.again()
         try:
             return self._moves.ask(method, *args)
         except _FAULTS as fault:
@@ -111,7 +111,7 @@ class WorkerProcess:
             TimeoutError: it took more than these seconds.
         """
         if self.why is not None:
-            raise self.why
+            raise self.why.again()
         try:
             return self._questions.ask(method, *args, seconds=seconds)
         except TimeoutError:
@@ -129,7 +129,7 @@ class WorkerProcess:
             self._kill()
         self._ended.wait(_LEAVES_SECONDS)
         # None of one that the system itself cannot end.
-        return self.why or self._died(None)
+        return self.why.again() if self.why else self._died(None)
 
     def condemn(self, why: GymServerError) -> None:
         """End it at once; whoever waits for it gets the reason."""

@@ -358,7 +358,8 @@ class Unpickled:
 
 
 _FORGED = pickle.dumps(Unpickled())
-FORGED = len(_FORGED).to_bytes(4, "big") + _FORGED
+# As a message of the server's own.
+FORGED = len(_FORGED).to_bytes(8, "little") + _FORGED
 
 
 class OwnSpace(spaces.Space):

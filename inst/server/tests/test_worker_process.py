@@ -2,11 +2,13 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
-from conftest import ServerProcess
+from conftest import SERVER, ServerProcess
 from running import descendants, is_running
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
@@ -180,6 +182,61 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve):
     assert (status, answer["code"]) == (500, "environment_error")
     assert "MemoryError" in answer["message"]
     assert server.get("/v1/health/")[0] == 200
+
+
+_CONDEMNS = """
+import sys, threading, time
+from gym_server.choices import Choices
+from gym_server.errors import GymServerError
+from gym_server.isolated_instance import IsolatedInstance
+from gym_server.worker import Surroundings
+
+def call(heard):
+    try:
+        instance.step(0)
+    except GymServerError as error:
+        heard.append(error.code)
+
+if __name__ == "__main__":
+    kwargs = {"does": "never_returns", "at": sys.argv[1]}
+    choices = Choices("faulty_envs:Rogue-v0", kwargs=kwargs)
+    instance = IsolatedInstance(choices, Surroundings(frozenset(["faulty_envs"])), print)
+    heard = []
+    why = GymServerError("call_too_long", "too long")
+    if sys.argv[1] == "constructor":
+        threading.Timer(1, instance.condemn, (why,)).start()
+        try:
+            instance.create()
+        except GymServerError as error:
+            heard.append(error.code)
+    else:
+        instance.create()
+        instance.reset(None, None)
+        calls = [threading.Thread(target=call, args=(heard,)) for _ in range(3)]
+        for one in calls:
+            one.start()
+        time.sleep(0.5)
+        instance.condemn(why)
+        for one in calls:
+            one.join()
+        call(heard)
+    print(heard, instance._worker._ended.is_set())
+"""
+
+
+@pytest.mark.parametrize(("at", "calls"), [("step", 4), ("constructor", 1)])
+def test_who_waits_for_one_that_is_condemned_hears_why_at_once(at, calls, tmp_path):
+    script = tmp_path / "condemns.py"
+    script.write_text(_CONDEMNS)
+    path = os.pathsep.join(map(str, (SERVER, SERVER / "tests")))
+    told = subprocess.run(
+        [sys.executable, str(script), at],
+        env={**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert told.stdout.strip() == f"{['call_too_long'] * calls} True", told.stderr
 
 
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
