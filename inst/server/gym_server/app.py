@@ -23,6 +23,7 @@ from gym_server.errors import GymServerError, answer_to
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
 from gym_server.instances import Instances
+from gym_server.isolation import Isolation
 from gym_server.limits import Limits, Watchers
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
@@ -48,6 +49,9 @@ class Config:
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
         limits: how much of everything there is for all clients together.
+        isolate: which environments get a process of their own: "none", "foreign" (those of
+            other modules than Gymnasium's and ale_py's) or "all".
+        max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
     """
 
@@ -56,6 +60,8 @@ class Config:
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
     limits: Limits = field(default_factory=Limits)
+    isolate: str = "foreign"
+    max_worker_mb: int = 0
     stop: Callable[[], None] = lambda: None
 
 
@@ -75,7 +81,12 @@ class GymApp(Flask):
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(config.allowed_modules, self._renderer, config.limits)
+        self._instances = Instances(
+            config.allowed_modules,
+            self._renderer,
+            config.limits,
+            Isolation(config.isolate, config.max_worker_mb),
+        )
         services = Services(
             self._instances,
             self._monitor_root,

@@ -66,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 options.max_call_seconds,
                 options.idle_minutes,
             ),
+            isolate=options.isolate,
+            max_worker_mb=options.max_worker_mb,
             stop=stop,
         )
     )

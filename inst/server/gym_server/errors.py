@@ -22,6 +22,7 @@ _STATUS = {
     "too_many_instances": 429,
     "too_many_lanes": 429,
     "too_many_watchers": 429,
+    "environment_died": 500,
     "environment_error": 500,
     "internal_error": 500,
     "shutting_down": 503,
@@ -37,7 +38,10 @@ class GymServerError(Exception):
         message: one sentence for a person.
         hint: what to do about it, or None.
         extra: the extra of the server that is missing, or None.
+        is_logged: whether another process has logged it already.
     """
+
+    is_logged = False
 
     def __init__(
         self, code: str, message: str, hint: str | None = None, extra: str | None = None
@@ -127,6 +131,15 @@ def environment_error(error: BaseException) -> GymServerError:
     return GymServerError("environment_error", f"The environment raised {last_line}")
 
 
+def environment_died(how: str, doing: str, hint: str | None = None) -> GymServerError:
+    """The process of an isolated environment ended by itself."""
+    return GymServerError(
+        "environment_died",
+        f"The environment's process ended {doing}: {how}",
+        hint or "it is closed now, and the others go on; create another",
+    )
+
+
 def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
     """Turn any exception into a status and the body of the answer.
 
@@ -146,7 +159,7 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
             f"The server failed: {type(error).__name__}: {error}",
             "this is a fault of gym_server; the server's log has the details",
         )
-    elif error.code == "environment_error":
+    elif error.code == "environment_error" and not error.is_logged:
         log.warning("%s", error.message, exc_info=error)
     body = {"message": error.message, "code": error.code}
     if error.hint:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
 from collections.abc import Callable
 
 import gymnasium
@@ -16,6 +15,7 @@ from gym_server.creation import ask
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
 from gym_server.frames import RenderThread, picture
 from gym_server.hold import Hold
+from gym_server.listed import Listed
 from gym_server.monitor import Monitor
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.observed import entries
@@ -25,18 +25,14 @@ from gym_server.tally import LaneTally, Tally, told
 from gym_server.wrappers import draws_when_stepped
 
 
-class Instance:
+class Instance(Listed):
     """One environment.
 
     Every method that moves the environment waits for its hold; one that waited while the
     instance was being closed raises ``unknown_instance``, or why it was closed.
     """
 
-    # Given when the instance is listed.
-    instance_id = ""
     _lanes = 1
-    # None where there are no lanes.
-    _num_envs: int | None = None
 
     def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
         """Take over an environment.
@@ -352,32 +348,25 @@ class Instance:
     def about(self) -> dict:
         """Return all that is known of the instance, without waiting for its environment."""
         spec = self._env.spec
-        now = time.monotonic()
         monitor = self._monitor
         return {
-            "instance_id": self.instance_id,
-            "env_id": self.env_id,
-            "name": self._choices.name,
+            **self.line(),
             "observation_space": self._lane_observation_space_info,
             "action_space": self._lane_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,
             "max_episode_steps": spec.max_episode_steps if spec else None,
             "render_fps": plain((self._env.metadata or {}).get("render_fps")),
             "lanes": self._lanes,
-            "num_envs": self._num_envs,
             "vectorization_mode": None,
             "autoreset_mode": None,
             "render_mode": self._choices.render_mode or self._env.render_mode,
             "kwargs": self._choices.kwargs or {},
             "wrappers": [wrapper._asdict() for wrapper in self._choices.wrappers],
             "seed": self._choices.seed,
-            "age_seconds": now - self._made,
-            "idle_seconds": now - self.hold.used,
-            "steps": self._steps,
             "episode_steps": self._tally.of(0).step,
             "needs_reset": self._done or not self._was_reset,
             "monitor": monitor.about() if monitor else None,
-            "watched": self.screen.is_watched,
+            "isolated": False,
         }
 
     def look(self, lane: int) -> tuple[dict, np.ndarray | None]:

@@ -10,32 +10,18 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 
-import gymnasium
-from gymnasium.vector import VectorEnv
-
-from gym_server import creation, registry, vectorization, wrappers
+from gym_server import registry, vectorization, wrappers
 from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
+from gym_server.isolated_instance import IsolatedInstance
+from gym_server.isolation import Isolation
 from gym_server.limits import Limits
-from gym_server.vector_instance import VectorInstance
+from gym_server.making import make
 
 log = logging.getLogger(__name__)
-
-# What the list of instances tells of each.
-_LISTED = (
-    "instance_id",
-    "env_id",
-    "name",
-    "num_envs",
-    "age_seconds",
-    "idle_seconds",
-    "steps",
-    "watched",
-)
-
 
 # As in hold.py.
 _SETTLED_SECONDS = 5.0
@@ -76,6 +62,7 @@ class Instances:
         allowed_modules: Collection[str],
         renderer: RenderThread,
         limits: Limits | None = None,
+        isolation: Isolation | None = None,
     ) -> None:
         """Start with none.
 
@@ -83,16 +70,18 @@ class Instances:
             allowed_modules: names of the modules that an env_id may import.
             renderer: the process's render thread.
             limits: how many of them there may be, and how large.
+            isolation: which of them get a process of their own; None for none.
         """
         self._limits = limits or Limits()
+        self._isolation = isolation or Isolation()
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
-        self._instances: dict[str, Instance] = {}
+        self._instances: dict[str, Instance | IsolatedInstance] = {}
         # By instance_id; by the thread that makes it; by instance_id.
         self._lanes: dict[str, int] = {}
         self._creating: dict[int, _Making] = {}
-        self._closing: dict[str, Instance] = {}
+        self._closing: dict[str, Instance | IsolatedInstance] = {}
         self._departed = Departed()
         self._stopping = False
 
@@ -100,16 +89,17 @@ class Instances:
         """Make an environment and return its instance_id, 8 hex digits.
 
         Raises:
-            GymServerError: see ``creation.make()``, ``wrappers.wrap()`` and ``Instance``;
-                ``shutting_down``, ``too_many_instances``, ``too_many_lanes``; ``call_too_long``.
+            GymServerError: see ``making.make()``; ``shutting_down``, ``environment_died``,
+                ``too_many_instances``, ``too_many_lanes``; ``call_too_long``.
         """
         # Before an environment is made for nothing.
         wrappers.check_names(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)
-        make = self._make_single if choices.num_envs is None else self._make_vector
+        isolated = self._isolation.wants(choices.env_id, self._allowed_modules)
+        make_it = self._make_isolated if isolated else self._make
         with self._room_for(choices) as making, contextlib.ExitStack() as undo:
-            instance = make(choices, undo)
+            instance = make_it(choices, making, undo)
             if not self._enlist(instance, making):
                 undo.close()
                 making.settled.wait(_SETTLED_SECONDS)
@@ -144,37 +134,30 @@ class Instances:
         finally:
             self._creating.pop(thread, None)
 
-    def _make_single(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
-        env = creation.make(
-            choices.env_id, choices.render_mode, choices.kwargs or {}, self._allowed_modules
+    def _make(self, choices: Choices, _: _Making, undo: contextlib.ExitStack) -> Instance:
+        return make(choices, self._allowed_modules, self._limits.max_num_envs, self._renderer, undo)
+
+    def _make_isolated(
+        self, choices: Choices, making: _Making, undo: contextlib.ExitStack
+    ) -> IsolatedInstance:
+        surroundings = self._isolation.surroundings(
+            choices.env_id, self._allowed_modules, self._limits.max_num_envs
         )
-        undo.push(self._closing_quietly(env))
-        env = wrappers.wrap(env, choices.wrappers, self._renderer)
-        return Instance(env, choices, self._renderer)
-
-    def _make_vector(self, choices: Choices, undo: contextlib.ExitStack) -> Instance:
-        env, mode = vectorization.make(
-            choices, self._allowed_modules, self._limits.max_num_envs, self._renderer
+        instance = IsolatedInstance(
+            choices, surroundings, lambda one, why: self.bury(one.instance_id, why)
         )
-        undo.push(self._closing_quietly(env))
-        return VectorInstance(env, mode, choices, self._renderer)
-
-    def _closing_quietly(self, env: gymnasium.Env | VectorEnv) -> Callable[..., None]:
-        def close(kind: type | None, error: BaseException | None, *_: object) -> None:
-            # The render thread hangs in it, and must be left to that.
-            if isinstance(error, GymServerError) and error.code == "call_too_long":
-                return
-            # What the client must hear of is why it gets no instance.
-            with contextlib.suppress(Exception):
-                self._renderer.run(env.close)
-
-        return close
+        undo.callback(instance.condemn, shutting_down())
+        making.condemn = instance.condemn
+        instance.create()
+        return instance
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
+        if self._isolation.mode != "none" and self._allowed_modules:
+            return self._isolation.search(search, self._allowed_modules)
         return registry.search(search, self._allowed_modules)
 
-    def get(self, instance_id: str) -> Instance:
+    def get(self, instance_id: str) -> Instance | IsolatedInstance:
         """Return an instance.
 
         Raises:
@@ -228,13 +211,7 @@ class Instances:
         """Return what can be told of every instance at once, the oldest first."""
         with self._lock:
             instances = list(self._instances.values())
-        listed = []
-        for instance in instances:
-            # One that has ended meanwhile is not there any more.
-            with contextlib.suppress(GymServerError):
-                about = instance.about()
-                listed.append({name: about[name] for name in _LISTED})
-        return listed
+        return [instance.line() for instance in instances]
 
     def give_up_overdue(
         self, seconds: float, answer_for: Callable[[int, GymServerError], None]
@@ -295,7 +272,7 @@ class Instances:
             hold = instance.hold
             if max(hold.used, hold.watched) > now - minutes * 60 or hold.busy_since is not None:
                 continue
-            if instance.about()["watched"]:
+            if instance.screen.is_watched:
                 hold.watched = now
                 continue
             why = idle_closed(instance.instance_id, instance.env_id, minutes)

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import multiprocessing
-import os
-import threading
 import time
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import wait
@@ -18,7 +15,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import create_empty_array
 
-from gym_server import spaces
+from gym_server import processes, spaces
 from gym_server.creation import load_creator, make_from_spec
 from gym_server.frames import RenderThread
 from gym_server.wrappers import Wrapper, wrap
@@ -78,7 +75,7 @@ class WorkerLane(Lane):
     def __call__(self) -> gymnasium.Env:
         """Make another one."""
         if self._renderer is None:
-            _end_with_the_server()
+            processes.end_with_the_server()
             load_creator(self._how[0])
             self._renderer = _ThisThread()  # type: ignore[assignment]
             return self._make()
@@ -98,18 +95,6 @@ class _ThisThread:
 
     def run(self, draw: Callable, *args: object) -> object:
         return draw(*args)
-
-
-def _end_with_the_server() -> None:
-    """End this process when the server's ends, however that comes about."""
-    server = multiprocessing.parent_process()
-
-    def end() -> None:
-        server.join()
-        os._exit(1)
-
-    if server is not None:
-        threading.Thread(target=end, daemon=True).start()
 
 
 class SyncLanes(SyncVectorEnv):
@@ -170,15 +155,15 @@ class AsyncLanes(AsyncVectorEnv):
         # at a reset that an episode had ended, so there the lanes see to that themselves.
         resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
         self._failed = False
-        multiprocessing.get_context(_START_METHOD).set_forkserver_preload([__name__])
+        # Before Gymnasium starts them.
+        processes.context()
         try:
             self._with_workers(
                 super().__init__,
                 [WorkerLane(lane, autoreset_mode)] * num_envs,
                 shared_memory=False,
                 copy=False,
-                # Not a fork: it would copy locks that other threads hold, and our signals.
-                context=_START_METHOD,
+                context=processes.START_METHOD,
                 autoreset_mode=AutoresetMode.DISABLED if resets_itself else autoreset_mode,
             )
         except BaseException:
@@ -256,7 +241,3 @@ class AsyncLanes(AsyncVectorEnv):
             process.close()
         for pipe in getattr(self, "parent_pipes", ()):
             pipe.close()
-
-
-# It copies a process that has only just imported what all lanes need; Windows has none.
-_START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"

@@ -59,24 +59,26 @@ class MonitorRoot:
         Raises:
             GymServerError: ``monitor_directory``.
         """
+        return claim(self.reserve(directory), directory, force, resume, self.release)
+
+    def reserve(self, directory: str) -> Path:
+        """Refuse a directory to all monitors but one, which may ``claim()`` it.
+
+        Args:
+            directory: as the client names it.
+
+        Returns:
+            Where it is; to be given to ``release()`` in the end.
+
+        Raises:
+            GymServerError: ``monitor_directory``.
+        """
         path = self._resolve(directory)
         with self._lock:
             if path in self._in_use:
                 raise _refuse(directory, "another monitor writes there")
             self._in_use.add(path)
-        claimed = MonitorDirectory(path, self._release)
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            if path.resolve() != path:
-                raise _refuse(directory, "it leads elsewhere")
-            claimed.prepare(force, resume)
-        except OSError as error:
-            claimed.release()
-            raise _refuse(directory, error.strerror or str(error)) from error
-        except BaseException:
-            claimed.release()
-            raise
-        return claimed
+        return path
 
     def close(self) -> None:
         """Remove the temporary directory unless something was written there."""
@@ -84,7 +86,8 @@ class MonitorRoot:
             with contextlib.suppress(OSError):
                 self._own_root.rmdir()
 
-    def _release(self, path: Path) -> None:
+    def release(self, path: Path) -> None:
+        """Give a directory free for the next monitor."""
         with self._lock:
             self._in_use.discard(path)
 
@@ -109,6 +112,25 @@ class MonitorRoot:
         if not any(root in path.parents for root in allowed):
             raise _refuse(directory, "it is outside the directory that this server may write")
         return path
+
+
+def claim(
+    path: Path, directory: str, force: bool, resume: bool, on_release: Callable[[Path], None]
+) -> MonitorDirectory:
+    """Make a reserved directory ready for its monitor; see ``MonitorRoot.claim()``."""
+    claimed = MonitorDirectory(path, on_release)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        if path.resolve() != path:
+            raise _refuse(directory, "it leads elsewhere")
+        claimed.prepare(force, resume)
+    except OSError as error:
+        claimed.release()
+        raise _refuse(directory, error.strerror or str(error)) from error
+    except BaseException:
+        claimed.release()
+        raise
+    return claimed
 
 
 class MonitorDirectory:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gym_server import __version__
+from gym_server.isolation import MODES
 from gym_server.limits import Limits
 
 
@@ -47,6 +48,7 @@ def parser() -> argparse.ArgumentParser:
     options.add_argument(
         "--no-auth", action="store_true", help="serve a --host that others can reach"
     )
+    _add_isolation(options)
     options.add_argument("--version", action="version", version=__version__)
     return options
 
@@ -105,6 +107,23 @@ def _duration(text: str) -> float:
         if 0 <= float(text) < math.inf:
             return float(text)
     raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 0")
+
+
+def _add_isolation(options: argparse.ArgumentParser) -> None:
+    options.add_argument(
+        "--isolate",
+        default="foreign",
+        choices=MODES,
+        help="which environments get a process of their own, so that one that crashes takes no "
+        "other along: those of other modules than Gymnasium's (foreign), none or all (%(default)s)",
+    )
+    options.add_argument(
+        "--max-worker-mb",
+        type=_number(0, 2**24),
+        default=0,
+        help="memory that such a process may have, on Linux; 0 for as much as there is "
+        "(%(default)s)",
+    )
 
 
 def _number(least: int, greatest: int) -> Callable[[str], int]:

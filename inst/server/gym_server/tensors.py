@@ -100,9 +100,27 @@ def write(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:
         tuple((name, tensor.dtype, tensor.shape) for name, tensor in tensors.items())
     )
     text = b'%b"__metadata__":%b}' % (beginning, _encode(metadata).encode("ascii"))
-    text += b" " * (-len(text) % 8)
-    pieces = (tensors[name].data for name in names)
-    return b"".join((len(text).to_bytes(8, "little"), text, *pieces))
+    return b"".join((*_headed(text), *(tensors[name].data for name in names)))
+
+
+def add_metadata(file: bytes, name: str, text: str) -> bytes:
+    """Return a file with one more text, after the others that it must have.
+
+    Args:
+        file: as ``write()`` returns it; it is not looked at more closely.
+        name: of the text.
+        text: it.
+    """
+    end = 8 + int.from_bytes(file[:8], "little")
+    header = file[8:end].rstrip(b" ").removesuffix(b"}}")
+    header += b",%b}}" % _encode({name: text})[1:-1].encode("ascii")
+    return b"".join((*_headed(header), file[end:]))
+
+
+def _headed(header: bytes) -> tuple[bytes, bytes]:
+    """Return the length of a header and itself, as they begin a file."""
+    header += b" " * (-len(header) % 8)
+    return len(header).to_bytes(8, "little"), header
 
 
 _encode = json.JSONEncoder(separators=(",", ":")).encode

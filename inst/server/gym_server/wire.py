@@ -16,7 +16,7 @@ from gym_server.errors import GymServerError, invalid_parameter, missing_paramet
 from gym_server.exactly_once import RequestId
 from gym_server.plain import plain
 from gym_server.spaces import Parts
-from gym_server.tensors import TENSORS, Tensor, malformed_tensors
+from gym_server.tensors import TENSORS, Tensor, add_metadata, malformed_tensors
 from gym_server.tensors import read as read_tensors
 from gym_server.tensors import write as write_tensors
 from gym_server.wrappers import Wrapper
@@ -319,19 +319,28 @@ class Content(NamedTuple):
     headers: tuple[tuple[str, str], ...] = ()
 
 
+class Ready(NamedTuple):
+    """The body of a reset's or a step's answer, to which only the request is to be added."""
+
+    body: bytes
+    content_type: str
+
+
 def answer(
-    result: dict | Content | None, request_id: RequestId | None, status: int = 200
+    result: dict | Content | Ready | None, request_id: RequestId | None, status: int = 200
 ) -> Answer:
     """Put a route's result into an answer.
 
     Args:
-        result: a JSON object, whose observations may be tensors, a content of its own, or None
-            for an answer without content (204).
+        result: a JSON object, whose observations may be tensors, a content of its own, a body
+            that is ready, or None for an answer without content (204).
         request_id: what the client called its request, echoed when given.
         status: the HTTP status of a JSON answer.
     """
     if isinstance(result, Content):
         return Answer(result.status, result.data, result.content_type, result.headers)
+    if isinstance(result, Ready):
+        return Answer(status, _with_request(result, request_id), result.content_type)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default type here.
@@ -341,6 +350,15 @@ def answer(
     if isinstance(result.get("observation"), Parts):
         return Answer(status, _dumps_tensors(**result), TENSORS)
     return Answer(status, dumps(result))
+
+
+def _with_request(ready: Ready, request_id: RequestId | None) -> bytes:
+    if request_id is None:
+        return ready.body
+    request = dumps(request_id._asdict())
+    if ready.content_type == TENSORS:
+        return add_metadata(ready.body, REQUEST.name, request.decode("ascii"))
+    return b'%b,"request":%b}' % (ready.body[:-1], request)
 
 
 def _dumps_tensors(observation: Parts, final_obs: Parts | None = None, **others: Any) -> bytes:

@@ -25,7 +25,10 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    app = create_app(Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"]))
+    # Here, where a test can look inside; test_isolated_instance.py has the others.
+    app = create_app(
+        Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
+    )
     yield app
     app.close()
 
@@ -70,7 +73,9 @@ class ServerProcess:
         environment = {
             **os.environ,
             **variables,
-            "PYTHONPATH": os.pathsep.join([str(SERVER), str(TESTS)]),
+            "PYTHONPATH": os.pathsep.join(
+                [str(SERVER), str(TESTS), variables.get("PYTHONPATH", "")]
+            ),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
         self.process = subprocess.Popen(

@@ -3,7 +3,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import faulty_envs  # noqa: F401 - it registers what is made here
 import gymnasium
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import SERVER
 from gymnasium.vector import AutoresetMode
+from running import descendants, is_running
 
 from gym_server.frames import RenderThread
 from gym_server.lanes import AsyncLanes, Lane
@@ -36,16 +36,6 @@ def processes():
 
 def zeros(env):
     return np.zeros(env.action_space.shape, env.action_space.dtype)
-
-
-def is_running(pid):
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    # A process that has ended and that nobody has waited for is still listed.
-    with open(f"/proc/{pid}/stat") as stat:
-        return stat.read().rpartition(")")[2].split()[0] != "Z"
 
 
 def test_a_failure_in_a_lane_is_told_and_the_other_processes_end(processes):
@@ -132,7 +122,7 @@ def test_a_server_that_stops_ends_its_lanes(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Uneven-v0", num_envs=2, vectorization_mode="async")
     assert server.post(f"{url}/reset/")[0] == 200
-    children = _descendants(server.process.pid)
+    children = descendants(server.process.pid)
     assert len(children) >= 2
     status, _, errors = server.stop()
     assert (status, errors) == (0, "")
@@ -143,7 +133,7 @@ def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, eventual
     server = serve()
     url = server.create("faulty_envs:Hanging-v0", num_envs=2, vectorization_mode="async")
     server.post(f"{url}/reset/")
-    children = _descendants(server.process.pid)
+    children = descendants(server.process.pid)
     with server.socket() as connection:
         body = b'{"action": [0, 0]}'
         connection.sendall(
@@ -153,13 +143,3 @@ def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, eventual
         time.sleep(0.5)
         assert server.stop(timeout=40)[0] == 0
     eventually(lambda: not any(map(is_running, children)))
-
-
-def _descendants(pid):
-    stats = [stat.read_text() for stat in Path("/proc").glob("[0-9]*/stat")]
-    # The number, the name in parentheses, the state, the parent's number.
-    parents = {int(one.split()[0]): int(one.rpartition(")")[2].split()[1]) for one in stats}
-    found = [pid]
-    for parent in found:
-        found += [child for child, its_parent in parents.items() if its_parent == parent]
-    return found[1:]

@@ -39,7 +39,7 @@ class Call:
 
 
 # What does not hang takes less, also on a machine that is busy.
-STRICT = ("--max-call-seconds", "2")
+STRICT = ("--max-call-seconds", "2", "--isolate", "none")
 
 
 @pytest.fixture(scope="module")

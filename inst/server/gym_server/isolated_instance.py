@@ -1,0 +1,255 @@
+"""Stands for an instance that lives in a process of its own."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from gym_server.choices import Choices
+from gym_server.errors import GymServerError, invalid_parameter
+from gym_server.hold import Hold
+from gym_server.listed import Listed
+from gym_server.monitor_directory import MonitorRoot
+from gym_server.screen import Screen
+from gym_server.spaces import Parts
+from gym_server.tensors import Tensor
+from gym_server.wire import Ready
+from gym_server.worker import Surroundings, keep_instance
+from gym_server.worker_messages import Seen
+from gym_server.worker_process import WorkerProcess
+
+# What an environment is asked that keeps its process from any word: what is known is told.
+_ABOUT_SECONDS = 1.0
+
+
+class IsolatedInstance(Listed):
+    """One environment in a process of its own, with the methods of ``Instance``.
+
+    The order of moves, the watchers and their pace are kept here, as for an environment in the
+    server's process; everything else is asked of the process, and when that ends by itself,
+    every call raises ``environment_died``.
+    """
+
+    # Its pictures are drawn in its own process.
+    draws_when_stepped = False
+
+    def __init__(
+        self,
+        choices: Choices,
+        surroundings: Surroundings,
+        on_end: Callable[[IsolatedInstance, GymServerError], None],
+    ) -> None:
+        """Start the process; ``create()`` waits for the environment.
+
+        Args:
+            choices: what the client wants.
+            surroundings: what the process is to know of the server.
+            on_end: called with this and the reason when the process has ended by itself.
+        """
+        self.env_id = str(choices.env_id)
+        self._choices = choices
+        self._on_end = on_end
+        self.hold = Hold(self)  # type: ignore[arg-type]
+        self.moves = 0
+        self.on_move: Callable[[], None] | None = None
+        self.screen = Screen(self, None)  # type: ignore[arg-type]
+        self._for_eyes = choices.render_mode == "human"
+        self._made = time.monotonic()
+        self._lanes = 1
+        self._num_envs = choices.num_envs
+        self._steps = 0
+        self._reserved: tuple[MonitorRoot, Path] | None = None
+        self._about: dict = {}
+        hint = (
+            f"the server's option --max-worker-mb lets it have {surroundings.max_mb} MiB"
+            if surroundings.max_mb
+            else ""
+        )
+        self._worker = WorkerProcess(
+            keep_instance, choices, surroundings, on_end=self._end, hint=hint
+        )
+
+    def create(self) -> None:
+        """Wait until the environment is made.
+
+        Raises:
+            GymServerError: see ``making.make()``; ``environment_died``.
+        """
+        made = self._value(self._worker.first_word())
+        self._about = made["about"]
+        self.env_id = str(self._about["env_id"])
+        self._lanes = int(self._about["lanes"])
+        self.screen = Screen(self, made["fps"])  # type: ignore[arg-type]
+        self._made = self.hold.used = time.monotonic()
+        self._worker.stay()
+
+    @staticmethod
+    def _value(seen: Seen) -> dict:
+        return seen.value  # type: ignore[return-value]
+
+    # Moves ----------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | tuple[int | None, ...] | None,
+        options: dict | None,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+    ) -> Ready:
+        """Start an episode; see ``Instance.reset()`` and ``VectorInstance.reset()``."""
+        if self._for_eyes:
+            self.screen.pace()
+        with self.hold:
+            return self._move("reset", seed, options, tensors, mask)
+
+    def step(
+        self,
+        action: object,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+        for_eyes: bool = False,
+    ) -> Ready:
+        """Take one step; see ``Instance.step()`` and ``VectorInstance.step()``."""
+        if for_eyes or self._for_eyes:
+            self.screen.pace()
+        if isinstance(action, Parts):
+            action = _sendable(action)
+        with self.hold:
+            answer = self._move("step", action, tensors, mask)
+            self._steps += self._lanes if mask is None else int(mask.sum())
+            return answer
+
+    def _move(self, method: str, *args: object) -> Ready:
+        self.moves += 1
+        if self.on_move is not None:
+            call, self.on_move = self.on_move, None
+            call()
+        return self._worker.move(method, *args)
+
+    def sample_action(self) -> object:
+        """Draw an action from the action space's own generator."""
+        with self.hold:
+            return self._worker.move("sample_action").value
+
+    # Looks ----------------------------------------------------------------------------------
+
+    def render(self, lane: int = 0) -> np.ndarray:
+        """Draw the current state of a lane; see ``Instance.render()``."""
+        self.check_lane(lane)
+        with self.hold:
+            return self._worker.move("render", lane).frame
+
+    def check_lane(self, lane: int) -> None:
+        """Raise ``invalid_parameter`` for a lane that there is not."""
+        if lane >= self._lanes:
+            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
+            raise invalid_parameter("lane", lane, f"{last} for this environment")
+
+    def draws_on_render_thread(self) -> bool:
+        """Tell whether a picture takes the server's render thread."""
+        return False
+
+    def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a lane; whoever calls it has the hold."""
+        seen = self._worker.move("look", lane)
+        return dict(self._value(seen)), seen.frame
+
+    # While it moves -------------------------------------------------------------------------
+
+    @property
+    def action_space_info(self) -> dict:
+        """The description of the action space."""
+        return self._value(self._worker.question("action_space_info"))
+
+    @property
+    def observation_space_info(self) -> dict:
+        """The description of the observation space."""
+        return self._value(self._worker.question("observation_space_info"))
+
+    def action_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; see ``spaces.contains()``."""
+        return bool(self._worker.question("action_contains", claim).value)
+
+    def observation_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; see ``spaces.contains()``."""
+        return bool(self._worker.question("observation_contains", claim).value)
+
+    def about(self) -> dict:
+        """Return all that is known of the instance, without waiting for its environment."""
+        try:
+            self._about = self._value(self._worker.question("about", seconds=_ABOUT_SECONDS))
+        except TimeoutError:
+            logging.getLogger(__name__).info("Instance %s says nothing now", self.instance_id)
+        return {**self._about, **self.line(), "isolated": True}
+
+    # Monitors -------------------------------------------------------------------------------
+
+    def start_monitor(self, root: MonitorRoot, directory: str, *how: object) -> None:
+        """Record the episodes that start from now on; see ``Monitor``."""
+        with self.hold:
+            if self._reserved is not None or self._num_envs is not None:
+                # It says what is wrong.
+                self._worker.move("start_monitor", self.instance_id, None, directory, *how)
+                return
+            self._reserved = root, root.reserve(directory)
+            try:
+                path = self._reserved[1]
+                self._worker.move("start_monitor", self.instance_id, path, directory, *how)
+            except GymServerError:
+                self._release()
+                raise
+
+    def close_monitor(self) -> None:
+        """Stop recording and finish the files; see ``Instance.close_monitor()``."""
+        with self.hold:
+            try:
+                self._worker.move("close_monitor", self.instance_id)
+            finally:
+                self._release()
+
+    def _release(self) -> None:
+        reserved, self._reserved = self._reserved, None
+        if reserved is not None:
+            reserved[0].release(reserved[1])
+
+    # The end --------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Finish the monitor and close the environment; whoever waits learns that it is gone."""
+        with self.hold:
+            gone = self.hold.gone()
+            self.hold.closed = True
+            self.screen.end(gone)
+            self._worker.expect_end()
+            try:
+                self._worker.move("close")
+            finally:
+                self._worker.let_go(gone)
+                self._release()
+
+    def condemn(self, why: GymServerError) -> None:
+        """End the process at once.
+
+        Who waits for it hears why, and so does everybody who comes later: none is stuck.
+        """
+        self._worker.condemn(why)
+        self.screen.end(why)
+        self._release()
+
+    def _end(self, why: GymServerError) -> None:
+        self.screen.end(why)
+        self._release()
+        self._on_end(self, why)
+
+
+def _sendable(action: Parts) -> Parts:
+    """Return tensors whose bytes can be pickled."""
+    tensors = {
+        name: Tensor(tensor.dtype, tensor.shape, bytes(tensor.data))
+        for name, tensor in action.tensors.items()
+    }
+    return Parts(tensors, action.texts)

@@ -1,0 +1,40 @@
+"""What is known of an instance whatever its environment does."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gym_server.choices import Choices
+    from gym_server.hold import Hold
+    from gym_server.screen import Screen
+
+
+class Listed:
+    """An instance as it stands in the list of all."""
+
+    # Given when the instance is listed.
+    instance_id = ""
+    env_id: str
+    hold: Hold
+    screen: Screen
+    _choices: Choices
+    # None where there are no lanes.
+    _num_envs: int | None = None
+    _made: float
+    _steps: int
+
+    def line(self) -> dict:
+        """Return its line in the list."""
+        now = time.monotonic()
+        return {
+            "instance_id": self.instance_id,
+            "env_id": self.env_id,
+            "name": self._choices.name,
+            "num_envs": self._num_envs,
+            "age_seconds": now - self._made,
+            "idle_seconds": now - self.hold.used,
+            "steps": self._steps,
+            "watched": self.screen.is_watched,
+        }

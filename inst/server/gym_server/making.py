@@ -1,0 +1,56 @@
+"""Make an environment and what keeps it, here in this process."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Collection
+
+from gym_server import creation, vectorization, wrappers
+from gym_server.choices import Choices
+from gym_server.errors import GymServerError
+from gym_server.frames import RenderThread
+from gym_server.instance import Instance
+from gym_server.vector_instance import VectorInstance
+
+
+def make(
+    choices: Choices,
+    allowed_modules: Collection[str],
+    max_num_envs: int,
+    renderer: RenderThread,
+    undo: contextlib.ExitStack,
+) -> Instance:
+    """Make an instance of what a client wants.
+
+    Args:
+        choices: what that is.
+        allowed_modules: names of the modules that an env_id may import.
+        max_num_envs: how many lanes it may have.
+        renderer: the process's render thread.
+        undo: closes the environment when something goes wrong from here on.
+
+    Raises:
+        GymServerError: see ``creation.make()``, ``vectorization.make()``, ``wrappers.wrap()`` and
+            ``Instance``.
+    """
+    if choices.num_envs is None:
+        env = creation.make(
+            choices.env_id, choices.render_mode, choices.kwargs or {}, allowed_modules
+        )
+        undo.push(_closing_quietly(renderer, env.close))
+        return Instance(wrappers.wrap(env, choices.wrappers, renderer), choices, renderer)
+    lanes, mode = vectorization.make(choices, allowed_modules, max_num_envs, renderer)
+    undo.push(_closing_quietly(renderer, lanes.close))
+    return VectorInstance(lanes, mode, choices, renderer)
+
+
+def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:
+    def leave(kind: type | None, error: BaseException | None, *_: object) -> None:
+        # The render thread hangs in it, and must be left to that.
+        if isinstance(error, GymServerError) and error.code == "call_too_long":
+            return
+        # What the client must hear of is why it gets no instance.
+        with contextlib.suppress(Exception):
+            renderer.run(close)
+
+    return leave

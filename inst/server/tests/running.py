@@ -1,0 +1,24 @@
+"""Processes as Linux lists them."""
+
+import os
+from pathlib import Path
+
+
+def is_running(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    # A process that has ended and that nobody has waited for is still listed.
+    with open(f"/proc/{pid}/stat") as stat:
+        return stat.read().rpartition(")")[2].split()[0] != "Z"
+
+
+def descendants(pid):
+    stats = [stat.read_text() for stat in Path("/proc").glob("[0-9]*/stat")]
+    # The number, the name in parentheses, the state, the parent's number.
+    parents = {int(one.split()[0]): int(one.rpartition(")")[2].split()[1]) for one in stats}
+    found = [pid]
+    for parent in found:
+        found += [child for child, its_parent in parents.items() if its_parent == parent]
+    return found[1:]

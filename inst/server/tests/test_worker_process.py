@@ -1,0 +1,221 @@
+"""Environments that end their own process, or try to do more: nobody else notices."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from conftest import ServerProcess
+from running import descendants, is_running
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    forged = tmp_path_factory.mktemp("forged") / "file"
+    server = ServerProcess("--port", "0", "--allow-module", "faulty_envs", FORGED_FILE=str(forged))
+    server.forged = forged
+    yield server
+    server.kill()
+
+
+def rogue(server, **kwargs):
+    url = server.create("faulty_envs:Rogue-v0", kwargs=kwargs)
+    status, answer = server.post(f"{url}/reset/")
+    assert status == 200, answer
+    return url, answer["info"]["pid"]
+
+
+ENDS = [
+    ("exits", "exit status 7"),
+    ("is_killed", "signal SIGKILL"),
+    ("crashes", "signal SIGSEGV"),
+    ("closes_all_files", ""),
+    ("forks_and_exits", "exit status 8"),
+    ("forks_a_stranger_and_exits", "exit status 8"),
+]
+
+
+@pytest.mark.parametrize(("does", "how"), ENDS)
+def test_it_is_told_how_a_process_ended_and_the_instance_is_gone(server, does, how, eventually):
+    url, pid = rogue(server, does=does)
+    status, answer = server.post(f"{url}/step/", {"action": 0})
+    assert (status, answer["code"]) == (500, "environment_died")
+    assert how in answer["message"]
+    # Later calls get the reason, whatever they are.
+    eventually(lambda: url[-8:] not in server.get("/v1/envs/")[1]["all_envs"])
+    for method, path in [(server.post, "step/"), (server.get, ""), (server.post, "close/")]:
+        arguments = [{"action": 0}] if path == "step/" else []
+        assert method(f"{url}/{path}", *arguments) == (status, answer)
+    eventually(lambda: not is_running(pid))
+    assert server.get("/v1/health/")[0] == 200
+
+
+def test_what_it_forked_ends_with_it(server, eventually):
+    before = set(descendants(server.process.pid))
+    url, pid = rogue(server, does="forks_and_exits")
+    server.post(f"{url}/step/", {"action": 0})
+    eventually(lambda: not any(os.getpgid(one) == pid for one in _all_processes()))
+    assert set(descendants(server.process.pid)) <= before
+
+
+def _all_processes():
+    pids = [int(name) for name in os.listdir("/proc") if name.isdecimal()]
+    return [pid for pid in pids if os.path.exists(f"/proc/{pid}") and is_running_safely(pid)]
+
+
+def is_running_safely(pid):
+    try:
+        return is_running(pid)
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("at", ["constructor", "close", "render"])
+def test_it_is_told_wherever_it_ends(server, at):
+    if at == "constructor":
+        kwargs = {"does": "exits", "at": at}
+        status, answer = server.post(
+            "/v1/envs/", {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs}
+        )
+        assert "while it was created: exit status 7" in answer["message"]
+    else:
+        url, _ = rogue(server, does="exits", at=at)
+        call = server.get if at == "render" else server.post
+        status, answer = call(f"{url}/{at}/")
+    assert (status, answer["code"]) == (500, "environment_died")
+
+
+def test_a_watcher_hears_of_the_end(server):
+    url, pid = rogue(server)
+    number = server.get(f"{url}/watch/state/")[1]["number"]
+    heard = []
+    watcher = threading.Thread(
+        target=lambda: heard.append(server.get(f"{url}/watch/state/?after={number}"))
+    )
+    watcher.start()
+    time.sleep(0.2)
+    os.kill(pid, signal.SIGKILL)
+    watcher.join(10)
+    assert heard[0][1]["code"] == "environment_died"
+
+
+@pytest.mark.parametrize("does", ["prints", "ignores_sigterm"])
+def test_what_is_no_end_is_none(server, does, eventually):
+    url, pid = rogue(server, does=does)
+    assert server.post(f"{url}/step/", {"action": 0})[0] == 200
+    assert server.post(f"{url}/step/", {"action": 0})[0] == 200
+    assert server.post(f"{url}/close/")[0] == 204
+    eventually(lambda: not is_running(pid))
+
+
+def test_nothing_that_it_sends_runs_in_the_server(server):
+    url, _ = rogue(server, does="forges")
+    answer = server.post(f"{url}/step/", {"action": 0})[1]
+    assert answer["code"] == "environment_died"
+    assert "nobody asked for" in answer["message"] or "it sent" in answer["message"]
+    assert not server.forged.exists()
+
+
+def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
+    urls = [server.create("faulty_envs:Counting-v0", kwargs={"length": 1000}) for _ in range(19)]
+    ending, _ = rogue(server, does="exits")
+    for url in urls:
+        server.post(f"{url}/reset/")
+    disturbed = []
+
+    def run(url):
+        connection = server.connect()
+        for number in range(1, 61):
+            connection.request("POST", f"{url}/step/", '{"action": 1}')
+            answer = connection.getresponse()
+            if f'"observation":[{number}]'.encode() not in answer.read():
+                disturbed.append(url)
+        connection.close()
+
+    threads = [threading.Thread(target=run, args=(url,)) for url in urls]
+    for thread in threads:
+        thread.start()
+    assert server.post(f"{ending}/step/", {"action": 0})[1]["code"] == "environment_died"
+    for thread in threads:
+        thread.join(60)
+    print(f"isolation: others disturbed {len(disturbed)} of {len(urls)}")
+    assert disturbed == []
+    for url in urls:
+        server.post(f"{url}/close/")
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_no_process_outlives_the_server(serve, how, eventually):
+    server = serve()
+    pids = [rogue(server)[1] for _ in range(2)]
+    lanes = server.create("faulty_envs:Uneven-v0", num_envs=2, vectorization_mode="async")
+    assert server.post(f"{lanes}/reset/")[0] == 200
+    if how == signal.SIGKILL:
+        stuck, pid = rogue(server, does="never_returns")
+        pids.append(pid)
+        call = threading.Thread(target=_without_answer, args=(server, f"{stuck}/step/"))
+        call.start()
+        time.sleep(0.3)
+    children = descendants(server.process.pid)
+    assert set(pids) < set(children)
+    server.stop(how)
+    eventually(lambda: not any(map(is_running, children)))
+
+
+def _without_answer(server, url):
+    try:
+        server.post(url, {"action": 0})
+    except Exception:
+        return
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="Linux limits memory so")
+def test_a_process_gets_no_more_memory_than_it_may_have(serve):
+    server = serve("--max-worker-mb", "600")
+    url, _ = rogue(server, does="hoards")
+    status, answer = server.post(f"{url}/step/", {"action": 0})
+    assert (status, answer["code"]) == (500, "environment_error")
+    assert "MemoryError" in answer["message"]
+    assert server.get("/v1/health/")[0] == 200
+
+
+def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
+    server = serve("--max-call-seconds", "4")
+    other, _ = rogue(server, does="nothing")
+    url, pid = rogue(server, does="never_returns")
+
+    def step(_):
+        return server.post(f"{url}/step/", {"action": 0})
+
+    with ThreadPoolExecutor() as calls:
+        # One hangs, and the others wait for it.
+        answers = [*calls.map(step, range(3)), step(None)]
+    assert [(status, answer["code"]) for status, answer in answers] == [(504, "call_too_long")] * 4
+    eventually(lambda: not is_running(pid))
+    kwargs = {"does": "never_returns", "at": "constructor"}
+    status, answer = server.post("/v1/envs/", {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs})
+    assert (status, answer["code"]) == (504, "call_too_long")
+    assert list(server.get("/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
+    assert server.post(f"{other}/step/", {"action": 0})[0] == 200
+
+
+def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
+    def left():
+        files = len(os.listdir(f"/proc/{server.process.pid}/fd"))
+        threads = len(os.listdir(f"/proc/{server.process.pid}/task"))
+        return files, threads, len(descendants(server.process.pid))
+
+    rogue(server, does="nothing")
+    eventually(lambda: left() == left())
+    time.sleep(0.5)
+    before = left()
+    for _ in range(5):
+        url, _ = rogue(server)
+        assert server.post(f"{url}/close/")[0] == 204
+        url, _ = rogue(server, does="exits")
+        server.post(f"{url}/step/", {"action": 0})
+    eventually(lambda: all(a <= b for a, b in zip(left(), before, strict=True)))
