@@ -301,6 +301,17 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, look, s
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
+def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, eventually):
+    strict = serve("--max-call-seconds", "2")
+    where = {"where": "reset"}
+    url = strict.create("faulty_envs:HangsWhere-v0", kwargs=where, render_mode="rgb_array")
+    browser.get(f"http://127.0.0.1:{strict.port}{url}/watch/")
+    eventually(lambda: text(browser, "words") == "Not reset yet")
+    assert strict.post(f"{url}/reset/")[0] == 504
+    eventually(lambda: "took more than 2 seconds" in text(browser, "words"))
+    assert text(browser, "state") == "closed"
+
+
 def test_every_control_has_a_name(browser, server, look):
     look(server.create("CartPole-v1", num_envs=2))
     for control in browser.find_elements(By.CSS_SELECTOR, "button, input, canvas"):
