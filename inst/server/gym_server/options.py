@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -119,11 +120,18 @@ def _add_isolation(options: argparse.ArgumentParser) -> None:
     )
     options.add_argument(
         "--max-worker-mb",
-        type=_number(0, 2**24),
+        type=_worker_mb,
         default=0,
         help="memory that such a process may have, on Linux; 0 for as much as there is "
         "(%(default)s)",
     )
+
+
+def _worker_mb(text: str) -> int:
+    size = _number(0, 2**24)(text)
+    if size and sys.platform != "linux":
+        raise argparse.ArgumentTypeError("only Linux keeps such a limit")
+    return size
 
 
 def _number(least: int, greatest: int) -> Callable[[str], int]:

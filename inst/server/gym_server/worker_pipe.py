@@ -61,9 +61,9 @@ class SocketPipe(ConnectionPipe):
 
     def __init__(self, connection: Connection) -> None:
         """Take over an end."""
-        super().__init__(connection)
         self._socket = socket.socket(fileno=os.dup(connection.fileno()))
         self._rest = b""
+        connection.close()
 
     def send(self, message: bytes) -> None:
         """Send a message."""
@@ -112,7 +112,6 @@ class SocketPipe(ConnectionPipe):
     def close(self) -> None:
         """Close this end; nobody may wait here."""
         self._socket.close()
-        super().close()
 
 
 Pipe = SocketPipe if os.name == "posix" else ConnectionPipe

@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 # Once its end of the pipe is closed it has nothing to do any more.
 _LEAVES_SECONDS = 2.0
 
+# How it ended is known a little later than that it did, on a busy machine more than a little.
+_NEWS_SECONDS = 10.0
+
 # What a process that is gone, or no longer what it was, is known by.
 _FAULTS = (EOFError, OSError, ValueError, Nonsense)
 
@@ -124,7 +127,7 @@ class WorkerProcess:
         if isinstance(fault, Nonsense):
             self._nonsense = f"it sent {fault}"
             self._kill()
-        elif not self._ended.wait(_LEAVES_SECONDS):
+        elif not self._ended.wait(_NEWS_SECONDS):
             self._nonsense = "it closed its connection to the server"
             self._kill()
         self._ended.wait(_LEAVES_SECONDS)

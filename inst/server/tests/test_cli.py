@@ -101,7 +101,13 @@ def test_a_monitor_directory_that_cannot_be_made_is_one_line_and_status_1(tmp_pa
 
 @pytest.mark.parametrize(
     "options",
-    [["--port", "65536"], ["--port", "x"], ["--max-body-mb", "0"], ["--max-num-envs", "0"]],
+    [
+        ["--port", "65536"],
+        ["--port", "x"],
+        ["--max-body-mb", "0"],
+        ["--max-num-envs", "0"],
+        ["--max-worker-mb", "-1"],
+    ],
 )
 def test_options_out_of_range_are_refused(options, capsys):
     with pytest.raises(SystemExit):

@@ -15,7 +15,11 @@ def limited():
     apps = []
 
     def limited(**limits):
-        apps.append(create_app(Config(allowed_modules=["faulty_envs"], limits=Limits(**limits))))
+        apps.append(
+            create_app(
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
+            )
+        )
         return apps[-1].test_client()
 
     yield limited

@@ -222,7 +222,11 @@ def quick():
     apps = []
 
     def quick(**limits):
-        apps.append(create_app(Config(allowed_modules=["faulty_envs"], limits=Limits(**limits))))
+        apps.append(
+            create_app(
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
+            )
+        )
         return apps[-1]
 
     yield quick
