@@ -49,8 +49,9 @@
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
 the_session$client <- NULL
+the_session$made <- new.env(parent = emptyenv())
 
 .onLoad <- function(libname, pkgname) {
   the_session$pid <- Sys.getpid()
-  reg.finalizer(the_session, stop_session_servers, onexit = TRUE)
+  reg.finalizer(the_session, end_session, onexit = TRUE)
 }

@@ -209,13 +209,31 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-# At the end of the session; a forked child's end is not the session's.
-stop_session_servers <- function(session) {
-  if (Sys.getpid() != session$pid) {
-    return()
-  }
-  for (server in session$servers) {
-    stop_server(server, patience = 2)
+# At the end of the session, with a limit for all of it. Servers end by themselves when
+# their standard input closes, all at once.
+end_session <- function(session) {
+  deadline <- proc.time()[["elapsed"]] + closing_time
+  servers <- if (Sys.getpid() == session$pid) running_servers(session)
+  lapply(servers, close_server_input)
+  close_session_instances(closing_time / 2)
+  stop_session_servers(servers, deadline)
+}
+
+running_servers <- function(session) {
+  Filter(function(server) server$process$is_alive(), session$servers)
+}
+
+stop_session_servers <- function(servers, deadline) {
+  await_ends(servers, deadline - closing_time / 2)
+  lapply(servers, terminate_server)
+  await_ends(servers, deadline)
+  lapply(servers, function(server) if (server$process$is_alive()) server$process$kill())
+}
+
+await_ends <- function(servers, deadline) {
+  for (server in servers) {
+    left <- deadline - proc.time()[["elapsed"]]
+    server$process$wait(max(0, left * 1000))
   }
 }
 

@@ -114,7 +114,7 @@ test_that("a server stops in order while a forked child lives", {
 test_that("the end of a forked child is not the session's", {
   skip_on_os("windows")
   server <- local_server()
-  parallel::mclapply(1:2, function(i) stop_session_servers(the_session), mc.cores = 2)
+  parallel::mclapply(1:2, function(i) end_session(the_session), mc.cores = 2)
   expect_type(env_list_all(server), "list")
 })
 
