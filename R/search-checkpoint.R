@@ -133,7 +133,7 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
   gym_abort(
     c(
       paste0("The checkpoint \"", path, "\" ", problem, "."),
-      stats::setNames(lines, rep("x", length(lines))),
+      if (length(lines)) stats::setNames(lines, rep("x", length(lines))),
       i = paste(
         "Give another file as `checkpoint`; with `resume = FALSE` the search begins anew and",
         "replaces what is there."
@@ -202,11 +202,14 @@ finished_search <- function(saved, settings, client) {
 
 # Writing --------------------------------------------------------------------------
 
+# So that writing takes a tenth of the time at most.
+rest_per_writing <- 9
+
 #' Keep a search in its file from now on
 #'
 #' After each block of episodes the file is written anew. What it holds grows, and where a
-#' block is a single short episode, writing would take longer than playing: it takes a
-#' tenth of the time at most, and of the last blocks some may then have to be played again.
+#' block is a single short episode, writing would take longer than playing: then some blocks
+#' pass without, and would be played again.
 #' @param record As [new_rounds()] returns it.
 #' @param started When the search began, less what it took before.
 #' @noRd
@@ -244,7 +247,7 @@ keep_rounds <- function(record, checkpoint, lanes, settings, started, call) {
       }
     )
     ended <- proc.time()[["elapsed"]]
-    rest_until <<- ended + 9 * (ended - began)
+    rest_until <<- ended + rest_per_writing * (ended - began)
   }
 }
 
@@ -290,7 +293,8 @@ write_checkpoint <- function(path, state) {
   part <- tempfile(paste0(basename(path), "-", Sys.getpid(), "-"), dirname(path), ".part")
   on.exit(unlink(part))
   bytes <- serialize(file, NULL)
-  writeBin(bytes, part)
+  # The warning knows more than the error.
+  tryCatch(writeBin(bytes, part), warning = function(cnd) stop(conditionMessage(cnd)))
   # A disk that is full is not always told when a file is closed.
   if (!identical(file.size(part), as.numeric(length(bytes)))) {
     stop("not all of it could be written")

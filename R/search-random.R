@@ -46,8 +46,8 @@
 #' rename, so that it is whole whenever R, the server or the machine's queue ends the search.
 #' The same call then goes on where the file has it, and comes to the result that an
 #' undisturbed search comes to, the generator's state afterwards included: in a script that
-#' is submitted to a cluster again and again, that one line is enough. What takes the time
-#' since the last block is played again. `elapsed` adds up.
+#' is submitted to a cluster again and again, that one line is enough. The block that was under
+#' way is played again. `elapsed` adds up.
 #'
 #' ```r
 #' search <- search_random("CartPole-v1", rounds = 1000, seed = 1, checkpoint = "search.rds")

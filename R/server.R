@@ -126,6 +126,11 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
 
 register_server <- function(server) {
   the_session$servers[[server$url]] <- server
+  # R ends what is youngest first. An end that is registered after the process finds the process
+  # there still; kept, as it must not come before the session's.
+  ending <- new.env(parent = emptyenv())
+  reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
+  the_session$endings <- c(the_session$endings, ending)
   new_client(server$url)
 }
 
@@ -212,6 +217,10 @@ session_server <- function(client, call = rlang::caller_env()) {
 # At the end of the session, with a limit for all of it. Servers end by themselves when
 # their standard input closes, all at once.
 end_session <- function(session) {
+  if (isTRUE(session$ended)) {
+    return()
+  }
+  session$ended <- TRUE
   deadline <- proc.time()[["elapsed"]] + closing_time
   servers <- if (Sys.getpid() == session$pid) running_servers(session)
   lapply(servers, close_server_input)
