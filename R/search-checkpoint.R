@@ -19,6 +19,7 @@ open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_en
     problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
     abort_checkpoint(path, problem, call = call)
   }
+  remove_parts(path)
   arguments <- search_arguments(env, settings)
   saved <- if (resume) read_checkpoint(path, call)
   if (!is.null(saved)) {
@@ -274,6 +275,13 @@ kept_record <- function(record) {
     wanted = record$wanted, begun = record$begun, policies = policies,
     returns = record$returns, means = record$means, open = record$open, episodes = episodes
   )
+}
+
+# What a kill in the middle of writing has left. A young one may be another process's.
+remove_parts <- function(path) {
+  files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
+  parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
+  unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
 }
 
 #' Write the file of a search

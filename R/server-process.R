@@ -169,9 +169,11 @@ close_server_input <- function(server) {
   tryCatch(close(input), error = function(cnd) NULL)
 }
 
-# A forked child that still lives holds the server's standard input open, too.
+# A forked child that still lives holds the server's standard input open, too; one that was
+# stopped hears of nothing until it goes on.
 terminate_server <- function(server) {
   if (server$process$is_alive() && !is_windows()) {
     server$process$signal(tools::SIGTERM)
+    server$process$signal(tools::SIGCONT)
   }
 }

@@ -214,8 +214,8 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-# At the end of the session, with a limit for all of it. Servers end by themselves when
-# their standard input closes, all at once.
+# At the end of the session, with a limit for all of it. Servers end by themselves when their
+# standard input closes. One that takes longer, with a video perhaps, is left to it.
 end_session <- function(session) {
   if (isTRUE(session$ended)) {
     return()
@@ -236,7 +236,6 @@ stop_session_servers <- function(servers, deadline) {
   await_ends(servers, deadline - closing_time / 2)
   lapply(servers, terminate_server)
   await_ends(servers, deadline)
-  lapply(servers, function(server) if (server$process$is_alive()) server$process$kill())
 }
 
 await_ends <- function(servers, deadline) {

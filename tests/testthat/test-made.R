@@ -63,6 +63,10 @@ test_that("a session ends at once with a server behind a broken line, and its ow
   )
   words <- as.numeric(strsplit(run$stdout, " ")[[1]])
   expect_quick_end(run, words[[1]])
+  for (i in 1:100) {
+    if (!pid_runs(words[[2]])) break
+    Sys.sleep(0.1)
+  }
   expect_false(pid_runs(words[[2]]))
 })
 

@@ -233,6 +233,15 @@ test_that("a write that ends in the middle leaves the file before it, and nothin
   expect_identical(list.files(folder), "search.rds")
 })
 
+test_that("what a kill in the middle of a write has left goes with the next start", {
+  folder <- withr::local_tempdir()
+  left <- file.path(folder, c("search.rds-1-a.part", "search.rds-2-b.part", "other.part"))
+  file.create(left)
+  Sys.setFileTime(left[c(1, 3)], Sys.time() - 3600)
+  search_random(fake_environment(), rounds = 1, checkpoint = file.path(folder, "search.rds"))
+  expect_setequal(list.files(folder), c("search.rds", basename(left[2:3])))
+})
+
 test_that("the file stays small: of the policies those are kept that are needed", {
   path <- local_checkpoint()
   search_random(fake_environment(), policy_network(c(4, 100, 1)), rounds = 40, episodes = 1,
