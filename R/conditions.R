@@ -61,13 +61,31 @@ sentence <- function(text) {
   if (grepl("[.?!]$", text)) text else paste0(text, ".")
 }
 
-abort_connection <- function(url, reason, call) {
+# `reached`: whether the server can have had the call.
+abort_connection <- function(url, reason, call, reached = TRUE) {
   base <- base_of(url)
+  hangs <- reached && grepl("timed out|timeout", reason, ignore.case = TRUE)
   gym_abort(
-    c(paste0("No answer from the server at ", base, "."), x = reason, i = connection_mend(base)),
+    c(
+      paste0("No answer from the server at ", base, "."),
+      x = reason,
+      i = if (hangs) hanging_mend(base) else connection_mend(base)
+    ),
     class = "gym_error_connection",
     url = base,
+    reached = reached,
     call = call
+  )
+}
+
+hanging_mend <- function(base) {
+  paste(
+    "It took the call, but works longer on it than the client's `timeout`, or it hangs.",
+    if (!is.null(the_session$servers[[base]])) {
+      "`gym_server_stop()` ends a server of this session's; `gym_make()` then starts another."
+    } else {
+      "`create_GymClient(timeout = )` waits longer; if it hangs, whoever runs it must start it anew."
+    }
   )
 }
 

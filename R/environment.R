@@ -2,7 +2,8 @@
 
 #' Create an environment on a server
 #'
-#' Makes an instance of an environment; the server keeps it until [env_close()].
+#' Makes an instance of an environment; the server keeps it until [env_close()] or the end of
+#' the session that made it.
 #'
 #' @param x A client, made by [create_GymClient()], [gym_client()] or
 #'   [gym_server_start()].
@@ -97,6 +98,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
 #' env_list_all(gym_client())
 env_list_all <- function(x) {
   check_client(x)
+  close_abandoned(x)
   get_answer(x, "/v1/envs/")$all_envs
 }
 

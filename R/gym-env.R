@@ -6,8 +6,9 @@
 #' Gymnasium's documentation writes it with a dot. Without a `client` it lives
 #' on the session's own server, which is started when there is none.
 #'
-#' The environment is closed by `$close()`, or some time after the object itself
-#' has been thrown away: keep the object for as long as the environment is played.
+#' The environment is closed by `$close()`, some time after the object itself has been
+#' thrown away, or at the session's end: keep the object for as long as the environment is
+#' played.
 #'
 #' With `num_envs` it has lanes: copies of the environment that are reset and stepped
 #' together, with one call for all of them. Observations then have a row a lane, and so
@@ -67,12 +68,14 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1")
   check_client(client)
-  instance_id <- create_instance(
+  env <- NULL
+  instance_id <- NULL
+  on.exit(if (is.null(env)) abandon_instance(client, instance_id))
+  # No interrupt comes between the instance and its name.
+  suspendInterrupts(instance_id <- allowInterrupts(create_instance(
     client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
     autoreset_mode, name
-  )
-  env <- NULL
-  on.exit(if (is.null(env)) close_if_there(client, instance_id))
+  )))
   env <- gym_env$new(client, instance_id)
   env
 }
@@ -150,8 +153,7 @@ gym_env <- R6Class(
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
-        state <- connection(self$client)
-        state$to_close <- c(state$to_close, self$instance_id)
+        queue_closing(self$client, self$instance_id)
       }
     }
   )

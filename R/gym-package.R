@@ -17,6 +17,7 @@
 #' | `gym_error_connection` | no answer: no server there, connection lost, time over |
 #' | `gym_error_server_start` | a server could not be started |
 #' | `gym_error_install` | what the server needs could not be installed |
+#' | `gym_error_checkpoint` | a search cannot go on from its file, or not keep one |
 #' | `gym_error_search` | a search ended early; what was played is its field `result` |
 #'
 #' A `gym_error_http` also has a class with the status, such as
@@ -48,8 +49,9 @@
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
 the_session$client <- NULL
+the_session$made <- new.env(parent = emptyenv())
 
 .onLoad <- function(libname, pkgname) {
   the_session$pid <- Sys.getpid()
-  reg.finalizer(the_session, stop_session_servers, onexit = TRUE)
+  reg.finalizer(the_session, end_session, onexit = TRUE)
 }

@@ -30,7 +30,7 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     check_viewer(call)
   }
   close_abandoned(x)
-  instance_id <- post_once(x, "/v1/envs/", fields, call = call)$instance_id
+  instance_id <- make_instance(x, fields, call)
   if (for_eyes) {
     show_instance(x, known_instance(x, instance_id, call), call)
   }
@@ -43,6 +43,7 @@ instance_route <- function(instance_id) {
 
 close_instance <- function(x, instance_id, call = rlang::caller_env()) {
   post_once(x, paste0(instance_route(instance_id), "close/"), call = call)
+  forget_made(made_place(x, instance_id))
   instances <- connection(x)$instances
   if (!is.null(instances[[instance_id]])) {
     rm(list = instance_id, envir = instances)
@@ -55,6 +56,7 @@ close_if_there <- function(x, instance_id, call = rlang::caller_env()) {
     close_instance(x, instance_id, call),
     gym_error_http = function(cnd) {
       if (!isTRUE(cnd$code %in% gone_codes)) rlang::cnd_signal(cnd)
+      forget_made(made_place(x, instance_id))
     }
   )
 }
@@ -113,6 +115,7 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
 reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask = NULL,
                            call = rlang::caller_env()) {
   check_mask(mask, instance, call)
+  close_abandoned(x)
   fields <- c(
     seed = encode_seed(seed, instance$num_envs, call),
     options = encode_options(options, call),
@@ -224,16 +227,5 @@ encode_options <- function(options, call) {
   if (!is.null(options)) {
     check_named_list(options, call = call)
     to_json(options)
-  }
-}
-
-# Environments whose objects were thrown away are closed when the next is made:
-# a finalizer may run in the middle of another call and must not start its own.
-close_abandoned <- function(x) {
-  state <- connection(x)
-  abandoned <- state$to_close
-  state$to_close <- character()
-  for (instance_id in abandoned) {
-    close_if_there(x, instance_id)
   }
 }

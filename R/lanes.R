@@ -24,7 +24,10 @@ with_lanes <- function(env, episodes, client, use, frames = FALSE, make = make_l
   }
   env <- if (frames) gym_make(env, client = client) else make(env, episodes, client)
   finished <- FALSE
-  on.exit(close_made(env, finished))
+  # After a server that hung there must not be another wait.
+  on.exit({
+    if (finished) close_made(env, finished) else abandon_instance(env$client, env$instance_id)
+  })
   value <- use(lanes_of(env, block, call, frames))
   finished <- TRUE
   value

@@ -8,10 +8,14 @@
 #' @param on_end Called when episodes have ended, with the record, their numbers and
 #'   their returns, in which it may find that fewer are `wanted`.
 #' @return A record, an environment: `wanted`; `begun`, how many episodes have begun;
-#'   `blocks`, a list of environments, each with what is known of a block's episodes.
+#'   `blocks`, a list of environments, each with what is known of a block's episodes;
+#'   `after_block`, a function of the record, called when a block has ended.
 #' @noRd
 new_record <- function(wanted, on_end = function(record, episodes, returns) NULL) {
-  rlang::env(wanted = wanted, begun = 0L, blocks = list(), on_end = on_end)
+  rlang::env(
+    wanted = wanted, begun = 0L, blocks = list(), on_end = on_end,
+    after_block = function(record) NULL
+  )
 }
 
 #' Play blocks of episodes until those that are wanted have ended
@@ -30,6 +34,7 @@ play_episodes <- function(lanes, record, begin, max_steps = NULL, keep_steps = F
     record$blocks[[block]] <- new_block(record$begun + seq_len(n), begun$seeds)
     record$begun <- record$begun + n
     play_block(lanes, record$blocks[[block]], begun$policy, record, max_steps %||% Inf, keep_steps)
+    record$after_block(record)
   }
 }
 

@@ -11,6 +11,7 @@ connection <- function(client) {
     suspendInterrupts({
       state$line <- line
       state$instances <- new.env(parent = emptyenv())
+      state$creations <- new_numbers()
       state$to_close <- character()
       state$layouts <- new.env(parent = emptyenv())
       state$pid <- Sys.getpid()
@@ -37,15 +38,21 @@ free_line <- function(client) {
 # The key and number of the last call that must not be done twice, the body under way,
 # and the channels that were opened so far.
 open_line <- function(client, fetch = curl::curl_fetch_memory) {
-  line <- new.env(parent = emptyenv())
+  line <- new_numbers()
   line$fetch <- fetch
   line$busy <- FALSE
-  line$key <- new_key()
-  line$number <- 0
   line$body <- raw()
   line$sent <- 0L
   line$channels <- new.env(parent = emptyenv())
   line
+}
+
+# A key, and the last number used under it.
+new_numbers <- function() {
+  numbers <- new.env(parent = emptyenv())
+  numbers$key <- new_key()
+  numbers$number <- 0
+  numbers
 }
 
 # As curl_fetch_memory(), which has one engine for all and cannot run inside itself.
@@ -100,8 +107,7 @@ open_channel <- function(client, line, kind) {
   channel <- new.env(parent = emptyenv())
   channel$handle <- open_handle(client, kind$sends, kind$takes)
   channel$body_size <- -1
-  # Blanks at the end of a JSON text mean nothing.
-  channel$least_body <- if (kind$sends == json_type) 256L else 0L
+  channel$kind <- kind
   if (kind$post) {
     curl::handle_setopt(channel$handle, post = TRUE, readfunction = function(nbytes, ...) {
       read_body(line, nbytes)
@@ -165,12 +171,13 @@ new_key <- function() {
 #' @param fields JSON texts of the fields of a POST's body, named; `NULL` for a GET.
 #' @param tensors Tensors for a body that is not JSON, see [write_tensors()].
 #' @param take_tensors Whether the answer should come as tensors.
+#' @param request The key and number of a POST that is done once; by default the line's next.
 #' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the
 #'   `request` that was sent (its `key` and `number`) and the parsed `answer`, `NULL`
 #'   for none or one that cannot be read.
 #' @noRd
 send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FALSE,
-                 once = FALSE, call = rlang::caller_env()) {
+                 once = FALSE, request = NULL, call = rlang::caller_env()) {
   # Arguments may hold calls of their own, as in env_reset(x, env_create(x, id)):
   # those come first and have the line for themselves.
   force(route)
@@ -180,11 +187,11 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
   line$busy <- TRUE
   on.exit(line$busy <- FALSE)
   channel <- find_channel(client, line, channel_kind(fields, tensors, take_tensors))
-  request <- if (once) next_request(line)
+  if (once && is.null(request)) {
+    request <- next_request(line)
+  }
   if (!is.null(fields)) {
-    fields <- c(fields, request = request_json(request))
-    body <- if (is.null(tensors)) charToRaw(json_object(fields)) else write_tensors(tensors, fields)
-    load_body(line, channel, body)
+    load_body(line, channel, request_body(fields, request, tensors))
   }
   repeatable <- once || is.null(fields)
   response <- fetch(client, line, channel, route, request, repeatable, call)
@@ -202,9 +209,14 @@ channel_kind <- function(fields, tensors, take_tensors) {
   }
 }
 
-next_request <- function(line) {
-  line$number <- line$number + 1
-  list(key = line$key, number = line$number)
+next_request <- function(numbers) {
+  numbers$number <- numbers$number + 1
+  list(key = numbers$key, number = numbers$number)
+}
+
+request_body <- function(fields, request, tensors = NULL) {
+  fields <- c(fields, request = request_json(request))
+  if (is.null(tensors)) charToRaw(json_object(fields)) else write_tensors(tensors, fields)
 }
 
 request_json <- function(request) {
@@ -216,9 +228,8 @@ request_json <- function(request) {
 # curl needs the length of a body beforehand, and setting it costs as much as half a
 # call: small bodies are padded with blanks to one length.
 load_body <- function(line, channel, bytes) {
-  size <- max(length(bytes), channel$least_body)
-  padding <- size - length(bytes)
-  line$body <- if (padding > 0L) c(bytes, rep(as.raw(0x20), padding)) else bytes
+  line$body <- padded(bytes, channel$kind)
+  size <- length(line$body)
   if (size != channel$body_size) {
     suspendInterrupts({
       curl::handle_setopt(channel$handle, postfieldsize_large = size)
@@ -227,11 +238,18 @@ load_body <- function(line, channel, bytes) {
   }
 }
 
+# Blanks at the end of a JSON text mean nothing.
+padded <- function(bytes, kind) {
+  padding <- 256L - length(bytes)
+  if (padding > 0L && kind$sends == json_type) c(bytes, rep(as.raw(0x20), padding)) else bytes
+}
+
 fetch <- function(client, line, channel, route, request, repeatable, call) {
   handle <- channel$handle
   url <- paste0(client$remote_base, route)
   started <- proc.time()[["elapsed"]]
   attempt <- 1L
+  reached <- FALSE
   repeat {
     response <- exchange(client, line, handle, url, request)
     if (!inherits(response, "error")) {
@@ -241,16 +259,23 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
-    left <- client$timeout - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
+    reached <- reached || curl::handle_data(handle)$times[["pretransfer"]] > 0
+    left <- patience(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
     if (!repeatable || attempt == max_attempts || left <= 0 || !connection_broke(reason)) {
-      abort_connection(client$remote_base, reason, call)
+      abort_connection(client$remote_base, reason, call, reached)
     }
     Sys.sleep(0.1 * attempt)
     # All attempts together may take as long as one call.
     curl::handle_setopt(handle, timeout_ms = left * 1000)
-    on.exit(curl::handle_setopt(handle, timeout_ms = client$timeout * 1000))
+    on.exit(curl::handle_setopt(handle, timeout_ms = patience(client) * 1000))
     attempt <- attempt + 1L
   }
+}
+
+# httr's timeout() goes before the client's own.
+patience <- function(client) {
+  own <- client$config$options$timeout_ms
+  if (is.null(own)) client$timeout else own / 1000
 }
 
 # One attempt: the response with its answer parsed, or the error of the connection.
@@ -306,9 +331,9 @@ connection_broke <- function(reason) {
 
 # Make a call that the server carries out exactly once, and read its answer.
 post_once <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FALSE,
-                      call = rlang::caller_env()) {
+                      request = NULL, call = rlang::caller_env()) {
   fields <- fields %||% character()
-  response <- send(client, route, fields, tensors, take_tensors, once = TRUE, call = call)
+  response <- send(client, route, fields, tensors, take_tensors, TRUE, request, call)
   read_answer(response, "POST", call)
 }
 

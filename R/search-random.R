@@ -38,6 +38,26 @@
 #' search <- tryCatch(search_random(), gym_error_search = function(cnd) cnd$result)
 #' ```
 #'
+#' # To go on after a kill
+#'
+#' With a `checkpoint` the search keeps what it has played in a file, after each block of
+#' episodes (where a block is over in milliseconds, as with a single environment made by
+#' [gym_make()], as often as takes a tenth of the time at most). The file is replaced by a
+#' rename, so that it is whole whenever R, the server or the machine's queue ends the search.
+#' The same call then goes on where the file has it, and comes to the result that an
+#' undisturbed search comes to, the generator's state afterwards included: in a script that
+#' is submitted to a cluster again and again, that one line is enough. The block that was under
+#' way is played again. `elapsed` adds up.
+#'
+#' ```r
+#' search <- search_random("CartPole-v1", rounds = 1000, seed = 1, checkpoint = "search.rds")
+#' ```
+#'
+#' A search goes on only with the arguments that it began with (`progress` and `client` may be
+#' others), in an environment that is made in the same way. Two searches at the same time need
+#' two files. Read such files only if you trust where they are from, as all that [readRDS()]
+#' reads.
+#'
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
 #'   [gym_make()], with lanes or without.
 #' @param policy The kind of policy to search among: a network made by [policy_network()],
@@ -58,6 +78,11 @@
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param client The client of the server where an environment named by its id is made; the
 #'   default is the session's own, [gym_client()].
+#' @param checkpoint The file in which to keep what is played, a string; `NULL`, the default,
+#'   keeps nothing.
+#' @param resume Go on with what the `checkpoint` has? `TRUE`, the default, goes on where
+#'   there is such a file and otherwise begins; a search that had ended is returned at once.
+#'   `FALSE` begins anew, and replaces the file.
 #' @return An object of class [gym_search], which [print()], [summary()][summary.gym_search()],
 #'   [plot()][plot.gym_search()], [as.data.frame()][as.data.frame.gym_search()] and
 #'   [predict()][predict.gym_search()] know; a list with the elements
@@ -83,8 +108,10 @@
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, before
-#'   anything is made, or for a network that does not fit the environment; `gym_error_search`
-#'   for any error while it plays, with the classes of that error, `gym_error_http` or
+#'   anything is made, or for a network that does not fit the environment;
+#'   `gym_error_checkpoint` for a checkpoint that is damaged, is no search's, belongs to a
+#'   search with other arguments (the message names them, and so does the field `argument`) or
+#'   cannot be written; `gym_error_search` for any error while it plays, with the classes of that error, `gym_error_http` or
 #'   `gym_error_connection` for instance.
 #' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
@@ -98,17 +125,24 @@
 #' search$policy
 search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seed = NULL,
-                          progress = rlang::is_interactive(), client = gym_client()) {
+                          progress = rlang::is_interactive(), client = gym_client(),
+                          checkpoint = NULL, resume = TRUE) {
   check_seed(seed)
   check_flag(progress)
+  check_string(checkpoint, allow_null = TRUE)
+  check_flag(resume)
   call <- rlang::current_env()
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
   settings["env"] <- list(if (!is.character(env)) env)
   settings["seed"] <- list(seed)
+  kept <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
+  if (isTRUE(kept$saved$finished)) {
+    return(finished_search(kept$saved, settings, if (is_playable(env)) env$client else client))
+  }
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
     settings <- settings_in(lanes, settings)
     bound <- policy_bind(policy, lanes, call = call)
-    with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call))
+    with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call, kept))
   })
 }
 
@@ -142,12 +176,22 @@ settings_in <- function(lanes, settings) {
 #' Play rounds until one reaches the target
 #'
 #' An interrupt ends them early, an error does too and carries what was played.
+#' @param checkpoint As [open_checkpoint()] returns it, or `NULL`.
 #' @return A search, as [new_search()] makes it.
 #' @noRd
-play_rounds <- function(lanes, template, settings, progress, call) {
+play_rounds <- function(lanes, template, settings, progress, call, checkpoint = NULL) {
   started <- proc.time()[["elapsed"]]
   show <- if (progress) progress_bar(settings$rounds) else function(finished, best) NULL
   record <- new_rounds(settings$rounds, settings$episodes, settings$target, show)
+  if (!is.null(checkpoint)) {
+    saved <- checkpoint$saved
+    if (!is.null(saved)) {
+      settings$policy <- saved$template
+      started <- started - saved$elapsed
+      resume_rounds(record, saved, lanes, settings, checkpoint$path, call)
+    }
+    keep_rounds(record, checkpoint, lanes, settings, started, call)
+  }
   interrupted <- FALSE
   begin <- function(block, episodes) {
     list(seeds = lanes$draw_seeds(), policy = draw_policies(record, template, episodes))
@@ -159,7 +203,9 @@ play_rounds <- function(lanes, template, settings, progress, call) {
       inform_interrupted(count_finished(record), settings$rounds)
     },
     error = function(cnd) {
-      abort_search(cnd, new_search(record, settings, started), call)
+      abort_search(
+        cnd, new_search(record, settings, started), call, checkpoint = checkpoint$path
+      )
     }
   )
   new_search(record, settings, started, interrupted)
@@ -192,7 +238,8 @@ inform_interrupted <- function(finished, rounds) {
 
 # Of the error in the middle it keeps classes and fields, so that whoever waits for
 # a lost connection need not know that it was lost in a search.
-abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds), "round")) {
+abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds), "round"),
+                         checkpoint = NULL) {
   own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
            "use_cli_format")
   fields <- unclass(cnd)[setdiff(names(cnd), own)]
@@ -200,7 +247,10 @@ abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds
     gym_abort,
     c(
       paste0("The search ended early, after ", played, "."),
-      i = "What was played is the element `result` of this condition."
+      i = "What was played is the element `result` of this condition.",
+      i = if (!is.null(checkpoint)) {
+        paste0("The same call goes on from \"", checkpoint, "\" when what is wrong is mended.")
+      }
     ),
     class = c("gym_error_search", grep("^gym_error_", class(cnd), value = TRUE)),
     result = result,

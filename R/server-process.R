@@ -150,17 +150,30 @@ abort_server_start <- function(message, log_lines, call, hint = NULL) {
 
 stop_server <- function(server, patience = 15) {
   process <- server$process
+  forget_made_on(server$url)
   if (!process$is_alive()) {
     return(invisible())
   }
-  close(process$get_input_connection())
+  close_server_input(server)
   process$wait(1000)
-  if (process$is_alive() && !is_windows()) {
-    # A forked child that still lives holds the server's standard input open, too.
-    process$signal(tools::SIGTERM)
-  }
+  terminate_server(server)
   process$wait(patience * 1000)
   if (process$is_alive()) {
     process$kill()
+  }
+}
+
+close_server_input <- function(server) {
+  input <- server$process$get_input_connection()
+  # A stop that was interrupted has closed it.
+  tryCatch(close(input), error = function(cnd) NULL)
+}
+
+# A forked child that still lives holds the server's standard input open, too; one that was
+# stopped hears of nothing until it goes on.
+terminate_server <- function(server) {
+  if (server$process$is_alive() && !is_windows()) {
+    server$process$signal(tools::SIGTERM)
+    server$process$signal(tools::SIGCONT)
   }
 }

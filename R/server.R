@@ -131,6 +131,11 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
 
 register_server <- function(server) {
   the_session$servers[[server$url]] <- server
+  # R ends what is youngest first. An end that is registered after the process finds the process
+  # there still; kept, as it must not come before the session's.
+  ending <- new.env(parent = emptyenv())
+  reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
+  the_session$endings <- c(the_session$endings, ending)
   new_client(server$url)
 }
 
@@ -214,13 +219,34 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-# At the end of the session; a forked child's end is not the session's.
-stop_session_servers <- function(session) {
-  if (Sys.getpid() != session$pid) {
+# At the end of the session, with a limit for all of it. Servers end by themselves when their
+# standard input closes. One that takes longer, with a video perhaps, is left to it.
+end_session <- function(session) {
+  if (isTRUE(session$ended)) {
     return()
   }
-  for (server in session$servers) {
-    stop_server(server, patience = 2)
+  session$ended <- TRUE
+  deadline <- proc.time()[["elapsed"]] + closing_time
+  servers <- if (Sys.getpid() == session$pid) running_servers(session)
+  lapply(servers, close_server_input)
+  close_session_instances(closing_time / 2)
+  stop_session_servers(servers, deadline)
+}
+
+running_servers <- function(session) {
+  Filter(function(server) server$process$is_alive(), session$servers)
+}
+
+stop_session_servers <- function(servers, deadline) {
+  await_ends(servers, deadline - closing_time / 2)
+  lapply(servers, terminate_server)
+  await_ends(servers, deadline)
+}
+
+await_ends <- function(servers, deadline) {
+  for (server in servers) {
+    left <- deadline - proc.time()[["elapsed"]]
+    server$process$wait(max(0, left * 1000))
   }
 }
 

@@ -46,6 +46,21 @@ make_odd <- function(name, server) {
   gym_make(paste0("odd_environments:", name, "-v0"), client = server)
 }
 
+# The address of a server that gets stuck; see stalling_server.py.
+local_stalling <- function(how, frame = parent.frame()) {
+  python <- working_python()
+  process <- processx::process$new(
+    python, c(test_path("stalling_server.py"), how), stdin = "|", stdout = "|", stderr = NULL
+  )
+  withr::defer(process$kill(), envir = frame)
+  port <- character()
+  while (!length(port) && process$is_alive()) {
+    process$poll_io(1000)
+    port <- process$read_output_lines()
+  }
+  paste0("http://127.0.0.1:", port)
+}
+
 # A client whose connections to `server` are cut; see cutting_proxy.py.
 local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
   python <- the_session$servers[[server$remote_base]]$python
@@ -81,4 +96,25 @@ pid_runs <- function(pid) {
       readLines(file.path("/proc", pid, "status")),
       error = function(cnd) "", warning = function(cnd) ""
     )))
+}
+
+# Ends a process after some seconds as nothing can prevent, while this one does something else.
+kill_later <- function(pid, seconds, signal = 9L, frame = parent.frame()) {
+  code <- sprintf("Sys.sleep(%f); tools::pskill(%d, %d)", seconds, pid, signal)
+  killer <- processx::process$new(file.path(R.home("bin"), "Rscript"), c("--vanilla", "-e", code))
+  withr::defer(killer$kill(), envir = frame)
+}
+
+# Runs a script in a session of its own, with gym attached and `server` a client of another
+# session's server. Returns what processx::run() does.
+run_session <- function(server, ..., timeout = 60) {
+  script <- withr::local_tempfile(lines = c(
+    paste0(".libPaths(", deparse1(.libPaths()), ")"),
+    "library(gym)",
+    sprintf("server <- create_GymClient(\"%s\")", server$remote_base),
+    ...
+  ))
+  processx::run(
+    file.path(R.home("bin"), "Rscript"), script, timeout = timeout, error_on_status = FALSE
+  )
 }

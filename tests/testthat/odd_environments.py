@@ -184,6 +184,11 @@ def slow():
     return Slow(spaces.Discrete(2))
 
 
+def slow_to_make():
+    time.sleep(2)
+    return Odd(spaces.Discrete(2))
+
+
 def telling():
     return Telling(spaces.Discrete(2))
 
@@ -207,6 +212,7 @@ for maker in (
     nested,
     failing,
     slow,
+    slow_to_make,
     telling,
     chatty,
 ):

@@ -50,6 +50,46 @@ test_that("an answer that does not come within the timeout is an error", {
   expect_error(env_step(hasty, patient$instance_id, 1), "[Tt]ime", class = "gym_error_connection")
 })
 
+test_that("whatever way a server is dead, that is told within the timeout, with what helps", {
+  for (how in c("silent", "half", "full", "cut")) {
+    client <- create_GymClient(local_stalling(how), timeout = 1)
+    for (call in list(env_list_all, function(x) env_create(x, "CartPole-v1"))) {
+      # Where it is not noticed this test hangs for a minute.
+      taken <- system.time(error <- expect_error(call(client), class = "gym_error_connection"))
+      expect_lt(taken[["elapsed"]], 20)
+      mend <- switch(how, full = , cut = "gym_server_start", "timeout")
+      expect_match(conditionMessage(error), mend, info = how)
+    }
+  }
+})
+
+test_that("a server that is killed or stopped in a call is noticed", {
+  skip_on_os("windows")
+  server <- local_odd_server()
+  pid <- the_session$servers[[server$remote_base]]$pid
+  hasty <- create_GymClient(server$remote_base, timeout = 1)
+  env <- make_odd("Slow", server)
+  env$reset()
+
+  tools::pskill(pid, tools::SIGSTOP)
+  error <- expect_error(env_list_all(hasty), class = "gym_error_connection")
+  expect_match(conditionMessage(error), "gym_server_stop()", fixed = TRUE)
+  tools::pskill(pid, tools::SIGCONT)
+
+  kill_later(pid, 0.3)
+  error <- expect_error(env$step(1), class = "gym_error_connection")
+  expect_match(conditionMessage(error), "`gym_make()` starts another", fixed = TRUE)
+})
+
+test_that("a timeout of httr's goes before the client's, after a repeat too", {
+  server <- local_server()
+  client <- local_cut_client(server, "answered", "GET /v1/envs/ ")
+  client$config <- httr::timeout(3)
+  expect_identical(patience(client), 3)
+  expect_type(env_list_all(client), "list")
+  expect_identical(patience(server), 60)
+})
+
 test_that("a step whose answer was lost is not taken twice", {
   server <- local_server()
   client <- local_cut_client(server, "answered", "/step")

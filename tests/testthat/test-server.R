@@ -114,7 +114,7 @@ test_that("a server stops in order while a forked child lives", {
 test_that("the end of a forked child is not the session's", {
   skip_on_os("windows")
   server <- local_server()
-  parallel::mclapply(1:2, function(i) stop_session_servers(the_session), mc.cores = 2)
+  parallel::mclapply(1:2, function(i) end_session(the_session), mc.cores = 2)
   expect_type(env_list_all(server), "list")
 })
 
@@ -178,6 +178,36 @@ test_that("the server ends with the R session, also when R is killed", {
       Sys.sleep(0.1)
     }
     expect_false(pid_runs(pid))
+  }
+})
+
+test_that("R that is killed while it starts a server or uses it leaves none behind", {
+  skip_if_not(file.exists("/proc/self/environ"), "a system that tells a process's variables")
+  skip_if_no_server()
+  script <- withr::local_tempfile(lines = c(
+    paste0(".libPaths(", deparse1(.libPaths()), ")"),
+    "env <- gym::gym_make('CartPole-v1')",
+    "repeat gym::rollout(env, function(observation) 1L)"
+  ))
+  marked <- function(mark) {
+    any(vapply(Sys.glob("/proc/[0-9]*/environ"), function(path) {
+      bytes <- tryCatch(suppressWarnings(readBin(path, "raw", 1e5)), error = function(cnd) raw())
+      grepl(mark, rawToChar(bytes[bytes > 0]), fixed = TRUE, useBytes = TRUE)
+    }, NA))
+  }
+  for (moment in c(0.5, 1, 1.5, 3)) {
+    mark <- new_key()
+    session <- processx::process$new(
+      file.path(R.home("bin"), "Rscript"), script, env = c("current", GYM_MARK = mark)
+    )
+    session$wait(moment * 1000)
+    expect_true(marked(mark))
+    tools::pskill(session$get_pid(), tools::SIGKILL)
+    for (i in 1:100) {
+      if (!marked(mark)) break
+      Sys.sleep(0.1)
+    }
+    expect_false(marked(mark))
   }
 })
 

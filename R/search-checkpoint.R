@@ -1,0 +1,322 @@
+# The file in which a search keeps what it has played, so that it can go on after whatever
+# ended it.
+
+# Of the file's form. Files of another are refused.
+checkpoint_format <- 1L
+
+#' Make ready to keep a search in a file
+#'
+#' @param path The file.
+#' @param settings As [search_settings()] returns them, with `env` and `seed`.
+#' @param resume Whether to go on with what the file has.
+#' @return A list: `path`, `arguments` (what fixes the search, in which the file must agree)
+#'   and `saved`, what the file has, `NULL` where there is none to go on with.
+#' @noRd
+open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_env()) {
+  # The working directory may be another when the next block has ended.
+  path <- normalizePath(path, mustWork = FALSE)
+  if (dir.exists(path) || !dir.exists(dirname(path))) {
+    problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
+    abort_checkpoint(path, problem, call = call)
+  }
+  remove_parts(path)
+  arguments <- search_arguments(env, settings)
+  saved <- if (resume) read_checkpoint(path, call)
+  if (!is.null(saved)) {
+    check_same_search(path, saved$arguments, arguments, call)
+  }
+  list(path = path, arguments = arguments, saved = saved)
+}
+
+# What two runs have in common that are the same search. Of a policy what is drawn counts,
+# and not what it was given.
+search_arguments <- function(env, settings) {
+  double <- function(x) if (!is.null(x)) as.numeric(x)
+  list(
+    env = environment_traits(env),
+    policy = keep_random_state({
+      set.seed(1, "Mersenne-Twister", "Inversion", "Rejection")
+      policy_resample(settings$policy)
+    }),
+    rounds = settings$rounds, episodes = settings$episodes,
+    target = double(settings$target), max_steps = double(settings$max_steps),
+    seed = double(settings$seed)
+  )
+}
+
+environment_traits <- function(env) {
+  if (is.character(env)) {
+    list(env_id = env)
+  } else if (inherits(env, "gym_wrapped")) {
+    list(env_id = env$env_id, wrappers = env$wrappers)
+  } else {
+    list(
+      env_id = env$spec$id, num_envs = env$num_envs,
+      vectorization_mode = env$vectorization_mode, autoreset_mode = env$autoreset_mode
+    )
+  }
+}
+
+# Reading --------------------------------------------------------------------------
+
+#' Read the file of a search
+#' @return What [keep_search()] wrote, `NULL` where there is no file.
+#' @noRd
+read_checkpoint <- function(path, call) {
+  if (!file.exists(path)) {
+    return(NULL)
+  }
+  file <- tryCatch(
+    suppressWarnings(readRDS(path)),
+    error = function(cnd) abort_checkpoint(path, "cannot be read", conditionMessage(cnd), call)
+  )
+  if (!inherits(file, "gym_checkpoint")) {
+    abort_checkpoint(path, "is none of a search", call = call)
+  }
+  if (!identical(file$format, checkpoint_format)) {
+    abort_checkpoint(
+      path, paste("was written by another version of this package,", file$version), call = call
+    )
+  }
+  if (!is.raw(file$state) || !identical(rlang::hash(file$state), file$hash)) {
+    abort_checkpoint(path, "is damaged", "Its content is not what was written.", call)
+  }
+  unserialize(file$state)
+}
+
+check_same_search <- function(path, there, here, call) {
+  differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
+  if (length(differ)) {
+    lines <- vapply(differ, function(name) {
+      texts <- c(argument_text(name, there[[name]]), argument_text(name, here[[name]]))
+      if (texts[[1L]] == texts[[2L]]) {
+        paste0("`", name, "` is another there.")
+      } else {
+        paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
+      }
+    }, "")
+    abort_checkpoint(path, "is that of another search", lines, call, argument = differ)
+  }
+}
+
+is_same <- function(x, y) {
+  identical(x, y, ignore.bytecode = TRUE, ignore.environment = TRUE, ignore.srcref = TRUE)
+}
+
+argument_text <- function(name, value) {
+  switch(
+    name,
+    env = paste0(value$env_id, if (!is.null(value$num_envs)) {
+      paste0(" with ", count_of(value$num_envs, "lane"))
+    }),
+    policy = policy_text(value),
+    if (is.numeric(value)) number_text(value) else describe_value(value)
+  )
+}
+
+# The server may offer other lanes than it did, and with them other episodes.
+check_same_lanes <- function(path, told, now, call) {
+  differ <- Filter(function(name) !is_same(told[[name]], now[[name]]), names(now))
+  if (length(differ)) {
+    lines <- vapply(differ, function(name) {
+      what <- switch(
+        name, target = "the environment's reward threshold", env_id = "the environment",
+        block = "how many episodes are played at once", num_envs = "how many lanes share a seed"
+      )
+      paste0("There ", what, " is ", describe_value(told[[name]]), ", and ",
+             describe_value(now[[name]]), " on this server.")
+    }, "")
+    abort_checkpoint(path, "is from a server that played otherwise", lines, call)
+  }
+}
+
+abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
+  gym_abort(
+    c(
+      paste0("The checkpoint \"", path, "\" ", problem, "."),
+      if (length(lines)) stats::setNames(lines, rep("x", length(lines))),
+      i = paste(
+        "Give another file as `checkpoint`; with `resume = FALSE` the search begins anew and",
+        "replaces what is there."
+      )
+    ),
+    class = c("gym_error_checkpoint", "gym_error_argument"),
+    path = path, ..., call = call
+  )
+}
+
+# Going on -------------------------------------------------------------------------
+
+#' Go on with a search where its file has it
+#'
+#' R's generator too.
+#' @noRd
+resume_rounds <- function(record, saved, lanes, settings, path, call) {
+  check_same_lanes(path, saved$told, told_by_lanes(lanes, settings), call)
+  restore_rounds(record, saved)
+  # NULL in a session that had drawn nothing, of a search that had not begun.
+  if (!is.null(saved$generator)) {
+    restore_random_state(saved$generator)
+  }
+}
+
+# What the environment itself adds to the arguments.
+told_by_lanes <- function(lanes, settings) {
+  list(
+    target = settings$target, env_id = settings$env_id, num_envs = settings$num_envs,
+    block = lanes$block
+  )
+}
+
+#' Put a search back to where its file has it
+#' @param record As [new_rounds()] returns it.
+#' @return The record, with what was played.
+#' @noRd
+restore_rounds <- function(record, saved) {
+  kept <- saved$record
+  for (name in c("wanted", "begun", "policies", "returns", "means", "open")) {
+    record[[name]] <- kept[[name]]
+  }
+  record$blocks <- list(list2env(kept$episodes, parent = emptyenv()))
+  finished <- count_finished(record)
+  if (finished > 0) {
+    record$on_round(finished, max(-Inf, record$means[seq_len(finished)], na.rm = TRUE))
+  }
+  record
+}
+
+#' Make the result of a search whose file says that it had ended
+#' @noRd
+finished_search <- function(saved, settings, client) {
+  told <- saved$told
+  settings[names(told)] <- told
+  settings["client"] <- list(client)
+  settings$policy <- saved$template
+  if (is.null(settings$seed)) {
+    # As the search left it.
+    restore_random_state(saved$generator)
+  }
+  record <- new_rounds(settings$rounds, settings$episodes, settings$target, function(...) NULL)
+  restore_rounds(record, saved)
+  new_search(record, settings, proc.time()[["elapsed"]] - saved$elapsed)
+}
+
+# Writing --------------------------------------------------------------------------
+
+# So that writing takes a tenth of the time at most.
+rest_per_writing <- 9
+
+#' Keep a search in its file from now on
+#'
+#' After each block of episodes the file is written anew. What it holds grows, and where a
+#' block is a single short episode, writing would take longer than playing: then some blocks
+#' pass without, and would be played again.
+#' @param record As [new_rounds()] returns it.
+#' @param started When the search began, less what it took before.
+#' @noRd
+keep_rounds <- function(record, checkpoint, lanes, settings, started, call) {
+  write <- function(record) {
+    state <- list(
+      arguments = checkpoint$arguments, told = told_by_lanes(lanes, settings),
+      template = settings$policy, record = kept_record(record),
+      generator = globalenv()$.Random.seed, elapsed = proc.time()[["elapsed"]] - started,
+      finished = record$begun >= record$wanted
+    )
+    write_checkpoint(checkpoint$path, state)
+  }
+  if (is.null(checkpoint$saved)) {
+    tryCatch(
+      write(record),
+      error = function(cnd) {
+        abort_checkpoint(checkpoint$path, "cannot be written", conditionMessage(cnd), call)
+      }
+    )
+  }
+  rest_until <- -Inf
+  failed <- FALSE
+  record$after_block <- function(record) {
+    began <- proc.time()[["elapsed"]]
+    if (began < rest_until && record$begun < record$wanted) {
+      return()
+    }
+    tryCatch(
+      write(record),
+      error = function(cnd) {
+        # A full disk must not end what has played for hours.
+        if (!failed) warn_not_kept(checkpoint$path, cnd)
+        failed <<- TRUE
+      }
+    )
+    ended <- proc.time()[["elapsed"]]
+    rest_until <<- ended + rest_per_writing * (ended - began)
+  }
+}
+
+warn_not_kept <- function(path, cnd) {
+  rlang::warn(
+    c(paste0("The checkpoint \"", path, "\" cannot be written; the search goes on without."),
+      x = conditionMessage(cnd)),
+    class = "gym_warning_checkpoint"
+  )
+}
+
+# Between blocks: no episode is under way. Of the policies those are kept that the result
+# or the next block needs.
+kept_record <- function(record) {
+  finished <- count_finished(record)
+  policies <- record$policies
+  needless <- setdiff(seq_len(finished), which.max(record$means[seq_len(finished)]))
+  policies[needless] <- list(NULL)
+  columns <- c("seed", "lane", "return", "length", "terminated", "truncated")
+  episodes <- lapply(stats::setNames(nm = columns), function(name) {
+    unlist(lapply(record$blocks, function(block) block[[name]]))
+  })
+  list(
+    wanted = record$wanted, begun = record$begun, policies = policies,
+    returns = record$returns, means = record$means, open = record$open, episodes = episodes
+  )
+}
+
+# What a kill in the middle of writing has left. A young one may be another process's.
+remove_parts <- function(path) {
+  files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
+  parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
+  unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
+}
+
+#' Write the file of a search
+#'
+#' Beside the one that is there, which it then replaces in one move.
+#' @noRd
+write_checkpoint <- function(path, state) {
+  state <- serialize(state, NULL)
+  file <- structure(
+    list(
+      format = checkpoint_format, version = as.character(utils::packageVersion("gym")),
+      hash = rlang::hash(state), state = state
+    ),
+    class = "gym_checkpoint"
+  )
+  # A name of its own: another process may have been given the same checkpoint.
+  part <- tempfile(paste0(basename(path), "-", Sys.getpid(), "-"), dirname(path), ".part")
+  on.exit(unlink(part))
+  bytes <- serialize(file, NULL)
+  # The warning knows more than the error.
+  tryCatch(writeBin(bytes, part), warning = function(cnd) stop(conditionMessage(cnd)))
+  # A disk that is full is not always told when a file is closed.
+  if (!identical(file.size(part), as.numeric(length(bytes)))) {
+    stop("not all of it could be written")
+  }
+  replace_file(part, path)
+}
+
+# On Windows a file that somebody reads, such as a virus scanner, cannot be replaced just then.
+replace_file <- function(from, to) {
+  for (attempt in 1:20) {
+    if (suppressWarnings(file.rename(from, to))) {
+      return(invisible())
+    }
+    Sys.sleep(0.05)
+  }
+  stop("\"", from, "\" cannot be renamed")
+}

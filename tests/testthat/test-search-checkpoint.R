@@ -1,0 +1,298 @@
+# What counts of a search, without how long it took, where, and what nobody played.
+figures <- function(search) {
+  search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
+}
+
+# Plays a search that writes after each block, and keeps the file as each write left it.
+local_kept_files <- function(frame = parent.frame()) {
+  files <- new.env()
+  files$list <- list()
+  write <- write_checkpoint
+  local_functions(
+    write_checkpoint = function(path, state) {
+      write(path, state)
+      files$list <- c(files$list, list(readBin(path, "raw", file.size(path))))
+    },
+    rest_per_writing = 0,
+    frame = frame
+  )
+  files
+}
+
+local_checkpoint <- function(bytes = NULL, frame = parent.frame()) {
+  path <- withr::local_tempfile(fileext = ".rds", .local_envir = frame)
+  if (!is.null(bytes)) writeBin(bytes, path)
+  path
+}
+
+environments <- list(
+  single = function() fake_environment(reward = first_action),
+  sync = function() fake_lanes(7, "sync", reward = first_action),
+  together = function() fake_lanes(7, "vector_entry_point", reward = first_action)
+)
+
+test_that("a search goes on from the file of any block to the result of an undisturbed one", {
+  for (make in environments) {
+    for (target in list(Inf, 13.5)) {
+      play <- function(checkpoint = NULL) {
+        search_random(make(), rounds = 6, episodes = 3, target = target, seed = 1,
+                      checkpoint = checkpoint)
+      }
+      undisturbed <- play()
+      kept <- local_kept_files()
+      expect_identical(figures(play(local_checkpoint())), figures(undisturbed))
+      expect_gt(length(kept$list), 3)
+      for (bytes in kept$list) {
+        expect_identical(figures(play(local_checkpoint(bytes))), figures(undisturbed))
+      }
+    }
+  }
+})
+
+test_that("without a seed the generator goes on as well, and ends where it would have", {
+  kept <- local_kept_files()
+  play <- function(checkpoint) {
+    search_random(fake_lanes(4, reward = first_action), rounds = 9, target = Inf,
+                  checkpoint = checkpoint)
+  }
+  set.seed(3)
+  undisturbed <- play(local_checkpoint())
+  state <- .Random.seed
+  for (bytes in kept$list) {
+    set.seed(99)
+    expect_identical(figures(play(local_checkpoint(bytes))), figures(undisturbed))
+    expect_identical(.Random.seed, state)
+  }
+})
+
+test_that("with a seed the session's generator stays as it was", {
+  path <- local_checkpoint()
+  set.seed(1)
+  before <- .Random.seed
+  for (time in 1:2) {
+    search_random(fake_environment(), rounds = 2, seed = 5, checkpoint = path)
+    expect_identical(.Random.seed, before)
+  }
+})
+
+test_that("an interrupted search and one with an error go on by the same call", {
+  for (stop_it in list(rlang::interrupt, function() gym_abort("lost"))) {
+    path <- local_checkpoint()
+    play <- function(env) {
+      search_random(env, rounds = 5, episodes = 2, target = Inf, seed = 1, checkpoint = path)
+    }
+    undisturbed <- search_random(fake_environment(), rounds = 5, episodes = 2, target = Inf, seed = 1)
+    env <- fake_environment()
+    step <- env$step
+    env$step <- function(action) if (length(env$seeds) == 5L) stop_it() else step(action)
+    problem <- tryCatch(suppressMessages(play(env)), gym_error_search = identity)
+    if (inherits(problem, "error")) {
+      expect_match(conditionMessage(problem), basename(path), fixed = TRUE)
+    }
+    fresh <- fake_environment()
+    expect_identical(figures(play(fresh)), figures(undisturbed))
+    # Of ten episodes those that the file has are not played again.
+    expect_lt(length(fresh$seeds), 10)
+  }
+})
+
+test_that("a finished search is returned at once, with all its time", {
+  path <- local_checkpoint()
+  play <- function(env) search_random(env, rounds = 3, target = Inf, seed = 1, checkpoint = path)
+  env <- fake_environment()
+  step <- env$step
+  env$step <- function(action) {
+    Sys.sleep(0.01)
+    step(action)
+  }
+  first <- play(env)
+  idle <- fake_environment()
+  again <- play(idle)
+  expect_length(idle$seeds, 0)
+  expect_identical(figures(again), figures(first))
+  expect_gte(again$elapsed, 0.3)
+})
+
+test_that("the progress bar goes on, too", {
+  kept <- local_kept_files()
+  play <- function(path) {
+    shown <- integer()
+    local_functions(
+      progress_bar = function(rounds) function(finished, best) shown <<- c(shown, finished)
+    )
+    search_random(fake_environment(), rounds = 3, episodes = 1, target = Inf, seed = 1,
+                  progress = TRUE, checkpoint = path)
+    shown
+  }
+  expect_equal(play(local_checkpoint()), 1:3)
+  expect_equal(play(local_checkpoint(kept$list[[3]])), 2:3)
+})
+
+test_that("arguments that differ from the file's are named, with both values", {
+  path <- local_checkpoint()
+  env <- fake_environment()
+  begun <- list(env = env, policy = policy_network(), rounds = 3, episodes = 2, target = Inf,
+                max_steps = NULL, seed = 1, checkpoint = path)
+  play <- function(...) {
+    given <- list(...)
+    begun[names(given)] <- given
+    do.call(search_random, begun)
+  }
+  play()
+  refused <- function(..., argument, message) {
+    cnd <- expect_error(play(...), message, fixed = TRUE, class = "gym_error_checkpoint")
+    expect_identical(cnd$argument, argument)
+    expect_s3_class(cnd, "gym_error_argument")
+  }
+  refused(rounds = 4, argument = "rounds", message = "`rounds` is 3 there, and 4 here.")
+  refused(episodes = 5, argument = "episodes", message = "`episodes` is 2 there, and 5 here.")
+  refused(target = 7, argument = "target", message = "`target` is Inf there, and 7 here.")
+  refused(max_steps = 9, argument = "max_steps", message = "`max_steps` is NULL there, and 9 here.")
+  refused(seed = 2, argument = "seed", message = "`seed` is 1 there, and 2 here.")
+  refused(policy = policy_network(c(4, 1)), argument = "policy", message = "`policy` is network")
+  refused(env = fake_environment(id = "Other-v0"), argument = "env",
+          message = "`env` is Fake-v0 there, and Other-v0 here.")
+  refused(env = fake_lanes(3), argument = "env", message = "Fake-v0 with 3 lanes here")
+  refused(env = gym_wrap("Fake-v0", "TimeLimit", max_episode_steps = 5), argument = "env",
+          message = "`env` is another there.")
+  refused(seed = 2, rounds = 4, argument = c("rounds", "seed"), message = "`seed`")
+  # What has no part in the result may differ, and so may weights that are not played.
+  expect_s3_class(play(policy = policy_network(), seed = 1L, progress = FALSE), "gym_search")
+})
+
+test_that("a damaged or foreign file is an error, and stays as it is", {
+  path <- local_checkpoint()
+  env <- fake_environment()
+  search_random(env, rounds = 2, checkpoint = path)
+  whole <- readBin(path, "raw", file.size(path))
+  flipped <- function(at) {
+    bytes <- whole
+    bytes[[at]] <- xor(bytes[[at]], as.raw(1))
+    bytes
+  }
+  n <- length(whole)
+  foreign <- function(x) serialize(x, NULL)
+  newer <- structure(list(format = 99L, version = "9.9.9"), class = "gym_checkpoint")
+  contents <- c(
+    lapply(c(0, 1, 100, n %/% 2, n - 1), function(k) whole[seq_len(k)]),
+    lapply(c(n %/% 3, n %/% 2, n - 200), flipped),
+    list(charToRaw("a,b\n1,2\n"), foreign(mtcars), foreign(NULL), foreign(newer))
+  )
+  for (bytes in contents) {
+    writeBin(bytes, path)
+    expect_error(
+      search_random("CartPole-v1", rounds = 2, checkpoint = path, client = no_client()),
+      "resume = FALSE", fixed = TRUE, class = "gym_error_checkpoint"
+    )
+    expect_identical(readBin(path, "raw", n), bytes)
+  }
+  expect_error(search_random(env, checkpoint = path), "9.9.9", fixed = TRUE)
+  again <- search_random(env, rounds = 2, checkpoint = path, resume = FALSE)
+  expect_identical(nrow(again$rounds), 2L)
+  expect_identical(nrow(search_random(env, rounds = 2, checkpoint = path)$rounds), 2L)
+})
+
+test_that("a place where no file can be is refused before anything is made", {
+  folder <- withr::local_tempdir()
+  for (path in c(folder, file.path(folder, "none", "search.rds"))) {
+    expect_error(search_random(checkpoint = path, client = no_client()),
+                 class = "gym_error_checkpoint")
+  }
+  expect_error(search_random(checkpoint = 1, client = no_client()), "checkpoint",
+               class = "gym_error_argument")
+  expect_error(search_random(resume = NA, client = no_client()), "resume",
+               class = "gym_error_argument")
+})
+
+test_that("a disk that is full in the middle warns once and ends nothing", {
+  local_functions(rest_per_writing = 0)
+  folder <- withr::local_tempdir()
+  env <- fake_environment()
+  step <- env$step
+  env$step <- function(action) {
+    if (length(env$seeds) == 5L) unlink(folder, recursive = TRUE)
+    step(action)
+  }
+  warnings <- testthat::capture_warnings(
+    search <- search_random(env, rounds = 5, episodes = 2, target = Inf,
+                            checkpoint = file.path(folder, "search.rds"))
+  )
+  expect_length(warnings, 1)
+  expect_match(warnings, "goes on without")
+  expect_identical(nrow(search$rounds), 5L)
+})
+
+test_that("a write that ends in the middle leaves the file before it, and nothing else", {
+  folder <- withr::local_tempdir()
+  path <- file.path(folder, "search.rds")
+  search_random(fake_environment(), rounds = 2, seed = 1, checkpoint = path)
+  before <- readBin(path, "raw", 1e6)
+  local_functions(replace_file = function(from, to) rlang::interrupt())
+  tryCatch(write_checkpoint(path, list(1)), interrupt = function(cnd) NULL)
+  expect_identical(readBin(path, "raw", 1e6), before)
+  expect_identical(list.files(folder), "search.rds")
+})
+
+test_that("what a kill in the middle of a write has left goes with the next start", {
+  folder <- withr::local_tempdir()
+  left <- file.path(folder, c("search.rds-1-a.part", "search.rds-2-b.part", "other.part"))
+  file.create(left)
+  Sys.setFileTime(left[c(1, 3)], Sys.time() - 3600)
+  search_random(fake_environment(), rounds = 1, checkpoint = file.path(folder, "search.rds"))
+  expect_setequal(list.files(folder), c("search.rds", basename(left[2:3])))
+})
+
+test_that("the file stays small: of the policies those are kept that are needed", {
+  path <- local_checkpoint()
+  search_random(fake_environment(), policy_network(c(4, 100, 1)), rounds = 40, episodes = 1,
+                target = Inf, checkpoint = path)
+  # 500 weights are 4 kB, and there were 40 networks.
+  expect_lt(file.size(path), 40000)
+})
+
+test_that("a relative path is that of the folder at the start", {
+  folder <- normalizePath(withr::local_tempdir())
+  withr::local_dir(folder)
+  env <- fake_environment()
+  reset <- env$reset
+  env$reset <- function(...) {
+    setwd(tempdir())
+    reset(...)
+  }
+  search_random(env, rounds = 2, checkpoint = "here.rds")
+  expect_identical(list.files(folder), "here.rds")
+})
+
+test_that("a server that plays otherwise than the one before is told", {
+  kept <- local_kept_files()
+  play <- function(threshold, path) {
+    search_random(fake_environment(reward_threshold = threshold), rounds = 3, checkpoint = path)
+  }
+  play(100, local_checkpoint())
+  expect_error(play(99, local_checkpoint(kept$list[[2]])), "threshold.*100.*99",
+               class = "gym_error_checkpoint")
+})
+
+test_that("kill -9 of the server: the same call goes on to the result of an undisturbed search", {
+  path <- local_checkpoint()
+  play <- function(server, ...) {
+    env <- gym_make("CartPole-v1", num_envs = 32, client = server)
+    search_random(env, rounds = 40, target = Inf, seed = 1, ...)
+  }
+  server <- local_server()
+  undisturbed <- play(server)
+  killed <- 0L
+  repeat {
+    process <- the_session$servers[[server$remote_base]]$process
+    if (killed < 2L) {
+      moment <- undisturbed$elapsed * if (killed) 0.3 else 0.6
+      kill_later(process$get_pid(), moment)
+    }
+    search <- tryCatch(play(server, checkpoint = path), gym_error_connection = identity)
+    if (inherits(search, "gym_search")) break
+    killed <- killed + 1L
+    server <- local_server()
+  }
+  expect_gt(killed, 0)
+  expect_identical(figures(search), figures(undisturbed))
+})

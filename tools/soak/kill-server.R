@@ -1,0 +1,61 @@
+# A server that is killed with -9 at a random moment of a checkpointed search: the same call,
+# with another server, comes to the result of an undisturbed search.
+#
+#   tools/in-env Rscript tools/soak/kill-server.R [MOMENTS]      50 by default, some ten minutes
+
+library(gym)
+
+moments <- as.integer(c(commandArgs(TRUE), "50")[[1]])
+path <- tempfile(fileext = ".rds")
+
+# In lanes of its own, so that a search has dozens of blocks.
+play <- function(server, ...) {
+  env <- gym_make("CartPole-v1", num_envs = 16, client = server)
+  search_random(env, rounds = 60, target = Inf, seed = 1, ...)
+}
+
+figures <- function(search) {
+  search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
+}
+
+kill_after <- function(server, seconds) {
+  pid <- gym:::the_session$servers[[server$remote_base]]$pid
+  processx::process$new(
+    file.path(R.home("bin"), "Rscript"),
+    c("--vanilla", "-e", sprintf("Sys.sleep(%f); tools::pskill(%d, 9L)", seconds, pid))
+  )
+}
+
+# How many episodes the file has.
+episodes_kept <- function() {
+  if (!file.exists(path)) return(0L)
+  length(gym:::read_checkpoint(path, NULL)$record$returns)
+}
+
+server <- gym_server_start()
+undisturbed <- play(server)
+killed <- equal <- lost <- 0L
+while (killed < moments) {
+  unlink(path)
+  killer <- kill_after(server, undisturbed$elapsed * runif(1))
+  search <- tryCatch(play(server, checkpoint = path), gym_error = identity)
+  killer$wait()
+  server <- gym_server_start()
+  if (inherits(search, "gym_search")) {
+    # It came too late.
+    next
+  }
+  if (!inherits(search, "gym_error_connection")) stop(search)
+  killed <- killed + 1L
+  # What is played again is at most the block under way, of which some rounds had ended.
+  lost <- lost + (NROW(search$result$episodes) - episodes_kept() > 16L)
+  same <- identical(figures(play(server, checkpoint = path)), figures(undisturbed))
+  equal <- equal + same
+  message(format(Sys.time(), "%H:%M:%S "), killed, " of ", moments, ", with ",
+          NROW(search$result$rounds), " rounds played, equal: ", same)
+}
+cat(sprintf(
+  "kill-server: %d kills, results lost %d, equal to an undisturbed run %d of %d\n",
+  killed, lost, equal, killed
+))
+quit("no", status = if (equal == killed && lost == 0L) 0L else 1L)
