@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import blake2b
 from http import HTTPStatus
 from pathlib import Path
@@ -16,21 +16,24 @@ from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 
 from gym_server import (
-    watch_routes,  # noqa: F401, declares them
+    watch_routes,
     wire,
 )
-from gym_server.errors import answer_to
+from gym_server.allowed_paths import AllowedPaths
+from gym_server.errors import GymServerError, answer_to, shutdown_disabled
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
+from gym_server.guard import Access, Guard
 from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
 from gym_server.tensors import TENSORS
+from gym_server.watch_keys import WatchKeys
 from gym_server.wire import Answer
 
 # The routes of each step; the id is one that an instance can have.
 _HOT = re.compile("/v1/envs/([0-9a-f]+)/(reset|step)/?")
-
+_WATCH_PAGE = re.compile("/v1/envs/[0-9a-f]+/watch/?")
 
 # As much as the answers that are kept beside it; a digest of it takes 40 us.
 _KEPT_BYTES = 2**16
@@ -47,6 +50,9 @@ class Config:
         max_body_bytes: the size of the largest request.
         max_num_envs: how many lanes an environment may have.
         stop: asks the server to stop once the requests under way are answered.
+        access: whom the server lets in.
+        client_stop: whether clients may stop it.
+        allowed_paths: directories that kwargs may name paths in; None for any path.
     """
 
     monitor_dir: Path | None = None
@@ -55,6 +61,9 @@ class Config:
     max_body_bytes: int = 16 * 2**20
     max_num_envs: int = 16384
     stop: Callable[[], None] = lambda: None
+    access: Access = field(default_factory=Access)
+    client_stop: bool = True
+    allowed_paths: Collection[Path] | None = None
 
 
 class GymApp(Flask):
@@ -66,11 +75,19 @@ class GymApp(Flask):
         self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(config.allowed_modules, self._renderer, config.max_num_envs)
+        self._instances = Instances(
+            config.allowed_modules,
+            self._renderer,
+            config.max_num_envs,
+            AllowedPaths(config.allowed_paths),
+        )
+        watch_keys = WatchKeys()
+        self._guard = Guard(config.access, watch_keys)
         services = Services(
             self._instances,
             self._monitor_root,
-            config.stop,
+            config.stop if config.client_stop else _refuse_to_stop,
+            watch_keys if config.access.token is not None else None,
         )
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
         self._hot_handlers: dict[str, _Handler] = {}
@@ -90,6 +107,10 @@ class GymApp(Flask):
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
         """Answer by WSGI, resets and steps without Flask's dispatch: it takes longer than they."""
+        try:
+            self._guard.check(environ)
+        except GymServerError as refusal:
+            return _send(_turn_away(refusal, environ), start_response)
         hot = _HOT.fullmatch(environ["PATH_INFO"])
         length = environ.get("CONTENT_LENGTH", "")
         if not (
@@ -108,14 +129,11 @@ class GymApp(Flask):
             environ.get("CONTENT_TYPE", ""),
             environ.get("HTTP_ACCEPT", ""),
         )
-        answer = self._hot_handlers[hot[2]].answer(request)
-        headers = [
-            ("Content-Type", answer.content_type),
-            ("Content-Length", str(len(answer.body))),
-            *answer.headers,
-        ]
-        start_response(f"{answer.status} {HTTPStatus(answer.status).phrase}", headers)
-        return (answer.body,)
+        return _send(self._hot_handlers[hot[2]].answer(request), start_response)
+
+    def admit(self, environ: dict) -> None:
+        """Raise the refusal of a request that would not be answered, before its body has come."""
+        self._guard.check(environ)
 
     def end_watching(self) -> None:
         """Send all watchers away, who would wait for more than the server's last moment."""
@@ -229,10 +247,36 @@ def _view(handler: _Handler) -> Callable[..., Response]:
     return view
 
 
+def _send(answer: Answer, start_response: Callable) -> Iterable[bytes]:
+    headers = [
+        ("Content-Type", answer.content_type),
+        ("Content-Length", str(len(answer.body))),
+        *answer.headers,
+    ]
+    start_response(f"{answer.status} {HTTPStatus(answer.status).phrase}", headers)
+    return (answer.body,)
+
+
+def _turn_away(refusal: GymServerError, environ: dict) -> Answer:
+    """Answer who may not come in; people get the reason on the page that they wanted."""
+    path = environ["PATH_INFO"]
+    wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
+    if refusal.code == "unauthorized" and wants_page and _WATCH_PAGE.fullmatch(path):
+        page = wire.answer(watch_routes.page(path, refusal.status), None)
+        return page._replace(headers=(*page.headers, *refusal.headers))
+    return _failure(refusal, None)
+
+
+def _refuse_to_stop() -> None:
+    raise shutdown_disabled()
+
+
 def _failure(error: Exception, request_id: RequestId | None) -> Answer:
     status, body = answer_to(error)
     answer = wire.answer(body, request_id, status)
-    if isinstance(error, MethodNotAllowed):
+    if isinstance(error, GymServerError):
+        answer = answer._replace(headers=error.headers)
+    elif isinstance(error, MethodNotAllowed):
         answer = answer._replace(headers=(("Allow", ", ".join(sorted(error.valid_methods))),))
     return answer
 

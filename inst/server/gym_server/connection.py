@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import lru_cache
+from http import HTTPStatus
 from urllib.parse import unquote_to_bytes
 
 from httptools import HttpParserError, HttpParserUpgrade, HttpRequestParser, parse_url
@@ -24,11 +25,17 @@ from gym_server.errors import GymServerError, answer_to
 _IDLE_SECONDS = 3600.0
 _REST_SECONDS = 60.0
 
+# And how many a second must come of it, on the whole.
+_SLOWEST_BYTES = 1000
+
 # The header of answers that are worth nothing later.
 _NOT_KEPT = ("Cache-Control", "no-store")
 
 _RECEIVE_BYTES = 2**16
 _LARGEST_HEAD_BYTES = 2**16
+
+# A body that is read before anybody asks whose it is.
+_UNASKED_BYTES = 2**16
 
 # Of a request that is refused for its size, so that its sender gets to see the answer.
 _DISCARD_BYTES = 2**30
@@ -38,7 +45,12 @@ class Connection:
     """Serves the requests of one socket, one after the other."""
 
     def __init__(
-        self, client: socket.socket, app: Callable, base_environ: dict, max_body_bytes: int
+        self,
+        client: socket.socket,
+        app: Callable,
+        base_environ: dict,
+        max_body_bytes: int,
+        admit: Callable[[dict], None] = lambda environ: None,
     ) -> None:
         """Take over a connected socket.
 
@@ -47,15 +59,20 @@ class Connection:
             app: a WSGI application.
             base_environ: what is the same in the environment of each request.
             max_body_bytes: the size of the largest body.
+            admit: is shown what WSGI would be, before a large body is read, and raises what the
+                request is refused with.
         """
         self._socket = client
         self._app = app
         self._base_environ = base_environ
-        self._reader = _Reader(max_body_bytes, client.sendall)
+        self._reader = _Reader(max_body_bytes, client.sendall, self._why_not)
+        self._admit = admit
         self._last: _Request | None = None
         self._last_environ: dict = {}
         self._stopping = False
         self._answering = False
+        # When the rest of a begun request must be there.
+        self._due = 0.0
         # Whether what is sent is of this moment only.
         self._passing = False
 
@@ -68,12 +85,37 @@ class Connection:
             in_part = False
             while data := self._socket.recv(_RECEIVE_BYTES):
                 self._answering = True
-                if not self._answer_all(self._reader.feed(data)):
+                requests = self._reader.feed(data)
+                if not self._answer_all(requests):
                     break
                 self._answering = False
-                if self._reader.began != in_part:
+                if self._reader.began or in_part:
+                    left = self._rest_seconds(len(data), anew=bool(requests) or not in_part)
                     in_part = self._reader.began
-                    self._socket.settimeout(_REST_SECONDS if in_part else _IDLE_SECONDS)
+                    self._socket.settimeout(left if in_part else _IDLE_SECONDS)
+
+    def _rest_seconds(self, received: int, anew: bool) -> float:
+        """Return how long the rest of a request that has come in part may let wait for itself.
+
+        Whoever sends it drop by drop is no better than who sends nothing.
+        """
+        now = time.monotonic()
+        if anew:
+            self._due = now + _REST_SECONDS
+        self._due += received / _SLOWEST_BYTES
+        left = min(_REST_SECONDS, self._due - now)
+        if left <= 0:
+            raise TimeoutError("a request comes too slowly")
+        return left
+
+    def _why_not(self, request: _Request) -> GymServerError | None:
+        try:
+            self._admit({**self._base_environ, **request.environ()})
+        except GymServerError as refusal:
+            return refusal
+        except HttpParserError as error:
+            return _malformed(str(error))
+        return None
 
     def _answer_all(self, requests: list[_Request]) -> bool:
         return all(map(self._answer, requests))
@@ -146,9 +188,12 @@ class Connection:
 def _refuse(refusal: GymServerError) -> tuple[str, list[tuple[str, str]], bytes]:
     status, body = answer_to(refusal)
     data = wire.dumps(body)
-    reason = {400: "Bad Request", 413: "Content Too Large"}[status]
-    headers = [("Content-Type", wire.JSON), ("Content-Length", str(len(data)))]
-    return f"{status} {reason}", headers, data
+    headers = [
+        ("Content-Type", wire.JSON),
+        ("Content-Length", str(len(data))),
+        *refusal.headers,
+    ]
+    return f"{status} {HTTPStatus(status).phrase}", headers, data
 
 
 @lru_cache(maxsize=2)
@@ -167,6 +212,8 @@ class _Request:
         self.method = ""
         self.version = ""
         self.keep_alive = False
+        # Whether it was asked who sends it.
+        self.asked = False
         # Why it is not handed to the application.
         self.refusal: GymServerError | None = None
 
@@ -218,9 +265,15 @@ class _Request:
 class _Reader:
     """Makes requests of bytes; the parser calls the methods that begin with ``on_``."""
 
-    def __init__(self, max_body_bytes: int, send: Callable[[bytes], None]) -> None:
+    def __init__(
+        self,
+        max_body_bytes: int,
+        send: Callable[[bytes], None],
+        why_not: Callable[[_Request], GymServerError | None],
+    ) -> None:
         self._max_body_bytes = max_body_bytes
         self._send = send
+        self._why_not = why_not
         self._parser = HttpRequestParser(self)
         self._request = _Request()
         self._complete: list[_Request] = []
@@ -309,6 +362,11 @@ class _Reader:
             self._request.refusal = GymServerError(
                 "body_too_large", "The request's body is larger than this server takes"
             )
+        elif size > _UNASKED_BYTES and not self._request.asked:
+            self._request.asked = True
+            self._request.refusal = self._why_not(self._request)
+            if self._request.refusal is not None:
+                self._request.body.clear()
 
     def on_message_complete(self) -> None:
         self._silent_bytes = 0

@@ -13,6 +13,10 @@ log = logging.getLogger(__name__)
 
 # Every other code answers with 400, as the classic server did.
 _STATUS = {
+    "unauthorized": 401,
+    "foreign_host": 403,
+    "foreign_origin": 403,
+    "shutdown_disabled": 403,
     "not_found": 404,
     "method_not_allowed": 405,
     "request_conflict": 409,
@@ -22,6 +26,8 @@ _STATUS = {
     "internal_error": 500,
     "shutting_down": 503,
 }
+
+_HEADERS = {"unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),)}
 
 
 class GymServerError(Exception):
@@ -48,10 +54,20 @@ class GymServerError(Exception):
         """The HTTP status of the answer."""
         return _STATUS.get(self.code, 400)
 
+    @property
+    def headers(self) -> tuple[tuple[str, str], ...]:
+        """What else the answer's head says."""
+        return _HEADERS.get(self.code, ())
+
 
 def unknown_instance(instance_id: str) -> GymServerError:
     """No environment has this instance_id, or it was closed."""
     return GymServerError("unknown_instance", f"Instance_id {instance_id} unknown")
+
+
+def shutdown_disabled() -> GymServerError:
+    """The operator did not want clients to stop the server."""
+    return GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def shutting_down() -> GymServerError:

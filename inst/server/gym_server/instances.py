@@ -12,6 +12,7 @@ import gymnasium
 from gymnasium.vector import VectorEnv
 
 from gym_server import creation, registry, vectorization, wrappers
+from gym_server.allowed_paths import AllowedPaths
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError, shutting_down, unknown_instance
 from gym_server.frames import RenderThread
@@ -25,7 +26,11 @@ class Instances:
     """All instances of a server."""
 
     def __init__(
-        self, allowed_modules: Collection[str], renderer: RenderThread, max_num_envs: int = 16384
+        self,
+        allowed_modules: Collection[str],
+        renderer: RenderThread,
+        max_num_envs: int = 16384,
+        allowed_paths: AllowedPaths | None = None,
     ) -> None:
         """Start with none.
 
@@ -33,8 +38,10 @@ class Instances:
             allowed_modules: names of the modules that an env_id may import.
             renderer: the process's render thread.
             max_num_envs: how many lanes one of them may have.
+            allowed_paths: what clients may name of this machine's files; None for anything.
         """
         self._max_num_envs = max_num_envs
+        self._allowed_paths = allowed_paths or AllowedPaths()
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
@@ -46,9 +53,10 @@ class Instances:
 
         Raises:
             GymServerError: see ``creation.make()``, ``wrappers.wrap()`` and ``Instance``;
-                ``shutting_down``.
+                ``invalid_kwargs``, ``shutting_down``.
         """
         # Before an environment is made for nothing.
+        self._allowed_paths.check(choices)
         wrappers.check_names(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)

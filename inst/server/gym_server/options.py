@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gym_server import __version__
+from gym_server.token_file import VARIABLE
 
 
 def parser() -> argparse.ArgumentParser:
@@ -52,11 +53,44 @@ def parser() -> argparse.ArgumentParser:
         default=16384,
         help="lanes of the largest vector environment (%(default)s)",
     )
-    options.add_argument(
-        "--no-auth", action="store_true", help="serve a --host that others can reach"
-    )
+    _add_access(options)
     options.add_argument("--version", action="version", version=__version__)
     return options
+
+
+def _add_access(options: argparse.ArgumentParser) -> None:
+    options.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        help="holds a token of 16 characters or more, which every request must carry; without "
+        f"this option the variable {VARIABLE} may hold it",
+    )
+    options.add_argument(
+        "--no-auth",
+        action="store_true",
+        help="serve everybody without a token, also on a --host that others can reach",
+    )
+    options.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a further name (or NAME:PORT) that the server is known by, such as a proxy's; "
+        "repeatable",
+    )
+    options.add_argument(
+        "--no-shutdown", action="store_true", help="clients cannot stop the server"
+    )
+    options.add_argument(
+        "--allow-path",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="a directory in which kwargs may name files, on a server with a token or a --host "
+        "that others can reach; repeatable",
+    )
 
 
 def _number(least: int, greatest: int) -> Callable[[str], int]:

@@ -20,6 +20,7 @@ from gym_server.instances import Instances
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.tensors import TENSORS, Tensor
 from gym_server.tensors import write as write_tensors
+from gym_server.watch_keys import WatchKeys
 from gym_server.wire import Content, Field
 
 
@@ -31,11 +32,13 @@ class Services:
         instances: the environments.
         monitor_root: where monitors may write.
         stop: asks the server to stop once the requests under way are answered.
+        watch_keys: the keys that open watch pages; None where no page asks for one.
     """
 
     instances: Instances
     monitor_root: MonitorRoot
     stop: Callable[[], None]
+    watch_keys: WatchKeys | None = None
 
 
 @dataclass(frozen=True)
