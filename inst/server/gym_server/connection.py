@@ -279,6 +279,8 @@ class _Reader:
         self._complete: list[_Request] = []
         # Bytes since the parser last had something to say.
         self._silent_bytes = 0
+        # What we have against a request that the parser would take.
+        self._fault: GymServerError | None = None
         # Whether a request has come in part.
         self.began = False
 
@@ -290,7 +292,7 @@ class _Reader:
             while data:
                 data = self._parse(data)
         except HttpParserError as error:
-            self._give_up(_malformed(str(error)))
+            self._give_up(self._fault or _malformed(str(error)))
         if self._silent_bytes > _LARGEST_HEAD_BYTES:
             self._give_up(_malformed(f"its head has more than {_LARGEST_HEAD_BYTES} bytes"))
         return self._complete
@@ -339,6 +341,10 @@ class _Reader:
         request.method = self._parser.get_method().decode("ascii")
         request.version = self._parser.get_http_version()
         headers = dict(request.headers)
+        if b"transfer-encoding" in headers and not _is_plainly_chunked(request):
+            # A proxy may have seen its end elsewhere.
+            self._fault = _malformed("it does not say in one way where it ends")
+            raise HttpParserError
         self._check_size(int(headers.get(b"content-length", 0)))
         if headers.get(b"expect", b"").lower() == b"100-continue":
             if request.refusal is not None:
@@ -375,6 +381,12 @@ class _Reader:
             self._parser.should_keep_alive() and self._request.version == "1.1"
         )
         self._finish()
+
+
+def _is_plainly_chunked(request: _Request) -> bool:
+    framing = [h for h in request.headers if h[0] in (b"transfer-encoding", b"content-length")]
+    chunked = len(framing) == 1 and framing[0][1].strip(b" \t").lower() == b"chunked"
+    return chunked and request.version == "1.1"
 
 
 def _malformed(reason: str) -> GymServerError:
