@@ -13,7 +13,10 @@ from gym_server.token_file import VARIABLE
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     options = argparse.ArgumentParser(
-        prog="gym-http-server", description="Gymnasium environments over HTTP."
+        prog="gym-http-server",
+        description="Gymnasium environments over HTTP.",
+        # --token would be taken for --token-file, and an error would show it.
+        allow_abbrev=False,
     )
     options.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
     options.add_argument(
@@ -58,7 +61,18 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
+class _RefuseToken(argparse.Action):
+    """Refuses a token where everybody on the machine can read it, without repeating it."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        parser.error(
+            "a token on the command line is seen by everybody on this machine; --token-file FILE "
+            f"or the variable {VARIABLE} hold it"
+        )
+
+
 def _add_access(options: argparse.ArgumentParser) -> None:
+    options.add_argument("--token", action=_RefuseToken, help=argparse.SUPPRESS)
     options.add_argument(
         "--token-file",
         type=Path,

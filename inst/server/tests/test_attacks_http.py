@@ -270,6 +270,6 @@ def test_the_token_is_in_no_answer_and_no_log(serve):
             {"Authorization": f"Bearer {TOKEN}"},
         )
         answers.append(connection.getresponse().read().decode())
-    status, output, errors = server.stop() if os.name == "posix" else (0, "", "")
+    _, output, errors = server.stop() if os.name == "posix" else (0, "", "")
     assert not any(TOKEN in text for text in (*answers, output, errors))
     assert "Refused a request from 127.0.0.1 without a token" in errors or os.name != "posix"
