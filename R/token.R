@@ -85,16 +85,16 @@ hide_token <- function(token) {
 without_tokens <- function(x) {
   if (is.character(x)) {
     x[is_token_text(x)] <- "<token>"
-  } else if (is.call(x) || is.pairlist(x) || is.list(x) && !is.object(x)) {
-    for (i in seq_along(x)) {
-      # An argument may be missing, as in x[1, ].
-      if (!identical(x[[i]], quote(expr = )) && !is.null(x[[i]])) {
-        x[[i]] <- without_tokens(x[[i]])
-      }
+  } else if (has_parts(x)) {
+    # An argument may be missing, as in x[1, ].
+    for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
+      x[[i]] <- without_tokens(x[[i]])
     }
   }
   x
 }
+
+has_parts <- function(x) is.call(x) || is.pairlist(x) || is.list(x) && !is.object(x)
 
 is_token_text <- function(texts) {
   found <- texts %in% the_session$hidden

@@ -82,3 +82,18 @@ pid_runs <- function(pid) {
       error = function(cnd) "", warning = function(cnd) ""
     )))
 }
+
+token_text <- "correct-horse-battery-staple"
+
+# A file that holds the token.
+local_token_file <- function(text = token_text, frame = parent.frame()) {
+  file <- withr::local_tempfile(.local_envir = frame)
+  writeLines(text, file)
+  Sys.chmod(file, "600")
+  file
+}
+
+# A server that asks for it, as it says so.
+local_locked_server <- function(..., frame = parent.frame()) {
+  local_server(token_file = local_token_file(frame = frame), ..., frame = frame)
+}
