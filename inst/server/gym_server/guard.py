@@ -59,8 +59,8 @@ class Guard:
         self._expected = None if access.token is None else _header(access.token)
         self._watch_keys = watch_keys
         self._names = {"localhost", access.host.lower()}
-        self._names |= {_split(name)[0] for name in access.allowed_hosts}
-        self._origins = {_split(name) for name in access.allowed_hosts}
+        self._origins = {split_host(name) for name in access.allowed_hosts}
+        self._names |= {name for name, _ in self._origins}
         self._known_hosts: set[str] = set()
         self._listens_on_loopback = is_loopback(access.host)
         self._machine_names: set[str] | None = None
@@ -127,10 +127,13 @@ class Guard:
         if parts is None:
             return False
         default = _DEFAULT_PORTS[parts[1]]
-        name, port = _split(parts[2], default)
-        # Another port of the same machine is another's page.
-        if (name, port) == _split(host, default):
-            return True
+        try:
+            name, port = split_host(parts[2], default)
+            # Another port of the same machine is another's page.
+            if (name, port) == split_host(host, default):
+                return True
+        except ValueError:
+            return False
         return (name, port) in self._origins or (port == default and (name, "") in self._origins)
 
     def _has_token(self, environ: dict) -> bool:
@@ -169,9 +172,12 @@ def _header(token: str) -> bytes:
     return f"Bearer {token}".encode("latin-1")
 
 
-def _split(authority: str, default_port: str = "") -> tuple[str, str]:
+def split_host(authority: str, default_port: str = "") -> tuple[str, str]:
+    """Return the name in NAME or NAME:PORT, in lower case, and the port; else raise ValueError."""
     match = _AUTHORITY.fullmatch(authority)
-    return (match[1].lower(), match[2] or default_port) if match else ("", "")
+    if match is None:
+        raise ValueError(f"{authority!r} is no name of a host")
+    return match[1].lower(), match[2] or default_port
 
 
 def _is_address(name: str) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gym_server import __version__
+from gym_server.guard import split_host
 from gym_server.token_file import VARIABLE
 
 
@@ -61,6 +62,14 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
+def _host_name(text: str) -> str:
+    try:
+        split_host(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither NAME nor NAME:PORT") from None
+    return text
+
+
 class _RefuseToken(argparse.Action):
     """Refuses a token where everybody on the machine can read it, without repeating it."""
 
@@ -89,6 +98,7 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         "--allow-host",
         action="append",
         default=[],
+        type=_host_name,
         metavar="NAME",
         help="a further name (or NAME:PORT) that the server is known by, such as a proxy's; "
         "repeatable",

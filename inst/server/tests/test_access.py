@@ -87,6 +87,13 @@ def test_there_is_no_option_for_the_token_itself(capsys):
         assert TOKEN not in errors and "--token-file" in errors
 
 
+@pytest.mark.parametrize("name", ["https://gym.example.org", "gym.example.org/", "", "a b", "*"])
+def test_a_host_that_is_no_name_is_refused(name, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--port", "0", "--allow-host", name])
+    assert "neither NAME nor NAME:PORT" in capsys.readouterr().err
+
+
 def test_pages_and_other_names_are_refused_by_a_server_without_a_token(serve):
     server = serve("--allow-host", "gym.example.org")
     for headers, status in (

@@ -137,6 +137,8 @@ def test_its_own_pages_may_ask(origin, host):
         "file://",
         "chrome-extension://abcdef",
         "https://gym.example.org:8888",
+        "https://%%%",
+        "https://",
         "http://other.example",
     ],
 )
