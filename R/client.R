@@ -25,10 +25,15 @@
 #' @param config Further settings for the connection, made with httr:
 #'   [httr::authenticate()], [httr::add_headers()], [httr::use_proxy()] or
 #'   several of them joined by [c()].
+#' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
+#'   default is what the environment variable `GYM_SERVER_TOKEN` holds, so that no script has
+#'   to. It is sent with each call, to this server only, and nothing that is printed and no
+#'   error shows it. A saved client holds it: such a file is as secret as the token.
 #' @return An object of class `GymClient`, a list with the element
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https
-#'   URL or the timeout not a positive number; `gym_error_server_start` when a server
+#'   URL, the timeout not a positive number or the token no string of visible ASCII
+#'   characters; `gym_error_server_start` when a server
 #'   that was to be started could not be, and `gym_error_install` when what it needs
 #'   could not be installed.
 #' @export
@@ -41,7 +46,10 @@
 #' instance_id <- env_create(server, "CartPole-v1")
 #' env_reset(server, instance_id)
 #' gym_server_stop(server)
-create_GymClient <- function(remote_base, timeout = 60, config = httr::config()) {
+create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
+                             token = Sys.getenv("GYM_SERVER_TOKEN")) {
+  # First, as every later error would show the call.
+  token <- as_token(token)
   check_string(remote_base)
   if (!grepl("^https?://[^/]", remote_base)) {
     gym_abort(
@@ -57,17 +65,18 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config())
     must <- "made with httr, such as by httr::add_headers()"
     abort_argument(config, must, "config", rlang::current_env())
   }
-  client <- new_client(remote_base, timeout, config)
+  client <- new_client(remote_base, timeout, config, token)
   offer_server(client)
   client
 }
 
-new_client <- function(remote_base, timeout = 60, config = httr::config()) {
+new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
   structure(
     list(
       remote_base = sub("/+$", "", remote_base),
       timeout = timeout,
       config = config,
+      token = token,
       state = new.env(parent = emptyenv())
     ),
     class = "GymClient"
@@ -76,9 +85,12 @@ new_client <- function(remote_base, timeout = 60, config = httr::config()) {
 
 #' @export
 print.GymClient <- function(x, ...) {
-  cat("<GymClient: ", x$remote_base, ">\n", sep = "")
+  cat(format(x), "\n", sep = "")
   invisible(x)
 }
+
+#' @export
+format.GymClient <- function(x, ...) paste0("<GymClient: ", x$remote_base, ">")
 
 check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (!inherits(x, "GymClient")) {

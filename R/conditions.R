@@ -5,7 +5,8 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
     message,
     class = c(class, "gym_error"),
     ...,
-    call = call,
+    call = without_tokens(rlang::error_call(call)),
+    trace = hidden_trace(rlang::current_env()),
     parent = parent
   )
 }
@@ -15,7 +16,7 @@ abort_http <- function(response, method, call) {
   problem <- response$answer
   request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
-  hint <- extra_hint(problem$extra, request) %||% problem$hint
+  hint <- extra_hint(problem$extra, request) %||% token_hint(problem$code) %||% problem$hint
   gym_abort(
     c(
       sentence(problem$message %||% "The answer is not what a Gym server sends"),
@@ -33,6 +34,13 @@ abort_http <- function(response, method, call) {
     hint = hint,
     call = call
   )
+}
+
+token_hint <- function(code) {
+  if (identical(code, "unauthorized")) {
+    paste0("`create_GymClient(token = )` takes the server's token, and so does the environment ",
+           "variable ", token_variable)
+  }
 }
 
 # What is missing on a server that runs from what gym_server_install() made is installed by

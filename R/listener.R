@@ -29,12 +29,14 @@ start_call <- function(place) {
 #' By a route that every Gym server has, the classic one too.
 #' @param timeout How long the answer may take, in seconds. A server that takes connections
 #'   but does not answer in time listens nevertheless.
-#' @return A list of `listens` (logical), `is_gym` (logical), `name` (what the program calls
+#' @param token For a server that is known to be ours; a stranger is shown none.
+#' @return A list of `listens`, `is_gym` and `asks_token` (it wants another token, or one; all
+#'   three are logical), `name` (what the program calls
 #'   itself, a string or `NULL`), `instances` (how many a Gym server has) and `problem` (why
 #'   there is no answer, a string or `NULL`).
 #' @noRd
-probe_server <- function(base, timeout) {
-  client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE))
+probe_server <- function(base, timeout, token = NULL) {
+  client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE), token)
   problem <- NULL
   response <- tryCatch(
     send(client, "/v1/envs/"),
@@ -45,9 +47,11 @@ probe_server <- function(base, timeout) {
   )
   times <- curl::handle_data(client$state$line$channels$get$handle)$times
   envs <- response$answer$all_envs
+  asks_token <- identical(response$answer$code, "unauthorized")
   list(
     listens = !is.null(response) || times[["connect"]] > 0,
-    is_gym = !is.null(envs),
+    is_gym = !is.null(envs) || asks_token,
+    asks_token = asks_token,
     name = if (!is.null(response)) server_name(response),
     instances = length(envs),
     problem = problem

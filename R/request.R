@@ -136,6 +136,9 @@ open_handle <- function(client, sends, takes) {
     "Content-Type" = sends, "Accept" = takes, "Expect" = "",
     "User-Agent" = paste0("gym-R/", utils::packageVersion("gym"))
   )
+  if (!is.null(client$token)) {
+    headers[["Authorization"]] <- paste("Bearer", client$token())
+  }
   custom <- client$config$headers
   curl::handle_setheaders(
     handle,

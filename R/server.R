@@ -6,7 +6,7 @@
 #' Returns the client that functions take when they are given none. It talks to
 #' the server that the environment variable `GYM_SERVER_URL` names or, without
 #' it, to one on this machine, which is started at the first call and stops with
-#' the session.
+#' the session. A server that asks for a token gets the one that `GYM_SERVER_TOKEN` holds.
 #'
 #' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
@@ -41,9 +41,10 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  if (!identical(the_session$named_url, url)) {
-    the_session$named_client <- new_client(url)
-    the_session$named_url <- url
+  variables <- c(url, Sys.getenv(token_variable))
+  if (!identical(the_session$named_by, variables)) {
+    the_session$named_client <- new_client(url, token = variable_token(call))
+    the_session$named_by <- variables
   }
   the_session$named_client
 }
@@ -83,7 +84,8 @@ is_running <- function(base) {
 #'   `max_watchers` (100), `max_body_mb` (of a request, 16), `max_call_seconds` (that a
 #'   call may take before its environment is given up, 300, 0 for ever) and
 #'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
-#'   0 for never).
+#'   0 for never). `token_file = "token"` names a file with a token of 16
+#'   characters or more, which every call must then carry; the client that is returned does.
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own words: no
@@ -109,6 +111,9 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
 #' @noRd
 start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60,
                          install = TRUE, call = rlang::caller_env()) {
+  if (rlang::is_string(options$token_file)) {
+    options$token_file <- path.expand(options$token_file)
+  }
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
     server_options(options, call)
@@ -119,6 +124,7 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     for (candidate in pythons) {
       server <- launch_server(candidate, arguments, timeout, call)
       if (is.list(server)) {
+        server$token <- server_token(options, call)
         return(register_server(server))
       }
       refusals[[candidate]] <<- server
@@ -136,7 +142,7 @@ register_server <- function(server) {
   ending <- new.env(parent = emptyenv())
   reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
   the_session$endings <- c(the_session$endings, ending)
-  new_client(server$url)
+  new_client(server$url, token = server$token)
 }
 
 # Extra options as the command line takes them: log_level = "info" becomes

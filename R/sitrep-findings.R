@@ -157,7 +157,8 @@ sitrep_named_server <- function(url) {
 
 # One server, asked what it is.
 sitrep_server <- function(url, what, mend) {
-  probe <- probe_server(url, timeout = 2)
+  token <- known_token(url)
+  probe <- probe_server(url, timeout = 2, token)
   if (!probe$listens) {
     return(finding("servers", what, "does not answer", "wrong", mend))
   }
@@ -170,8 +171,14 @@ sitrep_server <- function(url, what, mend) {
     return(finding("servers", what, paste0("no Gym server", called), "wrong",
                    "Sys.unsetenv(\"GYM_SERVER_URL\")"))
   }
+  if (probe$asks_token) {
+    wants <- if (is.null(token)) "a token" else "another token"
+    return(finding("servers", what, paste("asks for", wants), "wrong",
+                   paste0("Sys.setenv(", token_variable, " = \"...\")")))
+  }
   count <- count_of(probe$instances, "environment")
-  health <- tryCatch(get_answer(new_client(url, 2), "/v1/health/"), gym_error = function(cnd) NULL)
+  health <- tryCatch(get_answer(new_client(url, 2, token = token), "/v1/health/"),
+                     gym_error = function(cnd) NULL)
   versions <- health$versions
   finding("servers", what, paste0(
     count,

@@ -37,6 +37,12 @@
 #' until the page is there, at most 5 seconds, so that nobody misses the beginning. If it has
 #' not come by then, as when there is no browser, the address is printed as in a script.
 #'
+#' # Who can open it
+#'
+#' Whoever reaches the server, unless it asks for a token. Then the address holds a key, which
+#' opens this environment's page and nothing else. It is good until nobody has used it for 10
+#' minutes; each call makes a new one.
+#'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance;
@@ -62,8 +68,8 @@ show_instance <- function(x, instance, call = rlang::caller_env()) {
 }
 
 open_watch <- function(x, instance, call = rlang::caller_env()) {
-  address <- paste0(x$remote_base, instance$route, "watch/")
   viewer <- check_viewer(call)
+  address <- paste0(x$remote_base, instance$route, "watch/", watch_key(x, instance, call))
   # A viewer that fails does so once.
   instance$shown <- TRUE
   comes <- open_address(address, viewer) && await_watcher(x, instance)
@@ -73,6 +79,12 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
     )
   }
   invisible(address)
+}
+
+# A browser has no token: where the server asks for one, the link holds a key in its place.
+watch_key <- function(x, instance, call) {
+  key <- post_answer(x, paste0(instance$route, "watch/key/"), call = call)$key
+  if (!is.null(key)) paste0("?key=", key)
 }
 
 #' Wait until somebody watches

@@ -118,3 +118,18 @@ run_session <- function(server, ..., timeout = 60) {
     file.path(R.home("bin"), "Rscript"), script, timeout = timeout, error_on_status = FALSE
   )
 }
+
+token_text <- "correct-horse-battery-staple"
+
+# A file that holds the token.
+local_token_file <- function(text = token_text, frame = parent.frame()) {
+  file <- withr::local_tempfile(.local_envir = frame)
+  writeLines(text, file)
+  Sys.chmod(file, "600")
+  file
+}
+
+# A server that asks for it, as it says so.
+local_locked_server <- function(..., frame = parent.frame()) {
+  local_server(token_file = local_token_file(frame = frame), ..., frame = frame)
+}

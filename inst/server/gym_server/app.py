@@ -16,24 +16,27 @@ from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 
 from gym_server import (
-    watch_routes,  # noqa: F401, declares them
+    watch_routes,
     wire,
 )
-from gym_server.errors import GymServerError, answer_to
+from gym_server.allowed_paths import AllowedPaths
+from gym_server.errors import GymServerError, answer_to, shutdown_disabled
 from gym_server.exactly_once import ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
+from gym_server.guard import Access, Guard
 from gym_server.instances import Instances
 from gym_server.isolation import Isolation
 from gym_server.limits import Limits, Watchers
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
 from gym_server.tensors import TENSORS
+from gym_server.watch_keys import WatchKeys
 from gym_server.watchdog import Watchdog
 from gym_server.wire import Answer
 
 # The routes of each step; the id is one that an instance can have.
 _HOT = re.compile("/v1/envs/([0-9a-f]+)/(reset|step)/?")
-
+_WATCH_PAGE = re.compile("/v1/envs/[0-9a-f]+/watch/?")
 
 # As much as the answers that are kept beside it; a digest of it takes 40 us.
 _KEPT_BYTES = 2**16
@@ -53,6 +56,9 @@ class Config:
             other modules than Gymnasium's and ale_py's) or "all".
         max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
+        access: whom the server lets in.
+        client_stop: whether clients may stop it.
+        allowed_paths: directories that kwargs may name paths in; None for any path.
     """
 
     monitor_dir: Path | None = None
@@ -63,6 +69,9 @@ class Config:
     isolate: str = "foreign"
     max_worker_mb: int = 0
     stop: Callable[[], None] = lambda: None
+    access: Access = field(default_factory=Access)
+    client_stop: bool = True
+    allowed_paths: Collection[Path] | None = None
 
 
 class GymApp(Flask):
@@ -86,12 +95,16 @@ class GymApp(Flask):
             self._renderer,
             config.limits,
             Isolation(config.isolate, config.max_worker_mb),
+            AllowedPaths(config.allowed_paths),
         )
+        watch_keys = WatchKeys()
+        self._guard = Guard(config.access, watch_keys)
         services = Services(
             self._instances,
             self._monitor_root,
-            config.stop,
+            config.stop if config.client_stop else _refuse_to_stop,
             Watchers(config.limits.max_watchers),
+            watch_keys if config.access.token is not None else None,
         )
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
         self._exactly_once = exactly_once
@@ -116,6 +129,10 @@ class GymApp(Flask):
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
         """Answer by WSGI, resets and steps without Flask's dispatch: it takes longer than they."""
+        try:
+            self._guard.check(environ)
+        except GymServerError as refusal:
+            return _send(_turn_away(refusal, environ), start_response)
         hot = _HOT.fullmatch(environ["PATH_INFO"])
         length = environ.get("CONTENT_LENGTH", "")
         if not (
@@ -134,9 +151,11 @@ class GymApp(Flask):
             environ.get("CONTENT_TYPE", ""),
             environ.get("HTTP_ACCEPT", ""),
         )
-        answer = self._hot_handlers[hot[2]].answer(request)
-        start_response(*_head(answer))
-        return (answer.body,)
+        return _send(self._hot_handlers[hot[2]].answer(request), start_response)
+
+    def admit(self, environ: dict) -> None:
+        """Raise the refusal of a request that would not be answered, before its body has come."""
+        self._guard.check(environ)
 
     def _give_up(self, thread: int, why: GymServerError) -> None:
         """Answer what a thread does that is stuck in an environment."""
@@ -257,10 +276,31 @@ def _view(handler: _Handler) -> Callable[..., Response]:
     return view
 
 
+def _send(answer: Answer, start_response: Callable) -> Iterable[bytes]:
+    start_response(*_head(answer))
+    return (answer.body,)
+
+
+def _turn_away(refusal: GymServerError, environ: dict) -> Answer:
+    """Answer who may not come in; people get the reason on the page that they wanted."""
+    path = environ["PATH_INFO"]
+    wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
+    if refusal.code == "unauthorized" and wants_page and _WATCH_PAGE.fullmatch(path):
+        page = wire.answer(watch_routes.page(path, refusal.status), None)
+        return page._replace(headers=(*page.headers, *refusal.headers))
+    return _failure(refusal, None)
+
+
+def _refuse_to_stop() -> None:
+    raise shutdown_disabled()
+
+
 def _failure(error: Exception, request_id: RequestId | None) -> Answer:
     status, body = answer_to(error)
     answer = wire.answer(body, request_id, status)
-    if isinstance(error, MethodNotAllowed):
+    if isinstance(error, GymServerError):
+        answer = answer._replace(headers=error.headers)
+    elif isinstance(error, MethodNotAllowed):
         answer = answer._replace(headers=(("Allow", ", ".join(sorted(error.valid_methods))),))
     return answer
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import ipaddress
+import errno
 import logging
 import os
 import signal
@@ -14,12 +14,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gym_server.app import Config, GymApp, create_app
+from gym_server.guard import Access, is_loopback
 from gym_server.limits import Limits
 from gym_server.open_files import allow_many_open_files
 from gym_server.options import parser
+from gym_server.port_holder import port_holder
 from gym_server.serve import Server, bind
+from gym_server.token_file import VARIABLE, BadTokenError, find_token
 
 log = logging.getLogger("gym_server")
+
+# Windows knows a port that is bound exclusively by the second.
+_TAKEN = (errno.EADDRINUSE, 10013)
 
 # A step that never returns must not keep the server alive for ever.
 _GRACE_SECONDS = 10.0
@@ -39,10 +45,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     _set_up_logging(options.log_level)
-    if not _is_loopback(options.host) and not options.no_auth:
+    try:
+        token = _find_token(options)
+    except BadTokenError as fault:
+        return _fail(str(fault))
+    except OSError as error:
+        return _fail(f"the file {options.token_file} cannot be read: {error.strerror or error}")
+    is_private = is_loopback(options.host) and token is None
+    if not is_loopback(options.host) and token is None and not options.no_auth:
         return _fail(
             f"--host {options.host} lets anybody on the network run environments on this machine "
-            "and write files; give --no-auth if that is meant"
+            f"and write files; give --token-file FILE or the variable {VARIABLE}, or --no-auth if "
+            "that is meant"
         )
     allow_many_open_files()
     stop = _Stop()
@@ -55,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     app = create_app(
         Config(
             monitor_dir=monitor_dir,
-            temporary_monitors=_is_loopback(options.host),
+            temporary_monitors=is_private,
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
             limits=Limits(
@@ -69,9 +83,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             isolate=options.isolate,
             max_worker_mb=options.max_worker_mb,
             stop=stop,
+            access=Access(token, options.host, options.allow_host),
+            client_stop=not options.no_shutdown,
+            allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(app, listener, max_body_bytes, on_stop=app.end_watching)
+    server = Server(app, listener, max_body_bytes, on_stop=app.end_watching, admit=app.admit)
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)
@@ -95,11 +112,11 @@ def _set_up_logging(level: str) -> None:
     warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
 
 
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
+def _find_token(options: argparse.Namespace) -> str | None:
+    if options.no_auth and options.token_file is not None:
+        raise BadTokenError("--no-auth and --token-file exclude each other")
+    token = find_token(options.token_file, os.environ)
+    return None if options.no_auth else token
 
 
 def _in_url(host: str) -> str:
@@ -116,9 +133,10 @@ def _prepare_monitor_dir(directory: Path | None) -> Path | None:
 def _why_not(error: OSError, options: argparse.Namespace) -> str:
     if error.filename is not None:
         return f"the directory {error.filename} cannot be used: {error.strerror}"
+    holder = port_holder(options.host, options.port) if error.errno in _TAKEN else None
+    reason = holder or error.strerror or error
     return (
-        f"port {options.port} on {options.host} cannot be used: {error.strerror or error}; "
-        "--port 0 takes a free one"
+        f"port {options.port} on {options.host} cannot be used: {reason}; --port 0 takes a free one"
     )
 
 

@@ -14,7 +14,7 @@ from gym_server import mujoco_setup
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.plain import brief, from_words
-from gym_server.registry import importing, look_up, near
+from gym_server.registry import LONGEST_ID, importing, look_up, near
 
 
 def make(
@@ -76,7 +76,7 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
     Raises:
         GymServerError: as for ``make()``.
     """
-    if not isinstance(env_id, str):
+    if not isinstance(env_id, str) or len(env_id) > LONGEST_ID:
         raise _unusable("malformed_env_id", brief(env_id))
     module, colon, name = env_id.rpartition(":")
     if registration.ENV_ID_RE.fullmatch(name) is None or (colon and not _is_module(module)):

@@ -13,6 +13,10 @@ log = logging.getLogger(__name__)
 
 # Every other code answers with 400, as the classic server did.
 _STATUS = {
+    "unauthorized": 401,
+    "foreign_host": 403,
+    "foreign_origin": 403,
+    "shutdown_disabled": 403,
     "not_found": 404,
     "method_not_allowed": 405,
     "request_conflict": 409,
@@ -28,6 +32,8 @@ _STATUS = {
     "shutting_down": 503,
     "call_too_long": 504,
 }
+
+_HEADERS = {"unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),)}
 
 
 class GymServerError(Exception):
@@ -61,6 +67,11 @@ class GymServerError(Exception):
         """Return a copy: one that is raised over and over keeps where each time."""
         return GymServerError(self.code, self.message, self.hint, self.extra)
 
+    @property
+    def headers(self) -> tuple[tuple[str, str], ...]:
+        """What else the answer's head says."""
+        return _HEADERS.get(self.code, ())
+
 
 def unknown_instance(instance_id: str) -> GymServerError:
     """No environment has this instance_id, or it was closed."""
@@ -89,6 +100,11 @@ def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError
         f"{what} took more than {seconds:g} seconds, so {consequence}",
         "create another; the server's option --max-call-seconds sets the limit",
     )
+
+
+def shutdown_disabled() -> GymServerError:
+    """The operator did not want clients to stop the server."""
+    return GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def shutting_down() -> GymServerError:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 
 from gym_server import registry, vectorization, wrappers
+from gym_server.allowed_paths import AllowedPaths
 from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
@@ -63,6 +64,7 @@ class Instances:
         renderer: RenderThread,
         limits: Limits | None = None,
         isolation: Isolation | None = None,
+        allowed_paths: AllowedPaths | None = None,
     ) -> None:
         """Start with none.
 
@@ -71,9 +73,11 @@ class Instances:
             renderer: the process's render thread.
             limits: how many of them there may be, and how large.
             isolation: which of them get a process of their own; None for none.
+            allowed_paths: what clients may name of this machine's files; None for anything.
         """
         self._limits = limits or Limits()
         self._isolation = isolation or Isolation()
+        self._allowed_paths = allowed_paths or AllowedPaths()
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
@@ -89,10 +93,12 @@ class Instances:
         """Make an environment and return its instance_id, 8 hex digits.
 
         Raises:
-            GymServerError: see ``making.make()``; ``shutting_down``, ``environment_died``,
-                ``too_many_instances``, ``too_many_lanes``; ``call_too_long``.
+            GymServerError: see ``making.make()``; ``invalid_kwargs``, ``shutting_down``,
+                ``environment_died``, ``too_many_instances``, ``too_many_lanes``;
+                ``call_too_long``.
         """
         # Before an environment is made for nothing.
+        self._allowed_paths.check(choices)
         wrappers.check_names(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)

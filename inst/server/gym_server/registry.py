@@ -14,7 +14,7 @@ from gymnasium import error
 from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra
 
 log = logging.getLogger(__name__)
@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 # Python lets go of its import locks where modules import each other in a circle, as Gymnasium's
 # do; two threads would see them half made.
 importing = threading.RLock()
+
+# Nothing that is longer is looked for: saying what it resembles would take seconds.
+LONGEST_ID = 200
 
 # Since Gymnasium 1.0 packages are no longer found by themselves.
 _PACKAGES = {"ALE": "ale_py"}
@@ -93,9 +96,15 @@ def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
 
     Args:
         text: a part of the id, in lower or upper case; when it is part of none, the nearest ids
-            are returned. None for all.
+            are returned. None for all. Longer ones than any id are refused: looking for what
+            is near them would take seconds.
         allowed_modules: modules that the operator allowed; what they register belongs to it.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
     """
+    if text and len(text) > LONGEST_ID:
+        raise invalid_parameter("search", text, f"of at most {LONGEST_ID} characters")
     with importing:
         _register_packages()
         for module in allowed_modules:

@@ -21,6 +21,7 @@ from gym_server.limits import Watchers
 from gym_server.monitor_directory import MonitorRoot
 from gym_server.tensors import TENSORS, Tensor
 from gym_server.tensors import write as write_tensors
+from gym_server.watch_keys import WatchKeys
 from gym_server.wire import Content, Field
 
 
@@ -33,12 +34,14 @@ class Services:
         monitor_root: where monitors may write.
         stop: asks the server to stop once the requests under way are answered.
         watchers: those who wait for a picture.
+        watch_keys: the keys that open watch pages; None where no page asks for one.
     """
 
     instances: Instances
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers
+    watch_keys: WatchKeys | None = None
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,7 @@ class Server:
         listener: socket.socket,
         max_body_bytes: int,
         on_stop: Callable[[], None] = lambda: None,
+        admit: Callable[[dict], None] = lambda environ: None,
     ) -> None:
         """Serve nothing yet: ``run()`` does.
 
@@ -85,9 +86,11 @@ class Server:
             listener: a listening socket, as ``bind()`` returns it.
             max_body_bytes: the size of the largest request body.
             on_stop: called when the stop has come and requests are still under way.
+            admit: raises the refusal of a request whose large body is still to come.
         """
         self._app = app
         self._on_stop = on_stop
+        self._admit = admit
         self._listener = listener
         self._max_body_bytes = max_body_bytes
         host, self.port = listener.getsockname()[:2]
@@ -173,7 +176,7 @@ class Server:
             return  # Else it has left again.
         client.setblocking(True)
         environ = {**self._base_environ, "REMOTE_ADDR": address[0]}
-        connection = Connection(client, self._app, environ, self._max_body_bytes)
+        connection = Connection(client, self._app, environ, self._max_body_bytes, self._admit)
         with self._changed:
             self._connections.add(connection)
         # A daemon: an environment that never comes back must not keep the process.

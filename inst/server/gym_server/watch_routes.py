@@ -7,6 +7,7 @@ from pathlib import Path
 from gym_server import lane_fields
 from gym_server.errors import GymServerError
 from gym_server.routes import INSTANCE, Call, declare
+from gym_server.watch_keys import KEY_SECONDS
 from gym_server.wire import JSON, Content, Field
 
 _PAGE = Path(__file__).parent / "watch_page"
@@ -42,10 +43,36 @@ def env_watch(call: Call) -> Content:
         if "text/html" not in call.accept:
             raise
         status = refusal.status
+    return page(call.url, status)
+
+
+def page(url: str, status: int) -> Content:
+    """Return the watch page; what it has to tell it learns from what it asks for.
+
+    Args:
+        url: the path that it was asked for by.
+        status: the HTTP status.
+    """
     # Also without the last slash the page finds what belongs to it, below any proxy's folder.
-    here = "" if call.url.endswith("/") else "watch/"
-    page = _read("watch.html").replace(b"{here}", here.encode())
-    return Content(page, _HTML, status, _PAGE_HEADERS)
+    here = "" if url.endswith("/") else "watch/"
+    return Content(
+        _read("watch.html").replace(b"{here}", here.encode()), _HTML, status, _PAGE_HEADERS
+    )
+
+
+@declare(
+    "POST",
+    _WATCH + "key/",
+    answer="key: opens the page as watch/?key=KEY, without a token, and seconds: how long after "
+    "its last use it does; both null where no page needs one",
+)
+def env_watch_key(call: Call) -> dict:
+    """Make a key to an environment's page, for a browser that has no token."""
+    _ = call.instance
+    keys = call.services.watch_keys
+    if keys is None:
+        return {"key": None, "seconds": None}
+    return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
 
 
 @declare("GET", _WATCH + "watch.css/", answer="how the page looks", content_type=_CSS)

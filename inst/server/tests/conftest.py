@@ -1,3 +1,4 @@
+import contextlib
 import http.client
 import json
 import os
@@ -144,6 +145,45 @@ def serve():
     yield serve
     for server in servers:
         server.kill()
+
+
+TOKEN = "correct-horse-battery"
+
+
+@pytest.fixture(scope="session")
+def attacked(tmp_path_factory):
+    """Give one server for all attacks: each finds it as the one before left it."""
+    root = tmp_path_factory.mktemp("attacked")
+    (root / "models").mkdir()
+    (root / "models" / "in.xml").write_text("<mujoco/>")
+    if os.name == "posix":
+        (root / "models" / "out.xml").symlink_to("/etc/passwd")
+    options = {"--monitor-dir": root / "runs", "--allow-path": root / "models"}
+    server = ServerProcess(
+        *("--port", "0", "--allow-module", "faulty_envs"),
+        *(str(word) for option in options.items() for word in option),
+        GYM_SERVER_TOKEN=TOKEN,
+    )
+    server.root = root
+    yield server
+    server.kill()
+
+
+@pytest.fixture
+def ask(attacked):
+    """Ask with the token; the server must be as well afterwards as before."""
+
+    def ask(method, path, body=None):
+        connection = attacked.connect()
+        with contextlib.closing(connection):
+            text = body if isinstance(body, str) or body is None else json.dumps(body)
+            connection.request(method, path, text, {"Authorization": f"Bearer {TOKEN}"})
+            answer = connection.getresponse()
+            return answer.status, json.loads(answer.read() or "null")
+
+    yield ask
+    assert ask("GET", "/v1/health/")[0] == 200
+    assert attacked.process.poll() is None
 
 
 @pytest.fixture

@@ -399,6 +399,26 @@ class CustomSpace(Counting):
     action_space = OwnSpace()
 
 
+class Deep(Counting):
+    """Has a space in a space in a space."""
+
+    def __init__(self, depth):
+        super().__init__()
+        self.observation_space = spaces.Discrete(2)
+        for _ in range(depth):
+            self.observation_space = spaces.Tuple([self.observation_space])
+
+    def observe(self):
+        return self.observation_space.sample()
+
+
+class Variables(Counting):
+    """Tells the variables of its process, as an environment might."""
+
+    def __init__(self):
+        raise ValueError(dict(os.environ))
+
+
 class LongDouble(Counting):
     observation_space = spaces.Box(0, 1, (1,), np.longdouble)
 
@@ -415,6 +435,7 @@ for _kind in (
     Counting,
     CannotSaySo,
     CustomSpace,
+    Deep,
     Drawing,
     Echo,
     ExitsInStep,
@@ -434,5 +455,6 @@ for _kind in (
     Shifted,
     SpoilsOneLane,
     Uneven,
+    Variables,
 ):
     gymnasium.register(id=f"{_kind.__name__}-v0", entry_point=_kind)

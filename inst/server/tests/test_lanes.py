@@ -137,7 +137,7 @@ def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, eventual
     with server.socket() as connection:
         body = b'{"action": [0, 0]}'
         connection.sendall(
-            b"POST %b/step/ HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n%b"
+            b"POST %b/step/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n%b"
             % (url.encode(), len(body), body)
         )
         time.sleep(0.5)

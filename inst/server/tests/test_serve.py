@@ -15,7 +15,7 @@ from gym_server.serve import bind
 
 
 def request(method, path, body=b"", *headers):
-    lines = [f"{method} {path} HTTP/1.1", "Host: here", *headers]
+    lines = [f"{method} {path} HTTP/1.1", "Host: 127.0.0.1", *headers]
     if not any(header.startswith("Transfer-Encoding") for header in headers):
         lines.append(f"Content-Length: {len(body)}")
     return "\r\n".join([*lines, "", ""]).encode() + body
@@ -130,7 +130,7 @@ def test_an_enormous_chunked_body_is_413_in_json(server):
 
 def test_an_enormous_body_is_refused_before_it_is_sent_to_a_client_that_asks(server):
     with server.socket() as connection:
-        head = b"POST /v1/envs/ HTTP/1.1\r\nHost: x\r\nExpect: 100-continue\r\n"
+        head = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nExpect: 100-continue\r\n"
         connection.sendall(head + b"Content-Length: 99000000\r\n\r\n")
         assert read_answer(connection)[0] == 413
 
@@ -173,7 +173,7 @@ def test_an_upgrade_is_declined_and_the_request_answered(server):
 
 def test_a_proxys_request_is_refused_and_the_server_goes_on(server):
     with server.socket() as connection:
-        answer = answered(connection, b"CONNECT a:80 HTTP/1.1\r\nHost: a\r\n\r\n")
+        answer = answered(connection, b"CONNECT a:80 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         assert (answer[0], connection.recv(1)) == (400, b"")
     assert server.stop()[0] == 0
 

@@ -9,6 +9,7 @@ import threading
 import time
 
 import pytest
+from conftest import TOKEN
 
 selenium = pytest.importorskip("selenium", reason="selenium is not installed (the extra 'dev')")
 
@@ -310,6 +311,105 @@ def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, even
     assert strict.post(f"{url}/reset/")[0] == 504
     eventually(lambda: "took more than 2 seconds" in text(browser, "words"))
     assert text(browser, "state") == "closed"
+
+
+# With a token -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def locked(serve):
+    """Start a server that asks for a token; return it and a function that asks with it."""
+    server = serve(GYM_SERVER_TOKEN=TOKEN)
+
+    def ask(path, **fields):
+        with contextlib.closing(server.connect()) as connection:
+            headers = {"Authorization": f"Bearer {TOKEN}"}
+            connection.request("POST", path, json.dumps(fields), headers)
+            return json.loads(connection.getresponse().read() or "null")
+
+    return server, ask
+
+
+def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
+    browser, locked, eventually
+):
+    server, ask = locked
+    url = f"/v1/envs/{ask('/v1/envs/', env_id='CartPole-v1')['instance_id']}"
+    ask(f"{url}/reset/", seed=1)
+    page = f"http://127.0.0.1:{server.port}{url}/watch/"
+    browser.get(f"{page}?key={ask(f'{url}/watch/key/')['key']}")
+    eventually(lambda: browser.find_element(By.ID, "picture").is_displayed())
+    first = picture(browser)
+    ask(f"{url}/step/", action=1)
+    eventually(lambda: picture(browser) != first)
+    assert text(browser, "env") == "CartPole-v1"
+    assert complaints(browser) == []
+    # The lane's and the speed's controls ask with the key, too.
+    browser.find_element(By.ID, "pause").click()
+    eventually(lambda: text(browser, "state") == "paused")
+    time.sleep(1)
+    assert text(browser, "state") == "paused"
+    ask(f"{url}/close/")
+    browser.find_element(By.ID, "pause").click()
+    eventually(lambda: text(browser, "words") == "This environment is closed")
+
+    for query, words in (("?key=dead", "no longer good"), ("", "opens with a link")):
+        browser.get(page + query)
+        eventually(lambda words=words: words in text(browser, "words"))
+        assert "env_watch()" in text(browser, "advice")
+        assert text(browser, "state") == "no key"
+
+
+def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve):
+    """A page of another server's on this machine, with a real browser's headers."""
+    url = server.create("CartPole-v1")
+    other = serve()
+    browser.get(f"http://127.0.0.1:{other.port}/v1/health/")
+    target = f"http://127.0.0.1:{server.port}"
+    for path in (f"{url}/reset/", f"{url}/close/", "/v1/shutdown/"):
+        for mode in ("no-cors", "cors"):
+            for kind in ("text/plain", "application/json"):
+                browser.execute_async_script(
+                    """
+                    const [url, mode, kind, done] = arguments;
+                    const headers = { "Content-Type": kind };
+                    fetch(url, { method: "POST", mode, headers, body: "{}" }).then(done, done);
+                    """,
+                    target + path,
+                    mode,
+                    kind,
+                )
+        # A form is sent in the page's place.
+        browser.execute_script(
+            """
+            const form = document.createElement("form");
+            Object.assign(form, { method: "post", action: arguments[0] });
+            document.body.append(form);
+            form.submit();
+            """,
+            target + path,
+        )
+        time.sleep(0.5)
+        assert "foreign_origin" in browser.page_source
+        browser.get(f"http://127.0.0.1:{other.port}/v1/health/")
+    assert server.get(url)[1]["steps"] == 0
+    # Nobody reset it, either.
+    assert server.post(f"{url}/step/", {"action": 0})[1]["code"] == "reset_needed"
+    server.post(f"{url}/reset/")
+    drawn_by_image = browser.execute_async_script(
+        """
+        const [url, done] = arguments;
+        const image = new Image();
+        image.onload = () => done(true);
+        image.onerror = () => done(false);
+        image.src = url;
+        """,
+        f"{target}{url}/render/",
+    )
+    assert drawn_by_image is False
+    # A link may be followed.
+    browser.get(f"{target}{url}/watch/")
+    assert browser.find_element(By.ID, "picture")
 
 
 def test_every_control_has_a_name(browser, server, look):

@@ -6,6 +6,8 @@ import { Observation } from "./observation.js";
 import { Playback } from "./playback.js";
 
 const $ = (id) => document.getElementById(id);
+// What opens the page in place of a token, where the server asks for one.
+const KEY = new URLSearchParams(location.search).get("key");
 // The page's own address, whether or not it was asked for with its last slash.
 const HERE = new URL(location.pathname.replace(/\/?$/, "/"), location.href);
 const GONE_PAUSE = 1000;
@@ -45,6 +47,10 @@ async function follow() {
         await tellClosed(problem);
         return;
       }
+      if (problem.status === 401) {
+        tellLocked(problem);
+        return;
+      }
       if (problem.code === "invalid_parameter" && lane > 0) {
         setLane(0);
         continue;
@@ -74,7 +80,9 @@ async function askForNews() {
 
 async function ask(path) {
   question = new AbortController();
-  const answer = await fetch(new URL(path, HERE), { cache: "no-store", signal: question.signal });
+  const url = new URL(path, HERE);
+  if (KEY !== null) url.searchParams.set("key", KEY);
+  const answer = await fetch(url, { cache: "no-store", signal: question.signal });
   const content = await answer.json();
   if (!answer.ok) throw Object.assign(new Error(content.message), content, { status: answer.status });
   return content;
@@ -204,6 +212,7 @@ function setLive({ state }) {
 
 const BADGES = {
   waiting: "waiting for a reset",
+  locked: "no key",
   faulty: "a fault",
   closed: "closed",
   gone: "server gone",
@@ -227,12 +236,22 @@ function hideMessage() {
   $("message").hidden = true;
 }
 
+function tellLocked({ message }) {
+  const advice =
+    "In R, env_watch() or env$watch() makes a new link. It lasts until nobody has used it for 10 minutes.";
+  tell("locked", `${message}.`, advice);
+  $("pause").disabled = true;
+  if (!shown) $("env").textContent = "Locked";
+}
+
 async function tellClosed(problem) {
   const byItsOwner = problem.code === "unknown_instance";
   tell("closed", byItsOwner ? "This environment is closed" : problem.message, "");
   $("pause").disabled = true;
   $("pace").textContent = "";
   if (!shown) $("env").textContent = "Closed";
+  // The key is good for this environment only.
+  if (KEY !== null) return;
   for (;;) {
     try {
       const open = Object.entries((await ask("../../")).all_envs);

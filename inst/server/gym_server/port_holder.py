@@ -1,0 +1,35 @@
+"""Who has a port that a server was to take."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+
+_ANSWER_SECONDS = 2.0
+_LARGEST_ANSWER = 2**16
+
+
+def port_holder(host: str, port: int) -> str | None:
+    """Ask whoever listens who it is; no token is shown to it.
+
+    Returns:
+        Words that end in "has it"; None when nobody answers the door.
+    """
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    answer = None
+    with contextlib.closing(http.client.HTTPConnection(host, port, timeout=_ANSWER_SECONDS)) as it:
+        try:
+            it.connect()
+        except OSError:
+            return None
+        with contextlib.suppress(OSError, http.client.HTTPException, ValueError):
+            it.request("GET", "/v1/health/")
+            answer = json.loads(it.getresponse().read(_LARGEST_ANSWER))
+    match answer:
+        case {"versions": {"gym_server": str(version)}, "pid": int(pid)}:
+            return f"a Gym server {version[:20]} (process {pid}) has it"
+        case {"code": "unauthorized"}:
+            return "a Gym server that asks for a token has it"
+        case _:
+            return "another program has it"

@@ -1,0 +1,59 @@
+"""Keys to watch pages: what a link holds in place of the server's token."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import threading
+import time
+from collections.abc import Callable
+
+# How long a key is good after it was made or last used.
+KEY_SECONDS = 600
+
+_MOST_KEYS = 10_000
+
+
+class WatchKeys:
+    """The keys that are good at present, each for one environment's page."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start with none."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        # By their digests, so that no key can be read or timed out of here; the one that ends
+        # next is first.
+        self._keys: dict[bytes, tuple[str, float]] = {}
+
+    def make(self, instance_id: str) -> str:
+        """Return a new key to an instance's page."""
+        key = secrets.token_urlsafe(24)
+        with self._lock:
+            self._drop_old()
+            while len(self._keys) >= _MOST_KEYS:
+                del self._keys[next(iter(self._keys))]
+            self._keys[_digest(key)] = (instance_id, self._clock() + KEY_SECONDS)
+        return key
+
+    def opens(self, key: str, instance_id: str) -> bool:
+        """Tell whether a key is good for an instance's page; that is a use of it."""
+        digest = _digest(key)
+        with self._lock:
+            self._drop_old()
+            if self._keys.get(digest, ("", 0.0))[0] != instance_id:
+                return False
+            del self._keys[digest]
+            self._keys[digest] = (instance_id, self._clock() + KEY_SECONDS)
+        return True
+
+    def _drop_old(self) -> None:
+        now = self._clock()
+        while self._keys:
+            digest, (_, end) = next(iter(self._keys.items()))
+            if end > now:
+                return
+            del self._keys[digest]
+
+
+def _digest(key: str) -> bytes:
+    return hashlib.sha256(key.encode("utf-8", "surrogatepass")).digest()

@@ -1,0 +1,182 @@
+# Everything that an error, a message or an object shows in any way.
+shown <- function(x) {
+  file <- tempfile()
+  on.exit(unlink(file))
+  dput(x, file)
+  kept <- if (inherits(x, "condition")) {
+    c(conditionMessage(x), deparse(conditionCall(x)), format(x$trace),
+      unlist(lapply(x$trace$call, deparse)), if (!is.null(x$parent)) shown(x$parent))
+  }
+  paste(c(
+    utils::capture.output(print(x)), utils::capture.output(utils::str(x)),
+    format(x), deparse(x), readLines(file), kept
+  ), collapse = "\n")
+}
+
+expect_hidden <- function(x) {
+  expect_false(grepl(token_text, shown(x), fixed = TRUE), info = shown(x))
+}
+
+test_that("a server that asks for a token gets it from the client that was returned", {
+  server <- local_locked_server()
+  env <- local_env(client = server)
+  expect_length(env$reset(), 4)
+  expect_true(env$step(1)$reward == 1)
+  expect_identical(get_request(server, "/v1/health/")$status, "ok")
+})
+
+test_that("without it, or with another, the error is a 401 that says what helps", {
+  server <- local_locked_server()
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  for (token in list(NULL, "", "another-token-altogether")) {
+    stranger <- create_GymClient(server$remote_base, token = token)
+    error <- expect_error(env_list_all(stranger), class = "gym_error_http_401")
+    expect_identical(error$code, "unauthorized")
+    expect_match(conditionMessage(error), "create_GymClient(token = )", fixed = TRUE)
+    expect_match(conditionMessage(error), "GYM_SERVER_TOKEN")
+  }
+  expect_error(shutdown_server(stranger), class = "gym_error_http_401")
+  friend <- create_GymClient(server$remote_base, token = token_text)
+  expect_length(env_list_all(friend), 0)
+})
+
+test_that("the variable is the token of every client", {
+  server <- local_locked_server()
+  withr::local_envvar(GYM_SERVER_TOKEN = token_text, GYM_SERVER_URL = server$remote_base)
+  expect_length(env_list_all(create_GymClient(server$remote_base)), 0)
+  expect_length(env_list_all(gym_client()), 0)
+  expect_error(env_list_all(create_GymClient(server$remote_base, token = NULL)),
+               class = "gym_error_http_401")
+  Sys.setenv(GYM_SERVER_TOKEN = "another-token-altogether")
+  expect_error(env_list_all(gym_client()), class = "gym_error_http_401")
+})
+
+test_that("a server that is started sees the variable, and its client has it", {
+  withr::local_envvar(GYM_SERVER_TOKEN = token_text)
+  server <- local_server()
+  expect_length(env_list_all(server), 0)
+  expect_error(env_list_all(create_GymClient(server$remote_base, token = NULL)),
+               class = "gym_error_http_401")
+  open <- local_server(no_auth = TRUE)
+  expect_length(env_list_all(create_GymClient(open$remote_base, token = NULL)), 0)
+})
+
+test_that("a client never shows its token", {
+  client <- create_GymClient("http://gym.example.org", token = token_text)
+  expect_hidden(client)
+  expect_hidden(client$token)
+  expect_hidden(unclass(client))
+  expect_hidden(list(a = client))
+  expect_output(print(client), "<GymClient: http://gym.example.org>", fixed = TRUE)
+  # It goes where the client goes.
+  file <- withr::local_tempfile()
+  saveRDS(client, file)
+  expect_identical(readRDS(file)$token(), token_text)
+})
+
+test_that("no error shows the token, also where the call was written with it", {
+  server <- local_locked_server()
+  errors <- list(
+    tryCatch(create_GymClient("nowhere", token = "correct-horse-battery-staple"),
+             error = identity),
+    tryCatch(create_GymClient("http://a", timeout = 0, token = "correct-horse-battery-staple"),
+             error = identity),
+    tryCatch(create_GymClient("http://a", token = "correct-horse-battery-staple x"),
+             error = identity),
+    tryCatch(create_GymClient("http://a", token = c("correct-horse-battery-staple", "b")),
+             error = identity),
+    tryCatch(env_list_all(create_GymClient(paste0("http://127.0.0.1:", free_port()),
+                                           token = "correct-horse-battery-staple")),
+             error = identity),
+    tryCatch(env_create(create_GymClient(server$remote_base,
+                                         token = "correct-horse-battery-staple"), "bad string"),
+             error = identity),
+    tryCatch(env_list_all(create_GymClient(server$remote_base,
+                                           token = "not-correct-horse-battery-staple")),
+             error = identity)
+  )
+  for (error in errors) {
+    expect_s3_class(error, "gym_error")
+    expect_hidden(error)
+  }
+})
+
+test_that("what cannot stand in a header is no token", {
+  for (token in list("a b", "a\nX-Header: b", "\u00e4\u00f6", 5, NA_character_, c("a", "b"))) {
+    error <- expect_error(create_GymClient("http://a", token = token),
+                          class = "gym_error_argument")
+    expect_identical(error$argument, "token")
+  }
+})
+
+test_that("the server's log does not show the token", {
+  server <- local_locked_server(log_level = "debug")
+  env <- local_env(client = server)
+  env$reset()
+  try(env_create(server, "bad string"), silent = TRUE)
+  stranger <- create_GymClient(server$remote_base, token = paste0(token_text, "x"))
+  try(env_list_all(stranger), silent = TRUE)
+  log <- gym_server_log(server)
+  expect_true(any(grepl("without a token", log)))
+  expect_false(any(grepl(token_text, log, fixed = TRUE)))
+})
+
+test_that("a token that is none ends the start, and is not shown", {
+  skip_if_no_server()
+  file <- local_token_file("short-token")
+  error <- expect_error(gym_server_start(token_file = file), class = "gym_error_server_start")
+  expect_match(conditionMessage(error), "16 to 1,024")
+  expect_false(grepl("short-token", conditionMessage(error)))
+  expect_error(gym_server_start(token_file = "nowhere/token"), "cannot be read",
+               class = "gym_error_server_start")
+})
+
+test_that("off this machine a token is needed, or the word that none is", {
+  skip_if_no_server()
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  error <- expect_error(gym_server_start(host = "0.0.0.0"), class = "gym_error_server_start")
+  expect_match(conditionMessage(error), "--token-file")
+})
+
+test_that("a watch page is opened by a key of its own", {
+  seen <- character()
+  withr::local_options(gym.viewer = function(address) {
+    seen <<- c(seen, address)
+    curl::curl_fetch_memory(sub("?", "presence/?", address, fixed = TRUE))
+  })
+  server <- local_locked_server()
+  env <- local_env(client = server)
+  address <- env$watch()
+  expect_match(address, "/watch/?key=", fixed = TRUE)
+  expect_identical(seen, address)
+  expect_false(grepl(token_text, address, fixed = TRUE))
+  expect_identical(curl::curl_fetch_memory(address)$status_code, 200L)
+  for (wrong in c(sub("[?].*", "", address), paste0(address, "x"))) {
+    expect_identical(curl::curl_fetch_memory(wrong)$status_code, 401L)
+  }
+})
+
+test_that("clients stop a server only where they may", {
+  server <- local_server(no_shutdown = TRUE)
+  error <- expect_error(shutdown_server(server), class = "gym_error_http_403")
+  expect_identical(error$code, "shutdown_disabled")
+  expect_length(env_list_all(server), 0)
+})
+
+test_that("who is asked who listens is shown no token", {
+  server <- local_locked_server()
+  probe <- probe_server(server$remote_base, timeout = 5)
+  expect_true(probe$listens && probe$is_gym && probe$asks_token)
+  known <- probe_server(server$remote_base, timeout = 5, known_token(server$remote_base))
+  expect_false(known$asks_token)
+  withr::local_envvar(GYM_SERVER_URL = "http://127.0.0.1:1", GYM_SERVER_TOKEN = NA)
+  expect_match(sitrep_server(server$remote_base, "server", NULL)$finding, "environment")
+})
+
+test_that("calls without tokens are kept as they are", {
+  local_session(hidden = token_text)
+  call <- quote(f(x[1, ], "a", b = function(y, z = "correct-horse-battery-staple") NULL))
+  expect_identical(
+    without_tokens(call), quote(f(x[1, ], "a", b = function(y, z = "<token>") NULL))
+  )
+})
