@@ -85,7 +85,7 @@ hide_token <- function(token) {
 without_tokens <- function(x) {
   if (is.character(x)) {
     x[is_token_text(x)] <- "<token>"
-  } else if (has_parts(x)) {
+  } else if (is_written(x)) {
     # An argument may be missing, as in x[1, ].
     for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
       x[[i]] <- without_tokens(x[[i]])
@@ -94,7 +94,8 @@ without_tokens <- function(x) {
   x
 }
 
-has_parts <- function(x) is.call(x) || is.pairlist(x) || is.list(x) && !is.object(x)
+# What may hold texts that a script wrote.
+is_written <- function(x) is.call(x) || is.pairlist(x) || is.list(x) && !is.object(x)
 
 is_token_text <- function(texts) {
   found <- texts %in% the_session$hidden
