@@ -92,7 +92,7 @@ hanging_mend <- function(base) {
     if (!is.null(the_session$servers[[base]])) {
       "`gym_server_stop()` ends a server of this session's; `gym_make()` then starts another."
     } else {
-      "`create_GymClient(timeout = )` waits longer; if it hangs, whoever runs it must start it anew."
+      "`create_GymClient(timeout = )` waits longer; a server that hangs must be started anew."
     }
   )
 }

@@ -262,9 +262,10 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
-    reached <- reached || curl::handle_data(handle)$times[["pretransfer"]] > 0
+    reached <- reached | curl::handle_data(handle)$times[["pretransfer"]] > 0
     left <- patience(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
-    if (!repeatable || attempt == max_attempts || left <= 0 || !connection_broke(reason)) {
+    again <- repeatable && attempt < max_attempts && left > 0 && connection_broke(reason)
+    if (!again) {
       abort_connection(client$remote_base, reason, call, reached)
     }
     Sys.sleep(0.1 * attempt)

@@ -111,8 +111,8 @@
 #'   anything is made, or for a network that does not fit the environment;
 #'   `gym_error_checkpoint` for a checkpoint that is damaged, is no search's, belongs to a
 #'   search with other arguments (the message names them, and so does the field `argument`) or
-#'   cannot be written; `gym_error_search` for any error while it plays, with the classes of that error, `gym_error_http` or
-#'   `gym_error_connection` for instance.
+#'   cannot be written; `gym_error_search` for any error while it plays, with the classes of
+#'   that error, `gym_error_http` or `gym_error_connection` for instance.
 #' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
 #' @seealso [gym_search] for what to do with the result; [search_repeat()] for how long such

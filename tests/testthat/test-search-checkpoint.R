@@ -78,10 +78,10 @@ test_that("with a seed the session's generator stays as it was", {
 test_that("an interrupted search and one with an error go on by the same call", {
   for (stop_it in list(rlang::interrupt, function() gym_abort("lost"))) {
     path <- local_checkpoint()
-    play <- function(env) {
-      search_random(env, rounds = 5, episodes = 2, target = Inf, seed = 1, checkpoint = path)
+    play <- function(env, checkpoint = path) {
+      search_random(env, rounds = 5, episodes = 2, target = Inf, seed = 1, checkpoint = checkpoint)
     }
-    undisturbed <- search_random(fake_environment(), rounds = 5, episodes = 2, target = Inf, seed = 1)
+    undisturbed <- play(fake_environment(), NULL)
     env <- fake_environment()
     step <- env$step
     env$step <- function(action) if (length(env$seeds) == 5L) stop_it() else step(action)
