@@ -40,7 +40,7 @@ def dumps(value: object) -> bytes:
     """Return a value as strict JSON; non-finite numbers become strings."""
     try:
         text = _encode(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RecursionError):
         # Only now walk through all of it: an ordinary step has nothing to convert.
         text = _encode(plain(value))
     return text.encode("ascii")

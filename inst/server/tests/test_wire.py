@@ -118,3 +118,19 @@ def test_a_value_in_a_url_is_json_or_text():
     assert wire.parse_path_value("[1, 2]") == [1, 2]
     assert wire.parse_path_value("NaN") == "NaN"
     assert wire.parse_path_value("left") == "left"
+
+
+def test_what_can_be_read_can_be_written_however_deep():
+    deepest = 0
+    for depth in range(500, 1100):
+        try:
+            body = wire.loads(b'{"a":' * depth + b"1" + b"}" * depth)
+        except GymServerError:
+            continue
+        deepest = depth
+
+        def further_down(frames, body=body):
+            return wire.dumps(body) if frames == 0 else further_down(frames - 1)
+
+        assert further_down(20).startswith(b'{"a":')
+    assert deepest > 500
