@@ -82,6 +82,9 @@ odd_values <- c(
   "[1,1,1,1,1,1,1,1,1]", "1E400", "\"\"", "[{}]"
 )
 
+# Seconds of this process's own: others may have the machine.
+worked <- function() sum(proc.time()[c("user.self", "sys.self")])
+
 seconds <- as.numeric(commandArgs(TRUE)[[1]])
 set.seed(1)
 seeds <- right_files()
@@ -93,7 +96,7 @@ invisible(gc(reset = TRUE))
 while (Sys.time() < end && length(problems) < 20) {
   bytes <- seeds[[sample(length(seeds), 1)]]
   bytes <- if (runif(1) < 0.5) swap_value(bytes) else mutate(bytes)
-  began <- proc.time()[["elapsed"]]
+  began <- worked()
   # Anew and with the headers that it knows, as a connection has them.
   for (known in list(NULL, layouts)) {
     outcome <- tryCatch(read_tensors(bytes, known), error = identity, warning = identity)
@@ -104,7 +107,7 @@ while (Sys.time() < end && length(problems) < 20) {
     }
   }
   read <- read + is.list(outcome) * !inherits(outcome, "condition")
-  if (proc.time()[["elapsed"]] - began > 5) problems <- c(problems, "took more than 5 s")
+  if (worked() - began > 5) problems <- c(problems, "took more than 5 s")
   cases <- cases + 1
 }
 megabytes <- sum(gc()[, 6])
