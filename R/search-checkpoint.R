@@ -126,6 +126,8 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
 resume_rounds <- function(record, saved, lanes, settings, path, call) {
   check_same_lanes(path, saved$told, told_by_lanes(lanes, settings), call)
   restore_rounds(record, saved)
+  finished <- count_finished(record)
+  inform_resumed("Going on from {.path {path}}, with {finished} of {settings$rounds} round{?s}.")
   # NULL in a session that had drawn nothing, of a search that had not begun.
   if (!is.null(saved$generator)) {
     restore_random_state(saved$generator)
@@ -157,9 +159,17 @@ restore_rounds <- function(record, saved) {
   record
 }
 
+# So that nobody takes what an earlier run has left for what this one has played.
+inform_resumed <- function(text, .envir = parent.frame()) {
+  cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
+}
+
 #' Make the result of a search whose file says that it had ended
 #' @noRd
-finished_search <- function(saved, settings, client) {
+finished_search <- function(saved, settings, client, path) {
+  inform_resumed(
+    "This search had ended: {.path {path}} has its result. {.code resume = FALSE} plays it anew."
+  )
   told <- saved$told
   settings[names(told)] <- told
   settings["client"] <- list(client)

@@ -82,7 +82,8 @@
 #'   keeps nothing.
 #' @param resume Go on with what the `checkpoint` has? `TRUE`, the default, goes on where
 #'   there is such a file and otherwise begins; a search that had ended is returned at once.
-#'   `FALSE` begins anew, and replaces the file.
+#'   A message of class `gym_message_resumed` says so. `FALSE` begins anew, and replaces the
+#'   file.
 #' @return An object of class [gym_search], which [print()], [summary()][summary.gym_search()],
 #'   [plot()][plot.gym_search()], [as.data.frame()][as.data.frame.gym_search()] and
 #'   [predict()][predict.gym_search()] know; a list with the elements
@@ -137,7 +138,8 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   settings["seed"] <- list(seed)
   kept <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
   if (isTRUE(kept$saved$finished)) {
-    return(finished_search(kept$saved, settings, if (is_playable(env)) env$client else client))
+    client <- if (is_playable(env)) env$client else client
+    return(finished_search(kept$saved, settings, client, kept$path))
   }
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
     settings <- settings_in(lanes, settings)

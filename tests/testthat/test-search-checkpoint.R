@@ -3,6 +3,11 @@ figures <- function(search) {
   search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
 }
 
+# Each file that is gone on from is told.
+quiet_search <- function(...) {
+  suppressMessages(search_random(...), classes = "gym_message_resumed")
+}
+
 # Plays a search that writes after each block, and keeps the file as each write left it.
 local_kept_files <- function(frame = parent.frame()) {
   files <- new.env()
@@ -35,7 +40,7 @@ test_that("a search goes on from the file of any block to the result of an undis
   for (make in environments) {
     for (target in list(Inf, 13.5)) {
       play <- function(checkpoint = NULL) {
-        search_random(make(), rounds = 6, episodes = 3, target = target, seed = 1,
+        quiet_search(make(), rounds = 6, episodes = 3, target = target, seed = 1,
                       checkpoint = checkpoint)
       }
       undisturbed <- play()
@@ -52,7 +57,7 @@ test_that("a search goes on from the file of any block to the result of an undis
 test_that("without a seed the generator goes on as well, and ends where it would have", {
   kept <- local_kept_files()
   play <- function(checkpoint) {
-    search_random(fake_lanes(4, reward = first_action), rounds = 9, target = Inf,
+    quiet_search(fake_lanes(4, reward = first_action), rounds = 9, target = Inf,
                   checkpoint = checkpoint)
   }
   set.seed(3)
@@ -70,7 +75,7 @@ test_that("with a seed the session's generator stays as it was", {
   set.seed(1)
   before <- .Random.seed
   for (time in 1:2) {
-    search_random(fake_environment(), rounds = 2, seed = 5, checkpoint = path)
+    quiet_search(fake_environment(), rounds = 2, seed = 5, checkpoint = path)
     expect_identical(.Random.seed, before)
   }
 })
@@ -79,7 +84,7 @@ test_that("an interrupted search and one with an error go on by the same call", 
   for (stop_it in list(rlang::interrupt, function() gym_abort("lost"))) {
     path <- local_checkpoint()
     play <- function(env, checkpoint = path) {
-      search_random(env, rounds = 5, episodes = 2, target = Inf, seed = 1, checkpoint = checkpoint)
+      quiet_search(env, rounds = 5, episodes = 2, target = Inf, seed = 1, checkpoint = checkpoint)
     }
     undisturbed <- play(fake_environment(), NULL)
     env <- fake_environment()
@@ -98,7 +103,7 @@ test_that("an interrupted search and one with an error go on by the same call", 
 
 test_that("a finished search is returned at once, with all its time", {
   path <- local_checkpoint()
-  play <- function(env) search_random(env, rounds = 3, target = Inf, seed = 1, checkpoint = path)
+  play <- function(env) quiet_search(env, rounds = 3, target = Inf, seed = 1, checkpoint = path)
   env <- fake_environment()
   step <- env$step
   env$step <- function(action) {
@@ -120,7 +125,7 @@ test_that("the progress bar goes on, too", {
     local_functions(
       progress_bar = function(rounds) function(finished, best) shown <<- c(shown, finished)
     )
-    search_random(fake_environment(), rounds = 3, episodes = 1, target = Inf, seed = 1,
+    quiet_search(fake_environment(), rounds = 3, episodes = 1, target = Inf, seed = 1,
                   progress = TRUE, checkpoint = path)
     shown
   }
@@ -163,7 +168,7 @@ test_that("arguments that differ from the file's are named, with both values", {
 test_that("a damaged or foreign file is an error, and stays as it is", {
   path <- local_checkpoint()
   env <- fake_environment()
-  search_random(env, rounds = 2, checkpoint = path)
+  quiet_search(env, rounds = 2, checkpoint = path)
   whole <- readBin(path, "raw", file.size(path))
   flipped <- function(at) {
     bytes <- whole
@@ -181,26 +186,26 @@ test_that("a damaged or foreign file is an error, and stays as it is", {
   for (bytes in contents) {
     writeBin(bytes, path)
     expect_error(
-      search_random("CartPole-v1", rounds = 2, checkpoint = path, client = no_client()),
+      quiet_search("CartPole-v1", rounds = 2, checkpoint = path, client = no_client()),
       "resume = FALSE", fixed = TRUE, class = "gym_error_checkpoint"
     )
     expect_identical(readBin(path, "raw", n), bytes)
   }
-  expect_error(search_random(env, checkpoint = path), "9.9.9", fixed = TRUE)
-  again <- search_random(env, rounds = 2, checkpoint = path, resume = FALSE)
+  expect_error(quiet_search(env, checkpoint = path), "9.9.9", fixed = TRUE)
+  again <- quiet_search(env, rounds = 2, checkpoint = path, resume = FALSE)
   expect_identical(nrow(again$rounds), 2L)
-  expect_identical(nrow(search_random(env, rounds = 2, checkpoint = path)$rounds), 2L)
+  expect_identical(nrow(quiet_search(env, rounds = 2, checkpoint = path)$rounds), 2L)
 })
 
 test_that("a place where no file can be is refused before anything is made", {
   folder <- withr::local_tempdir()
   for (path in c(folder, file.path(folder, "none", "search.rds"))) {
-    expect_error(search_random(checkpoint = path, client = no_client()),
+    expect_error(quiet_search(checkpoint = path, client = no_client()),
                  class = "gym_error_checkpoint")
   }
-  expect_error(search_random(checkpoint = 1, client = no_client()), "checkpoint",
+  expect_error(quiet_search(checkpoint = 1, client = no_client()), "checkpoint",
                class = "gym_error_argument")
-  expect_error(search_random(resume = NA, client = no_client()), "resume",
+  expect_error(quiet_search(resume = NA, client = no_client()), "resume",
                class = "gym_error_argument")
 })
 
@@ -214,7 +219,7 @@ test_that("a disk that is full in the middle warns once and ends nothing", {
     step(action)
   }
   warnings <- testthat::capture_warnings(
-    search <- search_random(env, rounds = 5, episodes = 2, target = Inf,
+    search <- quiet_search(env, rounds = 5, episodes = 2, target = Inf,
                             checkpoint = file.path(folder, "search.rds"))
   )
   expect_length(warnings, 1)
@@ -225,7 +230,7 @@ test_that("a disk that is full in the middle warns once and ends nothing", {
 test_that("a write that ends in the middle leaves the file before it, and nothing else", {
   folder <- withr::local_tempdir()
   path <- file.path(folder, "search.rds")
-  search_random(fake_environment(), rounds = 2, seed = 1, checkpoint = path)
+  quiet_search(fake_environment(), rounds = 2, seed = 1, checkpoint = path)
   before <- readBin(path, "raw", 1e6)
   local_functions(replace_file = function(from, to) rlang::interrupt())
   tryCatch(write_checkpoint(path, list(1)), interrupt = function(cnd) NULL)
@@ -238,13 +243,13 @@ test_that("what a kill in the middle of a write has left goes with the next star
   left <- file.path(folder, c("search.rds-1-a.part", "search.rds-2-b.part", "other.part"))
   file.create(left)
   Sys.setFileTime(left[c(1, 3)], Sys.time() - 3600)
-  search_random(fake_environment(), rounds = 1, checkpoint = file.path(folder, "search.rds"))
+  quiet_search(fake_environment(), rounds = 1, checkpoint = file.path(folder, "search.rds"))
   expect_setequal(list.files(folder), c("search.rds", basename(left[2:3])))
 })
 
 test_that("the file stays small: of the policies those are kept that are needed", {
   path <- local_checkpoint()
-  search_random(fake_environment(), policy_network(c(4, 100, 1)), rounds = 40, episodes = 1,
+  quiet_search(fake_environment(), policy_network(c(4, 100, 1)), rounds = 40, episodes = 1,
                 target = Inf, checkpoint = path)
   # 500 weights are 4 kB, and there were 40 networks.
   expect_lt(file.size(path), 40000)
@@ -259,14 +264,14 @@ test_that("a relative path is that of the folder at the start", {
     setwd(tempdir())
     reset(...)
   }
-  search_random(env, rounds = 2, checkpoint = "here.rds")
+  quiet_search(env, rounds = 2, checkpoint = "here.rds")
   expect_identical(list.files(folder), "here.rds")
 })
 
 test_that("a server that plays otherwise than the one before is told", {
   kept <- local_kept_files()
   play <- function(threshold, path) {
-    search_random(fake_environment(reward_threshold = threshold), rounds = 3, checkpoint = path)
+    quiet_search(fake_environment(reward_threshold = threshold), rounds = 3, checkpoint = path)
   }
   play(100, local_checkpoint())
   expect_error(play(99, local_checkpoint(kept$list[[2]])), "threshold.*100.*99",
@@ -277,7 +282,7 @@ test_that("kill -9 of the server: the same call goes on to the result of an undi
   path <- local_checkpoint()
   play <- function(server, ...) {
     env <- gym_make("CartPole-v1", num_envs = 32, client = server)
-    search_random(env, rounds = 40, target = Inf, seed = 1, ...)
+    quiet_search(env, rounds = 40, target = Inf, seed = 1, ...)
   }
   server <- local_server()
   undisturbed <- play(server)
@@ -295,4 +300,17 @@ test_that("kill -9 of the server: the same call goes on to the result of an undi
   }
   expect_gt(killed, 0)
   expect_identical(figures(search), figures(undisturbed))
+})
+
+test_that("a search says that it goes on, and how far the file is, or that it had ended", {
+  kept <- local_kept_files()
+  play <- function(path) {
+    search_random(fake_environment(reward = first_action), rounds = 4, episodes = 2, target = Inf,
+                  seed = 1, checkpoint = path)
+  }
+  path <- local_checkpoint()
+  expect_no_condition(play(path), class = "gym_message_resumed")
+  expect_message(play(path), "had ended", class = "gym_message_resumed")
+  half <- local_checkpoint(kept$list[[5]])
+  expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
