@@ -89,7 +89,12 @@ read_entry <- function(entry) {
   if (size != n * type$size) {
     abort_tensors("an offset does not fit its tensor")
   }
-  list(read = type$read, n = n, shape = as.integer(shape), begin = offsets[[1L]], size = size)
+  # R takes a part of a vector by integers in less time than by doubles.
+  whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
+  list(
+    read = type$read, n = n, shape = as.integer(shape),
+    begin = whole(offsets[[1L]]), size = whole(size)
+  )
 }
 
 # The elements of a JSON array of whole numbers from 0 on, NULL for anything else.
