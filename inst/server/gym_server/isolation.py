@@ -67,7 +67,9 @@ class Isolation:
             env_id: what is to be made; also nonsense, which gets none.
             allowed_modules: names of the modules that an env_id may import.
         """
-        if self.mode == "none" or not isinstance(env_id, str):
+        # Looking for what is near one that is too long would take minutes.
+        is_id = isinstance(env_id, str) and len(env_id) <= registry.LONGEST_ID
+        if self.mode == "none" or not is_id:
             return False
         module, colon, name = env_id.rpartition(":")
         if colon and module not in allowed_modules:

@@ -22,6 +22,7 @@ ALLOWED = ["faulty_envs"]
         # Refused without a process.
         ("os:Counting-v0", ALLOWED, []),
         (7, ALLOWED, []),
+        ("x" * 201 + "-v0", ALLOWED, []),
     ],
 )
 def test_gymnasiums_own_are_not_foreign(env_id, allowed, wanting):
