@@ -19,7 +19,9 @@ class Departed:
     def add(self, instance_id: str, why: GymServerError) -> None:
         """Note why an instance is gone."""
         with self._lock:
-            self._reasons[instance_id] = why
+            # A copy: what is raised keeps the frames that it came through, and with them the
+            # environment.
+            self._reasons[instance_id] = why.again()
             while len(self._reasons) > self._most:
                 del self._reasons[next(iter(self._reasons))]
 

@@ -1,3 +1,7 @@
+import contextlib
+import gc
+import weakref
+
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError
 
@@ -14,6 +18,21 @@ def test_a_reason_is_kept():
     # What is raised over and over must not grow.
     assert departed.why("a") is not found
     assert "a" in departed
+
+
+def test_a_reason_keeps_nothing_of_where_it_was_raised():
+    class Environment:
+        def step(self, why):
+            raise why
+
+    departed, why, environment = Departed(), reason(1), Environment()
+    departed.add("a", why)
+    with contextlib.suppress(GymServerError):
+        environment.step(why)
+    gone = weakref.ref(environment)
+    del environment, why
+    gc.collect()
+    assert gone() is None
 
 
 def test_without_one_an_instance_is_unknown():
