@@ -111,6 +111,7 @@ class Instances:
                 making.settled.wait(_SETTLED_SECONDS)
                 raise making.too_long(self._limits.max_call_seconds)
             undo.pop_all()
+        instance.stay()
         log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
         return instance.instance_id
 

@@ -85,6 +85,9 @@ class IsolatedInstance(Listed):
         self._lanes = int(self._about["lanes"])
         self.screen = Screen(self, made["fps"])  # type: ignore[arg-type]
         self._made = self.hold.used = time.monotonic()
+
+    def stay(self) -> None:
+        """Hear that it is on the list, which it leaves when its process ends."""
         self._worker.stay()
 
     @staticmethod

@@ -25,6 +25,9 @@ class Listed:
     _made: float
     _steps: int
 
+    def stay(self) -> None:
+        """Hear that it is on the list."""
+
     def line(self) -> dict:
         """Return its line in the list."""
         now = time.monotonic()

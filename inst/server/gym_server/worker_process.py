@@ -89,9 +89,13 @@ class WorkerProcess:
             raise self._end_after(fault) from None
 
     def stay(self) -> None:
-        """Take no end of it from now on for what was asked for."""
-        self._doing = "by itself"
-        self._expected = False
+        """Take no end of it for what was asked for: none from now on, and none that has come."""
+        with self._lock:
+            self._doing = "by itself"
+            self._expected = False
+            ended = self.why
+        if ended is not None:
+            self._on_end(ended)
 
     def move(self, method: str, *args: object) -> Ready | Seen:
         """Ask for a move or a look; one at a time.

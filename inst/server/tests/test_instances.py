@@ -1,8 +1,13 @@
+import os
 import re
+import signal
 import threading
 import time
 
 import pytest
+
+from gym_server.app import Config, create_app
+from gym_server.instances import Instances
 
 
 @pytest.fixture
@@ -118,6 +123,27 @@ def test_at_the_end_everything_is_closed_and_nothing_more_is_made(app, client, c
 def test_an_environment_that_fails_to_close_does_not_keep_the_others_open(app, faulty, create):
     faulty("RaisesInClose"), create()
     app._instances.close_all()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
+    monkeypatch, eventually
+):
+    app = create_app(Config(isolate="all"))
+    enlist = Instances._enlist
+
+    def end_it_and_enlist(self, instance, making):
+        os.kill(instance._worker.pid, signal.SIGKILL)
+        eventually(lambda: instance._worker.why is not None)
+        return enlist(self, instance, making)
+
+    monkeypatch.setattr(Instances, "_enlist", end_it_and_enlist)
+    client = app.test_client()
+    instance_id = client.post("/v1/envs/", json={"env_id": "CartPole-v1"}).json["instance_id"]
+    assert client.get("/v1/envs/").json["all_envs"] == {}
+    answer = client.post(f"/v1/envs/{instance_id}/reset/")
+    assert (answer.status_code, answer.json["code"]) == (500, "environment_died")
+    app.close()
 
 
 def test_instances_are_listed_with_who_uses_them_how_much(client, create):
