@@ -108,7 +108,6 @@ class Instances:
             instance = make_it(choices, making, undo)
             if not self._enlist(instance, making):
                 undo.close()
-                making.settled.wait(_SETTLED_SECONDS)
                 raise making.too_long(self._limits.max_call_seconds)
             undo.pop_all()
         instance.stay()
@@ -138,8 +137,12 @@ class Instances:
             self._creating[thread] = making
         try:
             yield making
-        finally:
-            self._creating.pop(thread, None)
+        except BaseException:
+            if self._creating.pop(thread, None) is None:
+                # Given up. Else the answer that is given on its behalf might go to its next
+                # request.
+                making.settled.wait(_SETTLED_SECONDS)
+            raise
 
     def _make(self, choices: Choices, _: _Making, undo: contextlib.ExitStack) -> Instance:
         return make(choices, self._allowed_modules, self._limits.max_num_envs, self._renderer, undo)

@@ -313,3 +313,28 @@ def test_an_answer_for_another_never_reaches_the_next_request(strict):
         connection.request("GET", "/v1/health/")
         assert json.loads(connection.getresponse().read())["status"] == "ok"
     connection.close()
+
+
+def test_an_answer_for_one_whose_making_fails_never_reaches_its_next_request(quick, monkeypatch):
+    app = quick(max_call_seconds=0.2)
+    given_up, came_back, waited = threading.Event(), threading.Event(), []
+
+    def fail(*_):
+        given_up.wait(SOON)
+        raise ValueError("too late")
+
+    def answer_for(*_):
+        given_up.set()
+        # Whoever makes it must not come back before this is done.
+        waited.append(not came_back.wait(0.5))
+
+    def create():
+        app.test_client().post("/v1/envs/", json={"env_id": "CartPole-v1"})
+        came_back.set()
+
+    monkeypatch.setattr(app._instances, "_make", fail)
+    app.answer_for = answer_for
+    thread = threading.Thread(target=create)
+    thread.start()
+    thread.join(SOON)
+    assert waited == [True]
