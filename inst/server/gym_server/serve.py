@@ -180,7 +180,14 @@ class Server:
         with self._changed:
             self._connections.add(connection)
         # A daemon: an environment that never comes back must not keep the process.
-        threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+        thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
+        try:
+            thread.start()
+        except RuntimeError:
+            log.warning("No more connections: this process may start no more threads")
+            self._forget(connection)
+            client.close()
+            time.sleep(1.0)
 
     def _serve(self, connection: Connection) -> None:
         try:

@@ -68,7 +68,10 @@ class WorkerProcess:
         )
         try:
             self._process.start()
+            self.pid = self._process.pid
+            threading.Thread(target=self._await_end, daemon=True).start()
         except BaseException:
+            self._kill()
             for channel in (self._moves, self._questions):
                 channel.close()
             raise
@@ -78,8 +81,6 @@ class WorkerProcess:
         # Else whoever starts another one would ask after this one's end, too, and the server's
         # end would wait for it.
         multiprocessing_process._children.discard(self._process)  # type: ignore[attr-defined]
-        self.pid = self._process.pid
-        threading.Thread(target=self._await_end, daemon=True).start()
 
     def first_word(self) -> Seen:
         """Wait for what it says unasked; see ``move()``."""

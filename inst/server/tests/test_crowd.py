@@ -59,3 +59,17 @@ def test_half_sent_requests_leave_as_well(crowded):
     for _ in range(MOST):
         crowded().sendall(GET[:20])
     assert is_well(crowded())
+
+
+def test_a_server_without_threads_turns_one_away_and_goes_on(crowded, monkeypatch):
+    start, refused = threading.Thread.start, []
+
+    def refuse_the_first(thread):
+        if not refused:
+            refused.append(thread)
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", refuse_the_first)
+    assert crowded().recv(1) == b""
+    assert is_well(crowded())
