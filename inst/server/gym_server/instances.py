@@ -164,7 +164,9 @@ class Instances:
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
         if self._isolation.mode != "none" and self._allowed_modules:
-            return self._isolation.search(search, self._allowed_modules)
+            return self._isolation.search(
+                search, self._allowed_modules, self._limits.max_call_seconds
+            )
         return registry.search(search, self._allowed_modules)
 
     def get(self, instance_id: str) -> Instance | IsolatedInstance:

@@ -26,12 +26,13 @@ four more such runs, each beside other work on both cores, lost 24 to 40 % and 1
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Collection
 
 from gymnasium import error
 
 from gym_server import registry
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, call_too_long, shutting_down
 from gym_server.worker import Surroundings, list_registry
 from gym_server.worker_process import WorkerProcess
 
@@ -59,6 +60,7 @@ class Isolation:
         """
         self.mode = mode
         self._max_mb = max_mb
+        self._searching = threading.Lock()
 
     def wants(self, env_id: object, allowed_modules: Collection[str]) -> bool:
         """Tell whether an environment gets a process, without importing its module.
@@ -88,13 +90,31 @@ class Isolation:
             allowed, imported, max_num_envs, self._max_mb, logging.getLogger().level
         )
 
-    def search(self, text: str | None, allowed_modules: Collection[str]) -> list[dict]:
+    def search(
+        self, text: str | None, allowed_modules: Collection[str], seconds: float
+    ) -> list[dict]:
         """Return what is registered when the allowed modules are imported, elsewhere.
 
         Args:
             text: see ``registry.search()``.
             allowed_modules: names of the modules.
+            seconds: how long that may take; 0 for as long as it takes.
         """
+        try:
+            # One at a time: everybody may ask, and each takes a process.
+            if not self._searching.acquire(timeout=seconds or -1):
+                raise _search_too_long(seconds)
+            try:
+                return self._search(text, allowed_modules, seconds)
+            finally:
+                self._searching.release()
+        except GymServerError as failure:
+            log.warning("The allowed modules cannot be listed: %s", failure)
+            return registry.search(text, ())
+
+    def _search(
+        self, text: str | None, allowed_modules: Collection[str], seconds: float
+    ) -> list[dict]:
         worker = WorkerProcess(
             list_registry,
             text,
@@ -102,11 +122,22 @@ class Isolation:
             on_end=lambda why: None,
             hint="",
         )
+        overdue = threading.Timer(seconds, worker.condemn, (_search_too_long(seconds),))
+        overdue.daemon = True
+        if seconds:
+            overdue.start()
         try:
             return worker.first_word().value
-        except GymServerError as failure:
-            log.warning("The allowed modules cannot be listed: %s", failure)
-            return registry.search(text, ())
+        finally:
+            overdue.cancel()
+            # It has no more to say, and a thread of a module's would keep it.
+            worker.condemn(shutting_down())
+
+
+def _search_too_long(seconds: float) -> GymServerError:
+    return call_too_long(
+        "Importing the allowed modules", seconds, "what they register is not listed"
+    )
 
 
 _UNKNOWN = "?"

@@ -255,3 +255,21 @@ def test_modules_are_imported_in_other_processes_only(serve, tmp_path):
     pids = told.read_text().split()
     assert len(pids) == 3
     assert str(server.process.pid) not in pids
+
+
+@pytest.mark.parametrize("hangs", [True, False])
+def test_a_module_that_hangs_or_stays_leaves_no_process_of_the_list(
+    serve, tmp_path, eventually, hangs
+):
+    module = tmp_path / "never_ends.py"
+    sleep = "time.sleep(3600)"
+    wait = sleep if hangs else f"threading.Thread(target=lambda: {sleep}).start()"
+    module.write_text(f"import threading, time\n{wait}\n")
+    limit = "3" if hangs else "60"
+    arguments = ("--allow-module", "never_ends", "--max-call-seconds", limit)
+    server = serve(*arguments, PYTHONPATH=str(tmp_path))
+    server.create("faulty_envs:Counting-v0")
+    before = set(descendants(server.process.pid))
+    status, answer = server.get("/v1/registry/?search=CartPole-v1")
+    assert (status, answer["environments"][0]["id"]) == (200, "CartPole-v1")
+    eventually(lambda: set(descendants(server.process.pid)) == before)
