@@ -248,7 +248,7 @@ class Instances:
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
         for instance in instances:
-            since = instance.hold.busy_since
+            since = instance.busy_since
             if since is not None and since < before:
                 why = self._dismiss(instance, seconds)
                 stuck = instance.condemn(why)

@@ -189,6 +189,12 @@ class IsolatedInstance(Listed):
             logging.getLogger(__name__).info("Instance %s says nothing now", self.instance_id)
         return {**self._about, **self.line(), "isolated": True}
 
+    @property
+    def busy_since(self) -> float | None:
+        """Since when a call has waited for it; also one that asks what can be said meanwhile."""
+        since = (self.hold.busy_since, self._worker.questioned_since)
+        return min((one for one in since if one is not None), default=None)
+
     # Monitors -------------------------------------------------------------------------------
 
     def start_monitor(self, root: MonitorRoot, directory: str, *how: object) -> None:

@@ -28,6 +28,11 @@ class Listed:
     def stay(self) -> None:
         """Hear that it is on the list."""
 
+    @property
+    def busy_since(self) -> float | None:
+        """Since when a call has waited for it, in the clock's seconds, or None."""
+        return self.hold.busy_since
+
     def line(self) -> dict:
         """Return its line in the list."""
         now = time.monotonic()

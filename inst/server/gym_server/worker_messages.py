@@ -12,6 +12,7 @@ import math
 import pickle
 import struct
 import threading
+import time
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
@@ -71,13 +72,19 @@ def refusal_of(number: int, refusal: dict[str, str]) -> bytes:
 
 
 class Channel:
-    """Asks the process one question at a time."""
+    """Asks the process one question at a time.
+
+    Attributes:
+        busy_since: since when an answer is waited for, in the clock's seconds; None while none
+            is.
+    """
 
     def __init__(self, connection: Connection) -> None:
         """Take over the server's end of a pipe."""
         self._pipe = Pipe(connection)
         self._lock = threading.Lock()
         self._number = 0
+        self.busy_since: float | None = None
 
     def ask(self, method: str, *args: object, seconds: float | None = None) -> Ready | Seen:
         """Call a method in the process.
@@ -98,11 +105,13 @@ class Channel:
         """
         if not self._lock.acquire(timeout=-1 if seconds is None else seconds):
             raise TimeoutError
+        self.busy_since = time.monotonic()
         try:
             self._number += 1
             self._pipe.send(pickle.dumps((self._number, method, args), 5))
             return self._hear(seconds)
         finally:
+            self.busy_since = None
             self._lock.release()
 
     def hear(self) -> Ready | Seen:

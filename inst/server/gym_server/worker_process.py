@@ -127,6 +127,11 @@ class WorkerProcess:
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
+    @property
+    def questioned_since(self) -> float | None:
+        """Since when it owes an answer to a ``question()``, in the clock's seconds, or None."""
+        return self._questions.busy_since
+
     def _end_after(self, fault: Exception) -> GymServerError:
         """Return why a process that is of no use has ended, after seeing to that."""
         if isinstance(fault, Nonsense):

@@ -185,7 +185,7 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve):
 
 def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
     server = serve("--max-call-seconds", "4")
-    other, _ = rogue(server, does="nothing")
+    other, stopped = rogue(server, does="nothing")
     url, pid = rogue(server, does="never_returns")
 
     def step(_):
@@ -201,6 +201,11 @@ def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
     assert (status, answer["code"]) == (504, "call_too_long")
     assert list(server.get("/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
     assert server.post(f"{other}/step/", {"action": 0})[0] == 200
+    # Also one that is asked while nothing moves.
+    os.kill(stopped, signal.SIGSTOP)
+    status, answer = server.get(f"{other}/action_space/")
+    assert (status, answer["code"]) == (504, "call_too_long")
+    eventually(lambda: not is_running(stopped))
 
 
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
