@@ -98,7 +98,7 @@ class Channel:
             ``Ready`` for a reset or a step, else ``Seen``.
 
         Raises:
-            GymServerError: what the process refused with.
+            GymServerError: what the process refused with; ``malformed_json``.
             EOFError, OSError: the process is gone.
             TimeoutError: it took too long; its answer will be nobody's.
             Nonsense: what it said is no answer.
@@ -108,7 +108,7 @@ class Channel:
         self.busy_since = time.monotonic()
         try:
             self._number += 1
-            self._pipe.send(pickle.dumps((self._number, method, args), 5))
+            self._pipe.send(_question(self._number, method, args))
             return self._hear(seconds)
         finally:
             self.busy_since = None
@@ -139,6 +139,17 @@ class Channel:
         """Close the pipe when nobody waits here any more; ``wake()`` sees to that."""
         with self._lock:
             self._pipe.close()
+
+
+def _question(number: int, method: str, args: tuple) -> bytes:
+    try:
+        return pickle.dumps((number, method, args), 5)
+    except RecursionError:
+        # JSON that could be read is not always flat enough for this.
+        raise GymServerError(
+            "malformed_json",
+            "The request's body has too many lists in one another to be handed on",
+        ) from None
 
 
 def _read_answer(raw: bytes) -> Ready | Seen:

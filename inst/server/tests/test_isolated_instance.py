@@ -102,6 +102,16 @@ def test_an_isolated_environment_answers_as_any_other_does(servers, env_id, acti
     assert ordinary[2][0] == 200 and b'"request' in ordinary[2][2]
 
 
+@pytest.mark.parametrize("depth", [100, 900])
+def test_no_depth_of_an_action_is_a_fault_of_the_servers(isolated, depth):
+    url = isolated.create("CartPole-v1")
+    isolated.post(f"{url}/reset/")
+    body = f'{{"action": {"[" * depth}{"]" * depth}}}'.encode()
+    status, _, content = raw(isolated, "POST", f"{url}/step/", body)
+    assert status == 400, content
+    assert isolated.post(f"{url}/step/", {"action": 1})[0] == 200
+
+
 def test_actions_travel_as_tensors(servers):
     action = b'{"action":{"dtype":"I64","shape":[3],"data_offsets":[0,24]}}'
     action += b" " * (-len(action) % 8)
