@@ -28,29 +28,35 @@ def _object(required: dict[str, dict], **others: dict) -> dict:
 
 _REQUEST = _object({"key": _TEXT, "number": _COUNT})
 
-_ABOUT = {
+_LINE = {
     "instance_id": _TEXT,
     "env_id": _TEXT,
+    "name": _or_null(_TEXT),
+    "num_envs": _or_null(_COUNT),
+    "age_seconds": _SECONDS,
+    "idle_seconds": _SECONDS,
+    "steps": _COUNT,
+    "watched": _FLAG,
+}
+
+_ABOUT = {
+    **_LINE,
     "observation_space": _SPACE,
     "action_space": _SPACE,
     "reward_threshold": _or_null(_NUMBER),
     "max_episode_steps": _or_null(_COUNT),
     "render_fps": _ANYTHING,
     "lanes": _or_null(_COUNT),
-    "num_envs": _or_null(_COUNT),
     "vectorization_mode": _or_null(_TEXT),
     "autoreset_mode": _or_null(_TEXT),
     "render_mode": _or_null(_TEXT),
     "kwargs": {"type": "object"},
     "wrappers": {"type": "array", "items": {"type": "object"}},
     "seed": _ANYTHING,
-    "age_seconds": _SECONDS,
-    "idle_seconds": _SECONDS,
-    "steps": _COUNT,
     "episode_steps": _or_null(_COUNT),
     "needs_reset": _FLAG,
     "monitor": _or_null({"type": "object"}),
-    "watched": _FLAG,
+    "isolated": _FLAG,
 }
 
 _LISTED = _object(
@@ -68,6 +74,7 @@ _LISTED = _object(
 ANSWERS = {
     "env_create": _object({"instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}),
     "env_list_all": _object({"all_envs": {"type": "object", "additionalProperties": _TEXT}}),
+    "instance_list": _object({"instances": {"type": "array", "items": _object(_LINE)}}),
     "env_about": _object(_ABOUT),
     "env_reset": _object({"observation": _ANYTHING, "info": {"type": "object"}}, request=_REQUEST),
     "env_step": _object(
@@ -97,5 +104,7 @@ ANSWERS = {
             "pid": _COUNT,
         }
     ),
+    "env_watch_key": _object({"key": _or_null(_TEXT), "seconds": _or_null(_COUNT)}),
+    "env_watch_state": _object({"number": _or_null(_COUNT), "state": _TEXT}),
     "env_watch_presence": _object({"watched": _FLAG}),
 }

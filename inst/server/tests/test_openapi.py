@@ -3,8 +3,10 @@ import json
 import openapi_spec_validator
 import pytest
 
+from gym_server.answers import ANSWERS
 from gym_server.openapi import document
 from gym_server.routes import ROUTES
+from gym_server.wire import JSON
 
 
 def test_the_document_names_every_route(client):
@@ -31,6 +33,14 @@ def test_the_document_is_made_of_the_fields_that_are_parsed():
 def test_every_route_is_described(route):
     assert route.handler.__doc__
     assert all(field.doc for field in route.fields)
+
+
+@pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.handler.__name__)
+def test_every_answer_in_json_has_a_schema(route):
+    has_none = route.content_type != JSON or not route.answer
+    always_refused, the_document = "upload", "openapi_document"
+    name = route.handler.__name__
+    assert has_none or name in ANSWERS or name in (always_refused, the_document)
 
 
 def test_operation_ids_are_unique():
