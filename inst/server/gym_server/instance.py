@@ -32,8 +32,6 @@ class Instance(Listed):
     instance was being closed raises ``unknown_instance``, or why it was closed.
     """
 
-    _lanes = 1
-
     def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
         """Take over an environment.
 
@@ -237,12 +235,6 @@ class Instance(Listed):
         self.check_lane(lane)
         with self.hold:
             return self._picture(lane)
-
-    def check_lane(self, lane: int) -> None:
-        """Raise ``invalid_parameter`` for a lane that there is not."""
-        if lane >= self._lanes:
-            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
-            raise invalid_parameter("lane", lane, f"{last} for this environment")
 
     def _picture(self, lane: int) -> np.ndarray:
         if self._env.render_mode != "rgb_array":

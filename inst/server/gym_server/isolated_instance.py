@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gym_server.choices import Choices
-from gym_server.errors import GymServerError, invalid_parameter
+from gym_server.errors import GymServerError
 from gym_server.hold import Hold
 from gym_server.listed import Listed
 from gym_server.monitor_directory import MonitorRoot
@@ -59,7 +59,6 @@ class IsolatedInstance(Listed):
         self.screen = Screen(self, None)  # type: ignore[arg-type]
         self._for_eyes = choices.render_mode == "human"
         self._made = time.monotonic()
-        self._lanes = 1
         self._num_envs = choices.num_envs
         self._steps = 0
         self._reserved: tuple[MonitorRoot, Path] | None = None
@@ -145,12 +144,6 @@ class IsolatedInstance(Listed):
         self.check_lane(lane)
         with self.hold:
             return self._worker.move("render", lane).frame
-
-    def check_lane(self, lane: int) -> None:
-        """Raise ``invalid_parameter`` for a lane that there is not."""
-        if lane >= self._lanes:
-            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
-            raise invalid_parameter("lane", lane, f"{last} for this environment")
 
     def draws_on_render_thread(self) -> bool:
         """Tell whether a picture takes the server's render thread."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from gym_server.errors import invalid_parameter
+
 if TYPE_CHECKING:
     from gym_server.choices import Choices
     from gym_server.hold import Hold
@@ -22,6 +24,8 @@ class Listed:
     _choices: Choices
     # None where there are no lanes.
     _num_envs: int | None = None
+    # As many as can be looked at.
+    _lanes = 1
     _made: float
     _steps: int
 
@@ -32,6 +36,12 @@ class Listed:
     def busy_since(self) -> float | None:
         """Since when a call has waited for it, in the clock's seconds, or None."""
         return self.hold.busy_since
+
+    def check_lane(self, lane: int) -> None:
+        """Raise ``invalid_parameter`` for a lane that there is not."""
+        if lane >= self._lanes:
+            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
+            raise invalid_parameter("lane", lane, f"{last} for this environment")
 
     def line(self) -> dict:
         """Return its line in the list."""
