@@ -163,6 +163,20 @@ class RenderThread:
             self._start()
             return True
 
+    def give_up_what_began_before(self, moment: float, why: Exception) -> bool:
+        """Draw the rest on another thread, if this one has been at one thing for too long.
+
+        Args:
+            moment: what has run since before it is given up, in the clock's seconds.
+            why: what is raised where it was asked for.
+
+        Returns:
+            Whether it was so.
+        """
+        job = self._running
+        began = None if job is None else job.began
+        return began is not None and began < moment and self.give_up(job.asker, why)
+
     def stop(self) -> None:
         """Let what is queued finish, and end the thread."""
         with self._lock:

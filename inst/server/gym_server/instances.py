@@ -255,6 +255,10 @@ class Instances:
                 if stuck is not None:
                     answer_for(stuck, why)
                 instance.hold.settle()
+        # What nobody waits for who is looked after: closing what was given up may hang, too.
+        nobodys = call_too_long("Closing an environment", seconds, "the server leaves it alone")
+        if self._renderer.give_up_what_began_before(before - seconds, nobodys):
+            log.warning("%s", nobodys.message)
 
     def _dismiss(self, instance: Instance, seconds: float) -> GymServerError:
         """Take an instance off the list on which a call takes too long; return what to say."""

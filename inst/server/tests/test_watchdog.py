@@ -264,6 +264,35 @@ def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, ev
     assert client.get("/v1/envs/").json["all_envs"] == {}
 
 
+def test_one_that_was_given_up_may_hang_once_more_and_others_are_drawn(quick, monkeypatch):
+    app = quick(max_call_seconds=0.3)
+    closing, released, drawn = threading.Event(), threading.Event(), []
+
+    def close(_):
+        closing.set()
+        released.wait(3 * SOON)
+
+    def draw():
+        client = app.test_client()
+        other = created(client, "faulty_envs:Drawing-v0")
+        client.post(f"{other}/reset/")
+        drawn.append(client.get(f"{other}/render/").status_code)
+
+    monkeypatch.setattr(HangsWhere, "close", close)
+    where = {"where": "reset", "hours": 0.6 / 3600}
+    url = created(app.test_client(), "faulty_envs:HangsWhere-v0", kwargs=where)
+    stuck = threading.Thread(target=lambda: app.test_client().post(f"{url}/reset/"))
+    drawing = threading.Thread(target=draw)
+    stuck.start()
+    assert closing.wait(SOON)
+    drawing.start()
+    drawing.join(SOON)
+    in_time = list(drawn)
+    released.set()
+    stuck.join(SOON)
+    assert in_time == [200]
+
+
 def test_0_seconds_are_for_ever(quick):
     client = quick(max_call_seconds=0, idle_minutes=0.01).test_client()
     url = created(client, kwargs={"seconds": 1.5})
