@@ -74,6 +74,15 @@ test_that("a client never shows its token", {
   expect_identical(readRDS(file)$token(), token_text)
 })
 
+test_that("the report of how things stand does not show the token", {
+  withr::local_envvar(
+    GYM_SERVER_TOKEN = token_text, GYM_SERVER_URL = paste0("http://127.0.0.1:", free_port())
+  )
+  text <- paste(capture.output(expect_hidden(gym_sitrep())), collapse = "\n")
+  expect_match(text, "GYM_SERVER_TOKEN=<token>", fixed = TRUE)
+  expect_false(grepl(token_text, text, fixed = TRUE))
+})
+
 test_that("no error shows the token, also where the call was written with it", {
   server <- local_locked_server()
   errors <- list(
