@@ -53,6 +53,16 @@ test_that("a server's limits say what to do about them", {
                   "gym_rollout")
 })
 
+test_that("an environment that was thrown away is not in the list", {
+  server <- local_server()
+  local({
+    gym_make("CartPole-v1", client = server)
+    NULL
+  })
+  gc()
+  expect_identical(nrow(env_list(server)), 0L)
+})
+
 test_that("an environment that nobody uses is closed, which its calls say, and close() takes", {
   server <- local_server(idle_minutes = 0.01)
   env <- gym_make("CartPole-v1", client = server)
