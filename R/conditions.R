@@ -77,7 +77,7 @@ abort_connection <- function(url, reason, call, reached = TRUE) {
     c(
       paste0("No answer from the server at ", base, "."),
       x = reason,
-      i = if (hangs) hanging_mend(base) else connection_mend(base)
+      i = if (hangs) hanging_mend(base) else connection_mend(base, reason)
     ),
     class = "gym_error_connection",
     url = base,
@@ -97,7 +97,13 @@ hanging_mend <- function(base) {
   )
 }
 
-connection_mend <- function(base) {
+connection_mend <- function(base, reason) {
+  if (grepl("certificate|SSL peer", reason)) {
+    return(paste(
+      "Its certificate is not one that this machine trusts.",
+      "`httr::set_config(httr::config(cainfo = \"FILE\"))` names one that is your own."
+    ))
+  }
   if (!is.null(the_session$servers[[base]])) {
     return(paste(
       "This session started it; `gym_server_log()` has its last words.",

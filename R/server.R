@@ -41,10 +41,10 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  variables <- c(url, Sys.getenv(token_variable))
-  if (!identical(the_session$named_by, variables)) {
+  names <- list(url, Sys.getenv(token_variable), getOption("httr_config"))
+  if (!identical(the_session$named_by, names)) {
     the_session$named_client <- new_client(url, token = variable_token(call))
-    the_session$named_by <- variables
+    the_session$named_by <- names
   }
   the_session$named_client
 }
