@@ -172,6 +172,11 @@ sitrep_server <- function(url, what, mend) {
     return(finding("servers", what, "takes connections but gave no answer in 2 seconds", "wrong",
                    mend))
   }
+  if (isTRUE(probe$status %in% proxy_statuses)) {
+    return(finding("servers", what, paste0(
+      "a proxy, and the server behind it does not answer (status ", probe$status, ")"
+    ), "wrong"))
+  }
   if (!probe$is_gym) {
     called <- if (!is.null(probe$name)) paste0(", it calls itself \"", probe$name, "\"")
     return(finding("servers", what, paste0("no Gym server", called), "wrong",

@@ -102,3 +102,20 @@ test_that("the unit's options are the server's", {
                       env = server_environment())$stdout
   for (option in options) expect_match(help, option, fixed = TRUE)
 })
+
+test_that("a proxy whose server is gone is told from one that is no Gym server", {
+  skip_if_no_nginx()
+  server <- local_locked_server(allow_host = "gym.example.org")
+  proxy <- local_proxy(server)
+  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
+  expect_identical(await_answer(client)$status, "ok")
+  expect_error(
+    env_create(client, "CartPole-v1", kwargs = list(x = strrep("x", 17 * 2^20))), "the proxy",
+    class = "gym_error_http_413"
+  )
+  gym_server_stop(server)
+  expect_error(env_list(client), "behind it does not answer", class = "gym_error_http_502")
+  withr::local_options(httr_config = proxy$config)
+  found <- sitrep_server(proxy$url, "server", NULL)
+  expect_match(found$finding, "behind it does not answer")
+})
