@@ -196,8 +196,8 @@ test_that("neither a function's source nor a list in a call shows a token", {
   call <- without_tokens(parse(text = text, keep.source = TRUE)[[1L]])
   expect_identical(deparse(call), "f(function(x) g(x, \"<token>\"), 1)")
   expect_hidden(call)
-  wrapped <- "tryCatch((function() create_GymClient('a', token = 'correct-horse-battery-staple'))())"
-  error <- expect_error(eval(parse(text = wrapped, keep.source = TRUE)),
+  written <- "(function() create_GymClient('a', token = 'correct-horse-battery-staple'))()"
+  error <- expect_error(eval(parse(text = written, keep.source = TRUE)),
                         class = "gym_error_argument")
   expect_hidden(error)
   expect_hidden(error$trace$call)
