@@ -24,7 +24,8 @@
 #'   10 seconds of it.
 #' @param config Further settings for the connection, made with httr:
 #'   [httr::authenticate()], [httr::add_headers()], [httr::use_proxy()] or
-#'   several of them joined by [c()].
+#'   several of them joined by [c()]. What [httr::set_config()] has set by then for the
+#'   whole session holds, too.
 #' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
 #'   default is what the environment variable `GYM_SERVER_TOKEN` holds, so that no script has
 #'   to. It is sent with each call, to this server only, and nothing that is printed and no
@@ -75,7 +76,8 @@ new_client <- function(remote_base, timeout = 60, config = httr::config(), token
     list(
       remote_base = sub("/+$", "", remote_base),
       timeout = timeout,
-      config = config,
+      # As for httr's own verbs.
+      config = c(getOption("httr_config", httr::config()), config),
       token = token,
       state = new.env(parent = emptyenv())
     ),

@@ -16,12 +16,12 @@ abort_http <- function(response, method, call) {
   problem <- response$answer
   request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
-  hint <- extra_hint(problem$extra, request) %||% token_hint(problem$code) %||% problem$hint
+  hint <- extra_hint(problem$extra, request) %||% token_hint(problem$code) %||%
+    in_r(problem$hint)
   gym_abort(
     c(
-      sentence(problem$message %||% "The answer is not what a Gym server sends"),
+      if (is.null(problem$message)) stranger_words(response) else sentence(problem$message),
       i = sentence(hint),
-      i = if (is.null(problem$message)) stranger_hint(response$url, server_name(response)),
       " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
     ),
     class = c(
@@ -41,6 +41,11 @@ token_hint <- function(code) {
     paste0("`create_GymClient(token = )` takes the server's token, and so does the environment ",
            "variable ", token_variable)
   }
+}
+
+# The server speaks to users of every language.
+in_r <- function(hint) {
+  if (!is.null(hint)) sub("GET /v1/instances/", "`env_list()`", hint, fixed = TRUE)
 }
 
 # What is missing on a server that runs from what gym_server_install() made is installed by
@@ -77,7 +82,7 @@ abort_connection <- function(url, reason, call, reached = TRUE) {
     c(
       paste0("No answer from the server at ", base, "."),
       x = reason,
-      i = if (hangs) hanging_mend(base) else connection_mend(base)
+      i = if (hangs) hanging_mend(base) else connection_mend(base, reason)
     ),
     class = "gym_error_connection",
     url = base,
@@ -97,7 +102,13 @@ hanging_mend <- function(base) {
   )
 }
 
-connection_mend <- function(base) {
+connection_mend <- function(base, reason) {
+  if (grepl("certificate|SSL peer", reason)) {
+    return(paste(
+      "Its certificate is not one that this machine trusts.",
+      "`httr::set_config(httr::config(cainfo = \"FILE\"))` names one that is your own."
+    ))
+  }
   if (!is.null(the_session$servers[[base]])) {
     return(paste(
       "This session started it; `gym_server_log()` has its last words.",

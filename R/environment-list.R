@@ -19,6 +19,7 @@
 #' env$close()
 env_list <- function(x = gym_client()) {
   check_client(x)
+  close_abandoned(x)
   instances <- get_answer(x, "/v1/instances/")$instances
   column <- function(name, missing) {
     vapply(instances, function(instance) instance[[name]] %||% missing, missing)

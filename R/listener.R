@@ -31,7 +31,7 @@ start_call <- function(place) {
 #'   but does not answer in time listens nevertheless.
 #' @param token For a server that is known to be ours; a stranger is shown none.
 #' @return A list of `listens`, `is_gym` and `asks_token` (it wants another token, or one; all
-#'   three are logical), `name` (what the program calls
+#'   three are logical), `status` (of the answer), `name` (what the program calls
 #'   itself, a string or `NULL`), `instances` (how many a Gym server has) and `problem` (why
 #'   there is no answer, a string or `NULL`).
 #' @noRd
@@ -51,6 +51,7 @@ probe_server <- function(base, timeout, token = NULL) {
   list(
     listens = !is.null(response) || times[["connect"]] > 0,
     is_gym = !is.null(envs) || asks_token,
+    status = response$status_code,
     asks_token = asks_token,
     name = if (!is.null(response)) server_name(response),
     instances = length(envs),
@@ -65,6 +66,23 @@ server_name <- function(response) {
     headers <- curl::parse_headers_list(headers)
   }
   headers[["server"]]
+}
+
+# By which a proxy says that the server behind it gave it no answer.
+proxy_statuses <- 502:504
+
+# What to say of a refusal that no Gym server wrote.
+stranger_words <- function(response) {
+  if (response$status_code %in% proxy_statuses) {
+    c("There is a proxy at this address, and the server behind it does not answer.",
+      i = "It may be starting anew. If that lasts, its operator should know.")
+  } else if (response$status_code == 413L) {
+    c("The request is larger than the proxy at this address takes.",
+      i = "Its operator sets that limit, in nginx `client_max_body_size`.")
+  } else {
+    c("The answer is not what a Gym server sends.",
+      i = stranger_hint(response$url, server_name(response)))
+  }
 }
 
 #' Say what a program that is no Gym server may be, and what helps

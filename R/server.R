@@ -41,10 +41,10 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  variables <- c(url, Sys.getenv(token_variable))
-  if (!identical(the_session$named_by, variables)) {
+  names <- list(url, Sys.getenv(token_variable), getOption("httr_config"))
+  if (!identical(the_session$named_by, names)) {
     the_session$named_client <- new_client(url, token = variable_token(call))
-    the_session$named_by <- variables
+    the_session$named_by <- names
   }
   the_session$named_client
 }
@@ -86,6 +86,8 @@ is_running <- function(base) {
 #'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
 #'   0 for never). `token_file = "token"` names a file with a token of 16
 #'   characters or more, which every call must then carry; the client that is returned does.
+#'   What else a server for a group takes (`isolate`, `max_worker_mb`, `allow_host`, `allow_path`,
+#'   `no_auth`, `no_shutdown`) is told by `vignette("server", package = "gym")`.
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own words: no

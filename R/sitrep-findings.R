@@ -31,18 +31,20 @@ sitrep_suggested <- function(packages = suggested_packages) {
   )
 }
 
+# The report is for other people's eyes.
 sitrep_variables <- function(variables) {
   texts <- if (length(variables)) {
-    paste0(names(variables), "=", without_password(variables), collapse = ", ")
+    values <- ifelse(names(variables) == token_variable, "<token>", without_password(variables))
+    paste0(names(variables), "=", values, collapse = ", ")
   }
   finding("R", "variables", texts %||% "none of the package's is set")
 }
 
-# `python_runs`: whether any of the Pythons can run the server.
-sitrep_environment <- function(python_runs) {
+# `needed`: whether the session cannot do without.
+sitrep_environment <- function(needed) {
   server <- installed_server()
   folders <- install_folders()
-  row <- function(text, wrong = !python_runs) {
+  row <- function(text, wrong = needed) {
     finding("Python", "environment", text, if (wrong) "wrong" else "note",
             if (wrong) "gym_server_install()" else NA_character_)
   }
@@ -139,7 +141,11 @@ sitrep_own_servers <- function() {
     }
   })
   do.call(rbind, unname(rows)) %||%
-    finding("servers", "this session's", "none yet, gym_client() starts one")
+    finding("servers", "this session's", if (nzchar(Sys.getenv("GYM_SERVER_URL"))) {
+      "none, gym_client() uses GYM_SERVER_URL"
+    } else {
+      "none yet, gym_client() starts one"
+    })
 }
 
 sitrep_named_server <- function(url) {
@@ -165,6 +171,11 @@ sitrep_server <- function(url, what, mend) {
   if (!is.null(probe$problem)) {
     return(finding("servers", what, "takes connections but gave no answer in 2 seconds", "wrong",
                    mend))
+  }
+  if (isTRUE(probe$status %in% proxy_statuses)) {
+    return(finding("servers", what, paste0(
+      "a proxy, and the server behind it does not answer (status ", probe$status, ")"
+    ), "wrong"))
   }
   if (!probe$is_gym) {
     called <- if (!is.null(probe$name)) paste0(", it calls itself \"", probe$name, "\"")

@@ -15,7 +15,7 @@
 #'     \item{state}{`"ok"`; `"note"` for what may well be so; `"wrong"`.}
 #'     \item{mend}{The call that helps, a string, or `NA`.}
 #'   }
-#'   Passwords in addresses are left out.
+#'   The token and passwords in addresses are left out.
 #' @seealso [gym_server_install()], [gym_server_log()]
 #' @export
 #' @examples
@@ -31,16 +31,17 @@ sitrep_findings <- function() {
   variables <- Sys.getenv()
   variables <- variables[grepl("^GYM_", names(variables)) & nzchar(variables)]
   pythons <- tryCatch(try_pythons(python_candidates()), error = identity)
+  url <- Sys.getenv("GYM_SERVER_URL")
   python_runs <- is.data.frame(pythons) && any(pythons$runs, na.rm = TRUE)
   rbind(
     attempt_rows("R", "versions", sitrep_versions()),
     attempt_rows("R", "suggested packages", sitrep_suggested()),
     attempt_rows("R", "variables", sitrep_variables(variables)),
-    attempt_rows("Python", "environment", sitrep_environment(python_runs)),
+    attempt_rows("Python", "environment", sitrep_environment(!python_runs && !nzchar(url))),
     attempt_rows("Python", "uv", sitrep_uv()),
     attempt_rows("Python", "Pythons", sitrep_pythons(pythons)),
     attempt_rows("servers", "this session's", sitrep_own_servers()),
-    attempt_rows("servers", "GYM_SERVER_URL", sitrep_named_server(Sys.getenv("GYM_SERVER_URL")))
+    attempt_rows("servers", "GYM_SERVER_URL", sitrep_named_server(url))
   )
 }
 

@@ -83,19 +83,35 @@ hide_token <- function(token) {
 #' @return It, with `"<token>"` in place of each text that is or holds one.
 #' @noRd
 without_tokens <- function(x) {
-  if (is.character(x)) {
+  if (!length(the_session$hidden)) {
+    x
+  } else if (is.character(x)) {
     x[is_token_text(x)] <- "<token>"
-  } else if (is_written(x)) {
-    # An argument may be missing, as in x[1, ].
-    for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
-      x[[i]] <- without_tokens(x[[i]])
-    }
+    x
+  } else if (is.call(x) || is.pairlist(x)) {
+    without_tokens_in_parts(x)
+  } else if (is.list(x) && !is.object(x)) {
+    # Data that do.call() has put there may be large.
+    rapply(x, without_tokens, classes = c("character", "call"), how = "replace")
+  } else {
+    x
+  }
+}
+
+without_tokens_in_parts <- function(x) {
+  # With options(keep.source = TRUE) there is the source, too, with all that was written there.
+  for (source in c("srcref", "srcfile", "wholeSrcref")) {
+    attr(x, source) <- NULL
+  }
+  if (is.call(x) && identical(x[[1L]], quote(`function`))) {
+    x <- x[1:3]
+  }
+  # An argument may be missing, as in x[1, ].
+  for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
+    x[[i]] <- without_tokens(x[[i]])
   }
   x
 }
-
-# What may hold texts that a script wrote.
-is_written <- function(x) is.call(x) || is.pairlist(x) || is.list(x) && !is.object(x)
 
 is_token_text <- function(texts) {
   found <- texts %in% the_session$hidden

@@ -362,3 +362,16 @@ test_that("calls leave R's generator alone", {
   env_action_space_sample(env$client, env$instance_id)
   expect_identical(.Random.seed, before)
 })
+
+test_that("what httr's set_config() says holds for clients, too, and their own goes before", {
+  withr::local_options(httr_config = httr::config(cainfo = "group.pem", proxy = "a.example.org"))
+  expect_identical(create_GymClient("http://a")$config$options$cainfo, "group.pem")
+  own <- create_GymClient("http://a", config = httr::config(cainfo = "own.pem"))
+  expect_identical(own$config$options$cainfo, "own.pem")
+  expect_identical(own$config$options$proxy, "a.example.org")
+  expect_s3_class(own$config, "request")
+  withr::local_envvar(GYM_SERVER_URL = "http://a")
+  expect_identical(gym_client()$config$options$cainfo, "group.pem")
+  options(httr_config = NULL)
+  expect_null(gym_client()$config$options$cainfo)
+})

@@ -47,10 +47,21 @@ test_that("a server's limits say what to do about them", {
   error <- expect_error(gym_make("CartPole-v1", client = server), "max-instances",
                         class = "gym_error_http_429")
   expect_identical(error$code, "too_many_instances")
+  expect_match(conditionMessage(error), "env_list()", fixed = TRUE)
   # Lanes for a rollout are taken where there is room for them only.
   env$close()
   expect_s3_class(rollout("CartPole-v1", policy_random(), episodes = 2, client = server),
                   "gym_rollout")
+})
+
+test_that("an environment that was thrown away is not in the list", {
+  server <- local_server()
+  local({
+    gym_make("CartPole-v1", client = server)
+    NULL
+  })
+  gc()
+  expect_identical(nrow(env_list(server)), 0L)
 })
 
 test_that("an environment that nobody uses is closed, which its calls say, and close() takes", {

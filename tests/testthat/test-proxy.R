@@ -20,7 +20,10 @@ test_that("by nginx and TLS a client plays as it does without", {
                class = "gym_error_connection")
   unsure <- httr::config(resolve = proxy$config$options$resolve)
   expect_error(env_list_all(create_GymClient(proxy$url, config = unsure, token = token_text)),
-               "certificate", class = "gym_error_connection")
+               "set_config", class = "gym_error_connection")
+  withr::with_options(list(httr_config = proxy$config), {
+    expect_length(env_list_all(create_GymClient(proxy$url, token = token_text)), 0)
+  })
   expect_error(env_list_all(create_GymClient(proxy$url, config = proxy$config, token = NULL)),
                class = "gym_error_http_401")
   from <- function(origin) {
@@ -98,4 +101,21 @@ test_that("the unit's options are the server's", {
   help <- run_quietly(working_python(), c("-m", "gym_server", "--help"),
                       env = server_environment())$stdout
   for (option in options) expect_match(help, option, fixed = TRUE)
+})
+
+test_that("a proxy whose server is gone is told from one that is no Gym server", {
+  skip_if_no_nginx()
+  server <- local_locked_server(allow_host = "gym.example.org")
+  proxy <- local_proxy(server)
+  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
+  expect_identical(await_answer(client)$status, "ok")
+  expect_error(
+    env_create(client, "CartPole-v1", kwargs = list(x = strrep("x", 17 * 2^20))), "the proxy",
+    class = "gym_error_http_413"
+  )
+  gym_server_stop(server)
+  expect_error(env_list(client), "behind it does not answer", class = "gym_error_http_502")
+  withr::local_options(httr_config = proxy$config)
+  found <- sitrep_server(proxy$url, "server", NULL)
+  expect_match(found$finding, "behind it does not answer")
 })

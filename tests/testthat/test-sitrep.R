@@ -43,6 +43,15 @@ test_that("without a Python the report names the call that mends it", {
   expect_match(seen$text, "1 thing is wrong", fixed = TRUE)
 })
 
+test_that("whoever plays on another machine needs no Python", {
+  url <- test_client()$remote_base
+  report(runs = FALSE, reason = "No module named 'flask'")
+  withr::local_envvar(GYM_SERVER_URL = url)
+  seen <- sitrep()
+  expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
+  expect_match(seen$text, "none, gym_client() uses GYM_SERVER_URL", fixed = TRUE)
+})
+
 test_that("a Python that GYM_PYTHON names and that cannot run the server is wrong", {
   report(runs = FALSE, reason = "Python 3.10 or newer is needed")
   withr::local_envvar(GYM_PYTHON = "/some/python3")

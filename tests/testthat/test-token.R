@@ -74,6 +74,15 @@ test_that("a client never shows its token", {
   expect_identical(readRDS(file)$token(), token_text)
 })
 
+test_that("the report of how things stand does not show the token", {
+  withr::local_envvar(
+    GYM_SERVER_TOKEN = token_text, GYM_SERVER_URL = paste0("http://127.0.0.1:", free_port())
+  )
+  text <- paste(capture.output(expect_hidden(gym_sitrep())), collapse = "\n")
+  expect_match(text, "GYM_SERVER_TOKEN=<token>", fixed = TRUE)
+  expect_false(grepl(token_text, text, fixed = TRUE))
+})
+
 test_that("no error shows the token, also where the call was written with it", {
   server <- local_locked_server()
   errors <- list(
@@ -179,4 +188,23 @@ test_that("calls without tokens are kept as they are", {
   expect_identical(
     without_tokens(call), quote(f(x[1, ], "a", b = function(y, z = "<token>") NULL))
   )
+})
+
+test_that("neither a function's source nor a list in a call shows a token", {
+  local_session(hidden = token_text)
+  text <- "f(function(x) g(x, 'correct-horse-battery-staple'), 1)"
+  call <- without_tokens(parse(text = text, keep.source = TRUE)[[1L]])
+  expect_identical(deparse(call), "f(function(x) g(x, \"<token>\"), 1)")
+  expect_hidden(call)
+  written <- "(function() create_GymClient('a', token = 'correct-horse-battery-staple'))()"
+  error <- expect_error(eval(parse(text = written, keep.source = TRUE)),
+                        class = "gym_error_argument")
+  expect_hidden(error)
+  expect_hidden(error$trace$call)
+  call <- as.call(list(quote(f), list(1, list(token_text, data.frame(a = token_text)))))
+  expect_identical(
+    without_tokens(call)[[2L]], list(1, list("<token>", data.frame(a = "<token>")))
+  )
+  local_session(hidden = character())
+  expect_identical(without_tokens(call), call)
 })

@@ -156,6 +156,15 @@ def environment_died(how: str, doing: str, hint: str | None = None) -> GymServer
     )
 
 
+def body_too_large() -> GymServerError:
+    """More was sent than the operator allows."""
+    return GymServerError(
+        "body_too_large",
+        "The request's body is larger than this server takes",
+        "the server's option --max-body-mb sets the limit",
+    )
+
+
 def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
     """Turn any exception into a status and the body of the answer.
 
@@ -197,10 +206,6 @@ def _from_http(error: HTTPException) -> GymServerError:
                 "method_not_allowed", "This URL does not take that method", f"use {allowed}"
             )
         case 413:
-            return GymServerError(
-                "body_too_large",
-                "The request's body is larger than this server takes",
-                "the server's option --max-body-mb sets the limit",
-            )
+            return body_too_large()
         case _:
             return GymServerError("malformed_json", f"The request cannot be read: {error}")

@@ -10,7 +10,7 @@ from urllib.parse import unquote_to_bytes
 
 from httptools import HttpParserError, HttpParserUpgrade, HttpRequestParser, parse_url
 
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, body_too_large
 
 _LARGEST_HEAD_BYTES = 2**16
 
@@ -190,9 +190,7 @@ class Reader:
     def _check_size(self, size: int) -> None:
         if size > self._max_body_bytes:
             self._request.body.clear()
-            self._request.refusal = GymServerError(
-                "body_too_large", "The request's body is larger than this server takes"
-            )
+            self._request.refusal = body_too_large()
         elif size > _UNASKED_BYTES and not self._request.asked:
             self._request.asked = True
             self._request.refusal = self._why_not(self._request)

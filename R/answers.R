@@ -1,0 +1,81 @@
+# What an answer says.
+
+#' Read an answer or raise its error
+#' @param response What [send()] returned.
+#' @return The parsed answer, `NULL` for an empty one.
+#' @noRd
+read_answer <- function(response, method, call = rlang::caller_env()) {
+  answer <- response$answer
+  check_echo(response, answer, call)
+  if (response$status_code >= 400L) {
+    abort_http(response, method, call)
+  }
+  if (response$status_code != 204L && is.null(answer)) {
+    abort_no_answer(response, call)
+  }
+  answer
+}
+
+# An answer as a list; NULL for an empty one, an error for what is none.
+parsed_body <- function(response, layouts = NULL, request = NULL) {
+  if (response$status_code == 204L) {
+    NULL
+  } else if (identical(response$type, tensors_type)) {
+    tensors_answer(response$content, layouts, request)
+  } else if (identical(response$type, "image/png")) {
+    list(png = response$content)
+  } else {
+    answer <- from_json(rawToChar(response$content))
+    if (is.list(answer)) answer
+  }
+}
+
+# An answer to another call would be worse than none.
+check_echo <- function(response, answer, call) {
+  sent <- response$request
+  if (is.null(sent)) {
+    return()
+  }
+  echo <- if (response$status_code == 204L) echo_in_header(response) else answer$request
+  if (!is.null(echo) && !(echo$number == sent$number && identical(echo$key, sent$key))) {
+    abort_connection(response$url, "The answer that came belongs to another call.", call)
+  }
+}
+
+echo_in_header <- function(response) {
+  echo <- curl::parse_headers_list(response$headers)[["gym-request"]]
+  if (!is.null(echo)) {
+    parts <- strsplit(echo, " ", fixed = TRUE)[[1L]]
+    list(key = parts[[1L]], number = as.numeric(parts[[2L]]))
+  }
+}
+
+# An answer of tensors has the fields of the JSON answer that it stands for, and
+# beside them the tensors and the texts by their names.
+tensors_answer <- function(bytes, layouts, request = NULL) {
+  file <- read_tensors(bytes, layouts, if (!is.null(request)) bare_metadata(request))
+  if (is.null(file$metadata)) {
+    return(list(tensors = file$tensors, info = empty_object, request = request))
+  }
+  field <- function(name) {
+    text <- file$metadata[[name]]
+    if (!is.null(text)) from_json(text)
+  }
+  list(
+    tensors = file$tensors,
+    texts = field("texts"),
+    info = if (identical(file$metadata$info, "{}")) empty_object else field("info"),
+    final_lanes = field("final_lanes"),
+    request = field("request")
+  )
+}
+
+# The metadata of an answer that echoes the request and has an empty info.
+bare_metadata <- function(request) {
+  sprintf(
+    '{"info":"{}","request":"{\\"key\\":\\"%s\\",\\"number\\":%.0f}"}}',
+    request$key, request$number
+  )
+}
+
+empty_object <- structure(list(), names = character())
