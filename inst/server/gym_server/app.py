@@ -106,7 +106,7 @@ class GymApp(Flask):
             Watchers(config.limits.max_watchers),
             watch_keys if config.access.token is not None else None,
         )
-        exactly_once: ExactlyOnce[Answer] = ExactlyOnce()
+        exactly_once: ExactlyOnce[Answer] = ExactlyOnce(size=_kept_bytes)
         self._exactly_once = exactly_once
         self._hot_handlers: dict[str, _Handler] = {}
         for route in ROUTES:
@@ -245,6 +245,11 @@ class _Handler:
 def _fingerprint(body: bytes) -> bytes:
     """Return what a repetition is known by: a digest where the body is too long to keep."""
     return body if len(body) <= _KEPT_BYTES else blake2b(body).digest()
+
+
+def _kept_bytes(content: tuple, answer: Answer) -> int:
+    """Tell how much is kept of a request, as ``_Handler`` describes it, and of its answer."""
+    return len(content[1]) + len(answer.body)
 
 
 def _prefers_tensors(accept: str, content_type: str) -> bool:

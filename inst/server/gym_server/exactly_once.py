@@ -41,16 +41,26 @@ class _Latest(Generic[AnswerT]):
 class ExactlyOnce(Generic[AnswerT]):
     """The last answer of each key."""
 
-    def __init__(self, forget_after: float = 15 * 60, most: int = 10_000) -> None:
+    def __init__(
+        self,
+        forget_after: float = 15 * 60,
+        most: int = 10_000,
+        size: Callable[[Hashable, AnswerT], int] = lambda content, answer: 0,
+        most_bytes: int = 2**29,
+    ) -> None:
         """Start with no keys.
 
         Args:
             forget_after: seconds of idleness after which a key is dropped by ``forget()``, and
                 when another comes.
             most: how many keys are kept; the one that was used last goes last.
+            size: tells how many bytes are kept of a request and its answer.
+            most_bytes: to how many ``forget()`` brings them down.
         """
         self._forget_after = forget_after
         self._most = most
+        self._size = size
+        self._most_bytes = most_bytes
         self._lock = threading.Lock()
         self._keys: dict[str, _Latest[AnswerT]] = {}
 
@@ -132,9 +142,20 @@ class ExactlyOnce(Generic[AnswerT]):
             return latest
 
     def forget(self) -> None:
-        """Drop the keys that have been idle for so long that nothing is repeated any more."""
+        """Drop the keys that have been idle for so long that nothing is repeated any more.
+
+        And more, the one that was used last goes last, where all together hold too much.
+        """
         with self._lock:
             self._forget_before(time.monotonic() - self._forget_after)
+            idle = self._idle()
+            sizes = [self._size(latest.content, latest.answer) for _, latest in idle]
+            excess = sum(sizes) - self._most_bytes
+            for (key, _), size in zip(idle, sizes, strict=True):
+                if excess <= 0:
+                    break
+                del self._keys[key]
+                excess -= size
 
     def _forget_before(self, oldest: float) -> None:
         for key, latest in list(self._keys.items()):
@@ -143,10 +164,17 @@ class ExactlyOnce(Generic[AnswerT]):
 
     def _forget_oldest(self) -> None:
         # A tenth at once: a look at all of them for each new one would take too long.
-        idle = [item for item in self._keys.items() if not item[1].lock.locked()]
-        idle.sort(key=lambda item: item[1].used)
-        for key, _ in idle[: max(1, self._most // 10)]:
+        for key, _ in self._idle()[: max(1, self._most // 10)]:
             del self._keys[key]
+
+    def _idle(self) -> list[tuple[str, _Latest[AnswerT]]]:
+        """Return the keys that have an answer, the one that was used last at the end."""
+        idle = [
+            item
+            for item in self._keys.items()
+            if not item[1].lock.locked() and item[1].answer is not None
+        ]
+        return sorted(idle, key=lambda item: item[1].used)
 
 
 def _conflict(request_id: RequestId, reason: str) -> GymServerError:

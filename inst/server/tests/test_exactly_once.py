@@ -157,3 +157,14 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     # What came too late is nobody's answer.
     assert once.answer(RequestId("a", 2), "step", act) == 1
     assert once.give_up(thread.ident, str) is None
+
+
+def test_what_all_keep_together_is_bounded():
+    once = ExactlyOnce(size=lambda content, answer: len(content) + answer, most_bytes=250)
+    for number, key in enumerate("abc"):
+        once.answer(RequestId(key, 1), "x" * 10, lambda: 90)
+        assert number < 2 or once.answer(RequestId("a", 1), "x" * 10, Counter()) == 90
+    once.forget()
+    # The one that was used longest ago is done anew.
+    act = Counter()
+    assert [once.answer(RequestId(key, 1), "x" * 10, act) for key in "acb"] == [90, 90, 1]

@@ -189,9 +189,9 @@ def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
 
 def test_what_is_slow_but_not_too_slow_delays_nobody(serve):
     server = serve()
-    slow = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 3})
+    slow = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 5})
     drawing = server.create(
-        "faulty_envs:HangsWhere-v0", kwargs={"where": "render", "hours": 3 / 3600}
+        "faulty_envs:HangsWhere-v0", kwargs={"where": "render", "hours": 5 / 3600}
     )
     other = server.create("CartPole-v1")
     for url in (slow, drawing):
