@@ -130,8 +130,13 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
     "  gym_make('odd_environments:SlowToMake-v0', client = server)",
     "}, interrupt = function(cnd) 'interrupted')",
     "cat(said, length(ls(gym:::the_session$made)), '')",
-    "Sys.sleep(2)",
-    "cat(length(env_list_all(server)), length(ls(gym:::the_session$made)))"
+    # It is not made yet when it is first asked for.
+    "for (i in 1:20) {",
+    "  Sys.sleep(2)",
+    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$made)))",
+    "  if (!any(left)) break",
+    "}",
+    "cat(left)"
   )
   expect_identical(run$stdout, "interrupted 1 0 0")
   # And at the session's end, of one that is long made by then.
