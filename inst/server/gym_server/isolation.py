@@ -20,7 +20,9 @@ steps of 1,024 lanes a second from R   235,000         203,000 (14.5 % lost)
 =====================================  ==============  =====================  ================
 
 (Rates: medians of 60 interleaved rounds of 300 and 60 calls, and of the ratios of their pairs;
-four more such runs, each beside other work on both cores, lost 24 to 40 % and 13 to 23 %.)
+six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the lanes'. Waking another
+process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a step does so
+twice; with an environment that takes its time itself the share is smaller.)
 """
 
 from __future__ import annotations
