@@ -217,15 +217,14 @@ def _video_callable(value: object) -> int:
 
 
 # Whatever can be seen on a line of its own, and does not turn the direction of the others.
-_NAME = (
-    "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069"
-    "\\ud800-\\udfff\\ufeff]*$"
-)
+_NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
 _LONGEST_NAME = 100
 
 
 def _name(value: object) -> str:
     value = text(value)
+    # Half a character is none, and many readers of patterns cannot say so.
+    value.encode()
     if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
         raise ValueError
     return value
