@@ -185,14 +185,14 @@ finished_search <- function(saved, settings, client, path) {
 
 # Writing --------------------------------------------------------------------------
 
-# So that writing takes a tenth of the time at most.
+# So that writing takes a tenth of the time at most, where a block is a single episode.
 rest_per_writing <- 9
 
 #' Keep a search in its file from now on
 #'
 #' After each block of episodes the file is written anew. What it holds grows, and where a
-#' block is a single short episode, writing would take longer than playing: then some blocks
-#' pass without, and would be played again.
+#' block is a single episode, writing might take longer than playing: then some blocks pass
+#' without, and would be played again.
 #' @param record As [new_rounds()] returns it.
 #' @param started When the search began, less what it took before.
 #' @noRd
@@ -218,7 +218,7 @@ keep_rounds <- function(record, checkpoint, lanes, settings, started, call) {
   failed <- FALSE
   record$after_block <- function(record) {
     began <- proc.time()[["elapsed"]]
-    if (began < rest_until && record$begun < record$wanted) {
+    if (lanes$block == 1L && began < rest_until && record$begun < record$wanted) {
       return()
     }
     tryCatch(

@@ -41,8 +41,8 @@
 #' # To go on after a kill
 #'
 #' With a `checkpoint` the search keeps what it has played in a file, after each block of
-#' episodes (where a block is over in milliseconds, as with a single environment made by
-#' [gym_make()], as often as takes a tenth of the time at most). The file is replaced by a
+#' episodes (with a single environment made by [gym_make()], where a block is one episode and
+#' may be over in milliseconds, as often as takes a tenth of the time at most). The file is replaced by a
 #' rename, so that it is whole whenever R, the server or the machine's queue ends the search.
 #' The same call then goes on where the file has it, and comes to the result that an
 #' undisturbed search comes to, the generator's state afterwards included: in a script that

@@ -314,3 +314,16 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   half <- local_checkpoint(kept$list[[5]])
   expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
+
+test_that("with lanes each block is kept, however long writing takes", {
+  written <- function(env) {
+    kept <- local_kept_files()
+    local_functions(rest_per_writing = 1e6)
+    quiet_search(env, rounds = 6, episodes = 4, target = Inf, seed = 1,
+                 checkpoint = local_checkpoint())
+    length(kept$list)
+  }
+  # One before the first block.
+  expect_identical(written(fake_lanes(8, "sync", reward = first_action)), 4L)
+  expect_lt(written(fake_environment(reward = first_action)), 25L)
+})
