@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flask import Flask, Response, request
-from werkzeug.datastructures import MIMEAccept
+from werkzeug.datastructures import MIMEAccept, MultiDict
 from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 
@@ -186,7 +186,7 @@ class _Request(NamedTuple):
     method: str
     path: str
     variables: dict[str, str]
-    query: dict[str, str]
+    query: dict[str, str | list[str]]
     body: bytes
     content_type: str
     accept: str
@@ -270,7 +270,7 @@ def _view(handler: _Handler) -> Callable[..., Response]:
                 request.method,
                 request.path,
                 variables,
-                request.args.to_dict(),
+                _query(request.args),
                 request.get_data(cache=False),
                 request.environ.get("CONTENT_TYPE", ""),
                 request.environ.get("HTTP_ACCEPT", ""),
@@ -298,6 +298,11 @@ def _turn_away(refusal: GymServerError, environ: dict) -> Answer:
 
 def _refuse_to_stop() -> None:
     raise shutdown_disabled()
+
+
+def _query(args: MultiDict) -> dict[str, str | list[str]]:
+    """Return a query's fields; one that was given several times is a list, which no field takes."""
+    return {name: values[0] if len(values) == 1 else values for name, values in args.lists()}
 
 
 def _failure(error: Exception, request_id: RequestId | None) -> Answer:

@@ -166,3 +166,16 @@ def test_resets_and_steps_are_answered_alike_with_and_without_flask_dispatch(
     monkeypatch.setattr("gym_server.app._HOT", re.compile("nothing"))
     client.post(f"{url}/reset/", json={"seed": 0})
     assert list(answers("k2")) == short
+
+
+def test_a_field_of_a_query_is_given_once(client, create):
+    url = create()
+    client.post(f"{url}/reset/", json={})
+    for path in (
+        f"{url}/watch/state/?lane=&lane=7",
+        f"{url}/render/?lane=0&lane=0",
+        "/v1/registry/?search=Cart&search=Pole",
+    ):
+        refusal = client.get(path)
+        assert (refusal.status_code, refusal.json["code"]) == (400, "invalid_parameter")
+    assert client.get(f"{url}/render/?lane=0&unknown=1&unknown=2").status_code == 200
