@@ -42,9 +42,9 @@
 #'
 #' With a `checkpoint` the search keeps what it has played in a file, after each block of
 #' episodes (with a single environment made by [gym_make()], where a block is one episode and
-#' may be over in milliseconds, as often as takes a tenth of the time at most). The file is replaced by a
-#' rename, so that it is whole whenever R, the server or the machine's queue ends the search.
-#' The same call then goes on where the file has it, and comes to the result that an
+#' may be over in milliseconds, as often as takes a tenth of the time at most). The file is
+#' replaced by a rename, so that it is whole whenever R, the server or the machine's queue ends
+#' the search. The same call then goes on where the file has it, and comes to the result that an
 #' undisturbed search comes to, the generator's state afterwards included: in a script that
 #' is submitted to a cluster again and again, that one line is enough. The block that was under
 #' way is played again. `elapsed` adds up.
