@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 # Longer than it takes to send a short answer to somebody who does not read.
-_SETTLED_SECONDS = 5.0
+SETTLED_SECONDS = 5.0
 
 
 class Hold:
@@ -134,7 +134,7 @@ class Hold:
         if error is not self.why:
             self._instance.clear_away()
         # Else the answer that is given on its behalf might go to its next request.
-        self._settled.wait(_SETTLED_SECONDS)
+        self._settled.wait(SETTLED_SECONDS)
         raise self.gone()
 
     def _refuse(self) -> None:

@@ -57,9 +57,6 @@ class Instance(Listed):
         self._steps = 0
         self._tally = self._make_tally()
         self._observation: object = None
-        # How often the environment has begun to move, and who wants to hear of the next time.
-        self.moves = 0
-        self.on_move: Callable[[], None] | None = None
         self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
         self._for_eyes = choices.render_mode == "human"
         self._made = self.hold.used
@@ -195,10 +192,7 @@ class Instance(Listed):
         }
 
     def _move(self, move: Callable, *args: object) -> tuple:
-        self.moves += 1
-        if self.on_move is not None:
-            call, self.on_move = self.on_move, None
-            call()
+        self._tell_of_move()
         if self.draws_when_stepped:
             return self.renderer.run(move, *args)
         return move(*args)

@@ -16,6 +16,7 @@ from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.frames import RenderThread
+from gym_server.hold import SETTLED_SECONDS
 from gym_server.instance import Instance
 from gym_server.isolated_instance import IsolatedInstance
 from gym_server.isolation import Isolation
@@ -23,9 +24,6 @@ from gym_server.limits import Limits
 from gym_server.making import make
 
 log = logging.getLogger(__name__)
-
-# As in hold.py.
-_SETTLED_SECONDS = 5.0
 
 
 @dataclass
@@ -141,7 +139,7 @@ class Instances:
             if self._creating.pop(thread, None) is None:
                 # Given up. Else the answer that is given on its behalf might go to its next
                 # request.
-                making.settled.wait(_SETTLED_SECONDS)
+                making.settled.wait(SETTLED_SECONDS)
             raise
 
     def _make(self, choices: Choices, _: _Making, undo: contextlib.ExitStack) -> Instance:

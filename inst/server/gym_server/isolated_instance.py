@@ -54,8 +54,6 @@ class IsolatedInstance(Listed):
         self._choices = choices
         self._on_end = on_end
         self.hold = Hold(self)  # type: ignore[arg-type]
-        self.moves = 0
-        self.on_move: Callable[[], None] | None = None
         self.screen = Screen(self, None)  # type: ignore[arg-type]
         self._for_eyes = choices.render_mode == "human"
         self._made = time.monotonic()
@@ -126,10 +124,7 @@ class IsolatedInstance(Listed):
             return answer
 
     def _move(self, method: str, *args: object) -> Ready:
-        self.moves += 1
-        if self.on_move is not None:
-            call, self.on_move = self.on_move, None
-            call()
+        self._tell_of_move()
         return self._worker.move(method, *args)
 
     def sample_action(self) -> object:

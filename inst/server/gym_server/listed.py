@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gym_server.errors import invalid_parameter
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Listed:
-    """An instance as it stands in the list of all."""
+    """What an instance has whatever runs its environment: its line in the list, its moves."""
 
     # Given when the instance is listed.
     instance_id = ""
@@ -28,6 +29,9 @@ class Listed:
     _lanes = 1
     _made: float
     _steps: int
+    # How often the environment has begun to move, and who wants to hear of the next time.
+    moves = 0
+    on_move: Callable[[], None] | None = None
 
     def stay(self) -> None:
         """Hear that it is on the list."""
@@ -56,3 +60,10 @@ class Listed:
             "steps": self._steps,
             "watched": self.screen.is_watched,
         }
+
+    def _tell_of_move(self) -> None:
+        """Count a move that begins, for those who watch."""
+        self.moves += 1
+        if self.on_move is not None:
+            call, self.on_move = self.on_move, None
+            call()
