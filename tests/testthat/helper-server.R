@@ -35,11 +35,11 @@ local_env <- function(env_id = "CartPole-v1", ..., client = test_client(),
 }
 
 # A server that can make the environments of odd_environments.py.
-local_odd_server <- function(frame = parent.frame()) {
+local_odd_server <- function(..., frame = parent.frame()) {
   withr::local_envvar(
     PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
   )
-  local_server(allow_module = "odd_environments", frame = frame)
+  local_server(allow_module = "odd_environments", ..., frame = frame)
 }
 
 make_odd <- function(name, server) {
