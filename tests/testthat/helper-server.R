@@ -5,6 +5,14 @@ test_client <- function() {
   gym_client()
 }
 
+# Whether every test is wanted, as by `make test-all`, and not only those of `make test`.
+tests_all <- function() identical(Sys.getenv("GYM_TEST_ALL"), "true")
+
+# For a test that takes long, beside others that make its main promise.
+skip_unless_all <- function() {
+  testthat::skip_if_not(tests_all(), "left to make test-all")
+}
+
 skip_if_no_server <- function() {
   testthat::skip_if_not(
     can_start_server(), "no Python that can run the server (GYM_PYTHON names one)"

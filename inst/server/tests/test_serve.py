@@ -318,6 +318,7 @@ def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, how):
     assert server.process.wait(10) == 0
 
 
+@pytest.mark.slow
 def test_a_large_answer_under_way_arrives_in_full(server):
     numbers = 2 * 10**6
     url = server.create("faulty_envs:Echo-v0", kwargs={"shape": [numbers]})
