@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo bench test soak check lint document clean
+.PHONY: help demo bench test test-all soak check lint document clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -14,7 +14,9 @@ help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
 	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
 	@echo '               some ten minutes, or a glance: make bench QUICK=1'
-	@echo 'make test      every test: of the server (pytest) and of the R package (testthat)'
+	@echo 'make test      the tests of the main promises: of the server (pytest) and of the R package'
+	@echo '               (testthat); some six minutes'
+	@echo 'make test-all  every test of both'
 	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
 	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
@@ -36,6 +38,10 @@ bench:
 test:
 	@tools/setup test
 	@tools/in-env tools/test
+
+test-all:
+	@tools/setup test
+	@tools/in-env tools/test all
 
 soak:
 	@tools/setup test

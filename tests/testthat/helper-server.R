@@ -5,6 +5,14 @@ test_client <- function() {
   gym_client()
 }
 
+# Whether every test is wanted, as by `make test-all`, and not only those of `make test`.
+tests_all <- function() identical(Sys.getenv("GYM_TEST_ALL"), "true")
+
+# For a test that takes long, beside others that make its main promise.
+skip_unless_all <- function() {
+  testthat::skip_if_not(tests_all(), "left to make test-all")
+}
+
 skip_if_no_server <- function() {
   testthat::skip_if_not(
     can_start_server(), "no Python that can run the server (GYM_PYTHON names one)"
@@ -35,11 +43,11 @@ local_env <- function(env_id = "CartPole-v1", ..., client = test_client(),
 }
 
 # A server that can make the environments of odd_environments.py.
-local_odd_server <- function(frame = parent.frame()) {
+local_odd_server <- function(..., frame = parent.frame()) {
   withr::local_envvar(
     PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
   )
-  local_server(allow_module = "odd_environments", frame = frame)
+  local_server(allow_module = "odd_environments", ..., frame = frame)
 }
 
 make_odd <- function(name, server) {

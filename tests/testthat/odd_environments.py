@@ -184,8 +184,8 @@ def slow():
     return Slow(spaces.Discrete(2))
 
 
-def slow_to_make():
-    time.sleep(2)
+def slow_to_make(seconds=2):
+    time.sleep(seconds)
     return Odd(spaces.Discrete(2))
 
 

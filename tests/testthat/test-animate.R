@@ -58,6 +58,7 @@ test_that("more frames than a GIF can show at that pace are left out, with a mes
 })
 
 test_that("a 200-step CartPole stays well under a megabyte", {
+  skip_unless_all()
   skip_if_not_installed("magick")
   balance <- function(observation) as.integer(observation[, 3] + observation[, 4] > 0)
   played <- rollout("CartPole-v0", balance, seed = 2, frames = TRUE, client = test_client())

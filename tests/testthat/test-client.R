@@ -51,6 +51,7 @@ test_that("an answer that does not come within the timeout is an error", {
 })
 
 test_that("whatever way a server is dead, that is told within the timeout, with what helps", {
+  skip_unless_all()
   for (how in c("silent", "half", "full", "cut")) {
     client <- create_GymClient(local_stalling(how), timeout = 1)
     for (call in list(env_list_all, function(x) env_create(x, "CartPole-v1"))) {

@@ -76,14 +76,13 @@ test_that("an environment that nobody uses is closed, which its calls say, and c
 })
 
 test_that("a call that takes too long fails in time, and the others go on", {
-  server <- local_server(max_call_seconds = 1)
+  server <- local_odd_server(max_call_seconds = 1, isolate = "none")
   other <- gym_make("CartPole-v1", client = server)
-  # As many lanes one after the other take longer than that, on any machine.
   many <- gym_make("CartPole-v1", num_envs = 65, vectorization_mode = "async", client = server) |>
     expect_error(class = "gym_error_http_429")
   expect_identical(many$code, "too_many_lanes")
   slow <- expect_error(
-    gym_make("CartPole-v1", num_envs = 16384, vectorization_mode = "sync", client = server),
+    gym_make("odd_environments:SlowToMake-v0", seconds = 30, client = server),
     class = "gym_error_http_504"
   )
   expect_identical(slow$code, "call_too_long")

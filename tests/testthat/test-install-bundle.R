@@ -9,6 +9,7 @@ fake_bundle <- function(..., frame = parent.frame()) {
 }
 
 test_that("a bundle installs without a network", {
+  skip_unless_all()
   local_cache()
   skip_if_no_packages()
   dir <- file.path(withr::local_tempdir(), "a bündle")

@@ -52,6 +52,7 @@ test_that("an installation runs the server, takes extras and mends itself", {
 })
 
 test_that("pip installs it where there is no uv", {
+  skip_unless_all()
   local_cache()
   skip_if_no_packages()
   local_binding("find_uv", function(...) NULL)

@@ -14,6 +14,7 @@ expect_known_returns <- function(returns) {
 }
 
 test_that("CartPole: returns in lanes are distributed as those of one episode after the other", {
+  skip_unless_all()
   client <- test_client()
   play <- function(env, episodes, seed) {
     rollout(env, policy_random(), episodes, seed = seed, client = client)$episodes$return

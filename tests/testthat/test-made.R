@@ -119,6 +119,7 @@ test_that("an environment that was closed is not closed again", {
 })
 
 test_that("an interrupted gym_make() leaves nothing, whenever the interrupt comes", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_odd_server()
   run <- run_session(

@@ -30,13 +30,14 @@ play_mirror <- function(env, tensors) {
   list(seen = seen, problems = problems)
 }
 
-test_that("2,400 random values of random spaces come back to Python as they were", {
+test_that("random values of random spaces come back to Python as they were", {
   skip_if_not_installed("bit64")
   server <- local_mirror_server()
   tried <- c(json = 0L, tensors = 0L)
   kinds <- character()
   problems <- character()
-  for (number in 1:300) {
+  how_many <- if (tests_all()) 300L else 40L
+  for (number in seq_len(how_many)) {
     env <- gym_make("mirror_environments:Mirror-v0", number = number, values = 8, client = server)
     kinds <- union(kinds, all_kinds(env$observation_space))
     by_json <- play_mirror(env, tensors = FALSE)
@@ -51,8 +52,8 @@ test_that("2,400 random values of random spaces come back to Python as they were
     env$close()
   }
   expect_identical(problems, character())
-  expect_identical(tried[["json"]], 2400L)
-  expect_gt(tried[["tensors"]], 1000L)
+  expect_identical(tried[["json"]], 8L * how_many)
+  expect_gt(tried[["tensors"]], 3L * how_many)
   expect_setequal(kinds, c("Box", "Discrete", "MultiDiscrete", "MultiBinary", "Text", "Tuple",
                            "Dict", "Sequence", "Graph", "OneOf"))
 })

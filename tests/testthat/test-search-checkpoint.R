@@ -279,6 +279,7 @@ test_that("a server that plays otherwise than the one before is told", {
 })
 
 test_that("kill -9 of the server: the same call goes on to the result of an undisturbed search", {
+  skip_unless_all()
   path <- local_checkpoint()
   play <- function(server, ...) {
     env <- gym_make("CartPole-v1", num_envs = 32, client = server)

@@ -148,6 +148,7 @@ test_that("bad arguments are refused, naming argument and value", {
 })
 
 test_that("CartPole: the landscape's middle is the best policy, and nothing stays open", {
+  skip_unless_all()
   client <- local_server()
   search <- search_random("CartPole-v0", rounds = 20, seed = 1, client = client)
   landscape <- search_landscape(search, size = 3, span = 0.5, episodes = 2, seed = 1)

@@ -63,6 +63,7 @@ test_that("a value for each lane belongs, drawn from each kind of space", {
 })
 
 test_that("values of lanes of 200 random spaces belong, and come back through tensors", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   withr::local_seed(6)
   tried <- 0L

@@ -1,4 +1,5 @@
 test_that("values that are drawn belong to their space and come back through JSON", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   withr::local_seed(4)
   tried <- 0L

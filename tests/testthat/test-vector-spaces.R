@@ -41,6 +41,7 @@ make_mirrors <- function(server, ...) {
 }
 
 test_that("values of random spaces come back to Python from their own lanes", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   server <- local_mirror_lanes()
   kinds <- character()

@@ -14,6 +14,7 @@ import stat
 import sys
 import threading
 import time
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -48,6 +49,23 @@ class Counting(gymnasium.Env):
 class Hanging(Counting):
     def step(self, action):
         time.sleep(3600)
+
+
+class Meeting(Counting):
+    """A step waits until as many files lie in a directory as are to come, its own included."""
+
+    def __init__(self, directory, count):
+        super().__init__()
+        self.directory, self.count = Path(directory), count
+
+    def step(self, action):
+        (self.directory / f"{os.getpid()}-{id(self)}").touch()
+        end = time.monotonic() + 20
+        while len(list(self.directory.iterdir())) < self.count:
+            if time.monotonic() > end:
+                raise RuntimeError("The others did not come")
+            time.sleep(0.01)
+        return super().step(action)
 
 
 class HangsWhere(Counting):
@@ -444,6 +462,7 @@ for _kind in (
     KillsItself,
     Letters,
     LongDouble,
+    Meeting,
     Nested,
     NotANumber,
     OldRenderModes,

@@ -114,6 +114,7 @@ def test_shutdown_can_be_switched_off(serve):
     assert server.stop()[0] == 0
 
 
+@pytest.mark.slow
 def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve):
     body = {"env_id": "Ant-v5", "kwargs": {"xml_file": "/no/such.xml"}}
 

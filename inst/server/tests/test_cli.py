@@ -50,6 +50,7 @@ def test_shutdown_is_answered_and_stops_it(serve):
     assert server.stop(how=None)[0] == 0
 
 
+@pytest.mark.slow
 @needs_signals
 def test_a_port_is_free_again_at_once(serve):
     server = serve()
@@ -106,6 +107,7 @@ def test_the_monitor_directory_is_the_one_that_was_named(serve, tmp_path):
     assert (tmp_path / "runs" / "a" / "episodes.csv").read_text().startswith("episode,return")
 
 
+@pytest.mark.slow
 @needs_signals
 def test_its_own_monitor_directory_is_there_only_for_what_was_written(serve, tmp_path):
     for directory in ("..", "a"):
@@ -148,6 +150,7 @@ def test_a_video_under_way_is_finished_at_the_stop(serve, tmp_path):
     assert (tmp_path / "a" / "rl-video-episode-0.mp4").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @needs_signals
 def test_what_never_returns_does_not_keep_it_alive(serve, tmp_path):
     pytest.importorskip("moviepy")

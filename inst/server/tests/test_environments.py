@@ -4,8 +4,13 @@ import pytest
 
 from gym_server.tensors import TENSORS, read
 
+SAMPLED = environments.sampled()
+REST = [env_id for env_id in environments.runnable() if env_id not in SAMPLED]
 
-@pytest.mark.parametrize("env_id", environments.runnable())
+
+@pytest.mark.parametrize(
+    "env_id", [*SAMPLED, *(pytest.param(env_id, marks=pytest.mark.slow) for env_id in REST)]
+)
 def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
     url = create(env_id, seed=1)
     observation = client.post(f"{url}/reset/").json["observation"]

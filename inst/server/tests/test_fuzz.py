@@ -214,16 +214,19 @@ def check_json(raw):
             assert wire.loads(written) == body
 
 
+@pytest.mark.slow
 def test_the_tensor_reader_takes_or_refuses_any_bytes(capsys):
     cases = explore(check_tensors, files() | st.binary(max_size=200))
     report(capsys, "fuzz-tensors", cases)
 
 
+@pytest.mark.slow
 def test_the_json_decoder_takes_or_refuses_any_bytes(capsys):
     cases = explore(check_json, texts() | st.binary(max_size=200))
     report(capsys, "fuzz-json", cases)
 
 
+@pytest.mark.slow
 def test_files_of_all_kinds_are_tried():
     """The strategy is no good if next to all of its files are refused, or none."""
     outcomes = {True: 0, False: 0}

@@ -1,5 +1,4 @@
 import threading
-import time
 
 import gymnasium
 import numpy as np
@@ -226,17 +225,21 @@ def test_what_an_environment_does_not_have_is_null(client, faulty):
     assert about["needs_reset"] is True
 
 
-def test_being_asked_about_does_not_wait_for_a_step(client, faulty, eventually):
-    url = faulty("Counting", seconds=1)
+def test_being_asked_about_does_not_wait_for_a_step(client, faulty, eventually, tmp_path):
+    meeting = tmp_path / "meeting"
+    meeting.mkdir()
+    url = faulty("Meeting", directory=str(meeting), count=2)
     client.post(f"{url}/reset/")
     step = threading.Thread(
         target=client.post, args=(f"{url}/step/",), kwargs={"json": {"action": 0}}
     )
-    began = time.monotonic()
     step.start()
+    eventually(lambda: list(meeting.iterdir()))
     assert client.get(url).status_code == 200
-    assert time.monotonic() - began < 0.9
+    assert client.get(url).json["steps"] == 0
+    (meeting / "the test").touch()
     step.join()
+    assert client.get(url).json["steps"] == 1
 
 
 def test_drawing_and_closing_happen_on_one_thread(client, create, faulty):

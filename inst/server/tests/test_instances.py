@@ -80,16 +80,20 @@ def test_steps_that_meet_a_close_are_taken_or_refused(client, faulty, in_backgro
         assert answer.status_code == 200 or answer.json["code"] == "unknown_instance"
 
 
-def test_environments_do_not_wait_for_each_other(client, create, faulty, in_background):
-    slow, quick = faulty("Counting", seconds=1.0), create()
+def test_environments_do_not_wait_for_each_other(
+    client, create, faulty, in_background, eventually, tmp_path
+):
+    meeting = tmp_path / "meeting"
+    meeting.mkdir()
+    slow, quick = faulty("Meeting", directory=str(meeting), count=2), create()
     client.post(f"{slow}/reset/")
-    began = time.monotonic()
     step = in_background(f"{slow}/step/", {"action": 0})
-    time.sleep(0.1)
+    eventually(lambda: list(meeting.iterdir()))
     assert client.post(f"{quick}/reset/").status_code == 200
     assert client.get("/v1/envs/").status_code == 200
     create()
-    assert time.monotonic() - began < 0.9
+    # Had one of these waited for the step, it would have given up by now.
+    (meeting / "the test").touch()
     assert step().status_code == 200
 
 

@@ -129,6 +129,7 @@ def test_a_server_that_stops_ends_its_lanes(serve, eventually):
     eventually(lambda: not any(map(is_running, children)))
 
 
+@pytest.mark.slow
 def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Hanging-v0", num_envs=2, vectorization_mode="async")

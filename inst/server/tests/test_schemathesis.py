@@ -49,6 +49,7 @@ def run(server, folder, seed, *arguments):
     return int(re.search(r"(\d+) generated", result.stdout)[1])
 
 
+@pytest.mark.slow
 def test_the_server_answers_as_its_document_says(serve, tmp_path, capsys):
     server = serve("--monitor-dir", str(tmp_path / "monitors"))
     cases, seed = 0, 1

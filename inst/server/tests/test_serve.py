@@ -273,18 +273,17 @@ def test_repetitions_that_arrive_while_the_first_runs_are_done_once(server, coun
         connection.close()
 
 
-def test_many_clients_are_served_at_the_same_time(server):
-    urls = [server.create("faulty_envs:Counting-v0", kwargs={"seconds": 0.5}) for _ in range(16)]
+def test_many_clients_are_served_at_the_same_time(server, tmp_path):
+    kwargs = {"directory": str(tmp_path), "count": 16}
+    urls = [server.create("faulty_envs:Meeting-v0", kwargs=kwargs) for _ in range(16)]
     for url in urls:
         server.post(f"{url}/reset/")
     connections = [server.socket() for _ in urls]
-    began = time.monotonic()
     for connection, url in zip(connections, urls, strict=True):
         connection.sendall(step(url, 1, key=url[-8:]))
     for connection in connections:
         assert read_answer(connection)[0] == 200
         connection.close()
-    assert time.monotonic() - began < 3
 
 
 def test_idle_and_silent_clients_hold_nobody_up(server):
@@ -319,6 +318,7 @@ def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, how):
     assert server.process.wait(10) == 0
 
 
+@pytest.mark.slow
 def test_a_large_answer_under_way_arrives_in_full(server):
     numbers = 2 * 10**6
     url = server.create("faulty_envs:Echo-v0", kwargs={"shape": [numbers]})

@@ -1,5 +1,4 @@
 import json
-import time
 import tracemalloc
 
 import numpy as np
@@ -142,9 +141,7 @@ def test_a_file_that_lies_is_refused(raw, words):
 )
 def test_nothing_is_allocated_on_the_word_of_a_header(raw):
     tracemalloc.start()
-    began = time.perf_counter()
     refusal(raw)
-    assert time.perf_counter() - began < 0.5
     assert tracemalloc.get_traced_memory()[1] < 4 * len(raw) + 2**16
     tracemalloc.stop()
 

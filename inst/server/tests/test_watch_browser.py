@@ -211,6 +211,7 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
 # What Python plays ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_two_people_watch_and_only_one_of_them_pauses(browser, server, play, look, eventually):
     url = server.create("MountainCar-v0")
     play(url, pause=0.01)
@@ -226,6 +227,7 @@ def test_two_people_watch_and_only_one_of_them_pauses(browser, server, play, loo
     assert len(pictures(browser)) > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", ["2", "4"])
 def test_slow_motion_goes_on_and_catches_up(browser, server, play, look, eventually, speed):
     url = server.create("CartPole-v1")
@@ -243,6 +245,7 @@ def test_slow_motion_goes_on_and_catches_up(browser, server, play, look, eventua
     eventually(lambda: float(browser.execute_script(shown)) > episode, seconds=30)
 
 
+@pytest.mark.slow
 def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, eventually):
     url = server.create("faulty_envs:Counting-v0")
     play(url, pause=0.02)
@@ -256,6 +259,7 @@ def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, e
     assert complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
     url = server.create("CartPole-v1", num_envs=3, vectorization_mode="sync")
     server.post(f"{url}/reset/", {"seed": 1})
@@ -273,6 +277,7 @@ def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
     assert "of all lanes" in text(browser, "caption")
 
 
+@pytest.mark.slow
 def test_what_is_not_there_is_said_in_words(browser, server, look, eventually):
     url = server.create("CartPole-v1")
     look(url)
@@ -290,6 +295,7 @@ def test_what_is_not_there_is_said_in_words(browser, server, look, eventually):
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
+@pytest.mark.slow
 def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, look, server, eventually):
     url = server.create("CartPole-v1")
     server.post(f"{url}/reset/")
@@ -302,6 +308,7 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, look, s
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
+@pytest.mark.slow
 def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, eventually):
     strict = serve("--max-call-seconds", "2", "--isolate", "none")
     where = {"where": "reset"}
@@ -330,6 +337,7 @@ def locked(serve):
     return server, ask
 
 
+@pytest.mark.slow
 def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
     browser, locked, eventually
 ):
@@ -412,6 +420,7 @@ def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve):
     assert browser.find_element(By.ID, "picture")
 
 
+@pytest.mark.slow
 def test_every_control_has_a_name(browser, server, look):
     look(server.create("CartPole-v1", num_envs=2))
     for control in browser.find_elements(By.CSS_SELECTOR, "button, input, canvas"):

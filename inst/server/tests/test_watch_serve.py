@@ -63,6 +63,7 @@ def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, pole):
     thread.join()
 
 
+@pytest.mark.slow
 def test_what_is_asked_after_watching_is_answered_at_the_stop(server):
     url = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 4})
     server.post(f"{url}/reset/")

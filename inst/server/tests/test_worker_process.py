@@ -148,6 +148,7 @@ def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
         server.post(f"{url}/close/")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_no_process_outlives_the_server(serve, how, eventually):
     server = serve()

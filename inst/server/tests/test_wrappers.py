@@ -61,6 +61,7 @@ IN_OTHERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("env_id", "wrapper"), EXAMPLES)
 def test_a_wrapped_environment_plays_and_draws(client, create, env_id, wrapper):
     if wrapper["name"] not in wrappers.allowed():
@@ -176,6 +177,7 @@ def test_what_draws_in_each_step_does_so_on_the_render_thread(client, create):
     assert len(faulty_envs.Drawing.threads) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "chosen", [[wrapped("FrameStackObservation", stack_size=2)], [wrapped("AddRenderObservation")]]
 )
