@@ -264,21 +264,21 @@ class Instance(Listed):
                     "close that monitor first",
                 )
             self._monitor = Monitor.start(
-                self._env, root, directory, force, resume, video_every, self.renderer
+                self._env,
+                root,
+                directory,
+                self.instance_id,
+                force,
+                resume,
+                video_every,
+                self.renderer,
             )
 
     def close_monitor(self) -> None:
-        """Stop recording and finish the files.
-
-        Raises:
-            GymServerError: ``monitor_not_active``.
-        """
+        """Stop recording and finish the files, if it is recorded."""
         with self.hold:
-            if self._monitor is None:
-                raise GymServerError(
-                    "monitor_not_active", f"Instance {self.instance_id} is not monitored"
-                )
-            self._finish_monitor()
+            if self._monitor is not None:
+                self._finish_monitor()
 
     def close(self) -> None:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""

@@ -298,8 +298,8 @@ def env_render(call: Call) -> Content:
     "POST",
     INSTANCE + "monitor/start/",
     Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", wire.BOOLEAN, "Delete what an earlier monitor wrote there."),
-    Field("resume", wire.BOOLEAN, "Go on counting where the earlier monitor ended."),
+    Field("force", wire.BOOLEAN, "Delete what monitors left there that are gone."),
+    Field("resume", wire.BOOLEAN, "Go on counting where an earlier monitor ended."),
     Field("video_callable", wire.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
 )
 def env_monitor_start(call: Call) -> None:
@@ -316,7 +316,7 @@ def env_monitor_start(call: Call) -> None:
 
 @declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
-    """Finish the monitor's files."""
+    """Finish the monitor's files; without a monitor there is nothing to do."""
     call.instance.close_monitor()
 
 
