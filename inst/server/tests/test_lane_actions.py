@@ -21,7 +21,7 @@ from gym_server.tensors import TENSORS, Tensor
         ("Discrete", [0, 0], "for each of the 3 lanes is needed, not 2"),
         ("Discrete", 0, "for each of the 3 lanes is needed, as a list"),
         ("Discrete", [0, 7, 0], "7 at [1] is not in Discrete(5, start=-2)"),
-        ("Discrete", [0, True, 0], "true at [1] is not in Discrete"),
+        ("Discrete", [0, None, 0], "null at [1] is not in Discrete"),
         ("Discrete", [0, 0, 0.5], "0.5 at [2] is not in Discrete"),
         ("bytes", [[0] * 4, [0] * 4, [0, 0, 300, 0]], "300 at [2][2] is not in Box"),
         ("bytes", [[0] * 4, [0] * 3, [0] * 4], "[0, 0, 0] at [1] is not in Box"),

@@ -20,13 +20,10 @@ class _WideBox(Box):
 
     def __init__(self, space: Box) -> None:
         limits = np.finfo(space.dtype) if space.dtype.kind == "f" else np.iinfo(space.dtype)
-        low, high = map(space.dtype.type, (limits.min, limits.max))
-        super().__init__(
-            np.where(np.isfinite(space.low), low, space.low),
-            np.where(np.isfinite(space.high), high, space.high),
-            space.shape,
-            space.dtype,  # type: ignore[arg-type]
-        )
+        low, high = space.low.copy(), space.high.copy()
+        low[np.isfinite(low)] = limits.min
+        high[np.isfinite(high)] = limits.max
+        super().__init__(low, high, space.shape, space.dtype)  # type: ignore[arg-type]
         self._narrow = space
 
     def __repr__(self) -> str:
