@@ -80,7 +80,7 @@ class Route:
     """One route of the protocol.
 
     Attributes:
-        method: "GET" or "POST".
+        method: "GET", "POST" or "DELETE".
         path: Flask's rule, which also matches without its last slash.
         fields: what the body may hold, or the query of a GET.
         handler: returns a JSON object, a content of its own, or None for 204.
@@ -89,6 +89,7 @@ class Route:
             often it arrives.
         content_type: what an ordinary answer is.
         tensors: whether the answer may also be tensors, when the client accepts them.
+        html: whether the answer may also be HTML, when the client asks for that.
         tensor_body: whether the body may also be tensors.
     """
 
@@ -100,6 +101,7 @@ class Route:
     once: bool = False
     content_type: str = wire.JSON
     tensors: bool = False
+    html: bool = False
     tensor_body: bool = False
 
     @property
@@ -326,6 +328,12 @@ def env_close(call: Call) -> None:
     call.services.instances.close(call.path["instance_id"])
 
 
+@declare("DELETE", INSTANCE, once=True)
+def env_delete(call: Call) -> None:
+    """Close an environment, as its route close/ does."""
+    env_close(call)
+
+
 @declare(
     "POST",
     "/v1/upload/",
@@ -343,11 +351,15 @@ def upload(call: Call) -> None:
     )
 
 
-@declare("POST", "/v1/shutdown/", answer="message")
-def shutdown(call: Call) -> dict:
+@declare("POST", "/v1/shutdown/", answer="message", html=True)
+def shutdown(call: Call) -> dict | Content:
     """Answer the requests under way and stop the server."""
     call.services.stop()
-    return {"message": "Server shutting down"}
+    message = "Server shutting down"
+    if wire.HTML in call.accept:
+        # As the classic server answered.
+        return Content(message.encode(), f"{wire.HTML}; charset=utf-8")
+    return {"message": message}
 
 
 @declare(

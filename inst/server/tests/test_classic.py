@@ -76,6 +76,27 @@ def test_an_unknown_instance(client):
         assert answer.json["message"] == "Instance_id bad id unknown"
 
 
+def test_every_error_names_its_documentation(client, create, faulty):
+    """The classic R client prints message and documentation_url, or nothing where one lacks."""
+    broken = faulty("RaisesInStep")
+    client.post(f"{broken}/reset/")
+    answers = [
+        client.post("/v1/envs/bad id/reset/"),
+        client.post("/v1/envs/", json={"env_id": "bad string"}),
+        client.post("/v1/envs/", json={}),
+        client.post("/v1/envs/", data=b"{"),
+        client.post(f"{create(ENV_ID)}/step/", json={"action": 0}),
+        client.post(f"{broken}/step/", json={"action": 1}),
+        client.post("/v1/upload/", json={"training_dir": "d", "api_key": "k"}),
+        client.get("/nowhere"),
+        client.get("/v1/shutdown/"),
+    ]
+    for answer in answers:
+        assert answer.status_code >= 400
+        assert answer.json["message"]
+        assert answer.json["documentation_url"].startswith("https://github.com/openai/gym-http-api")
+
+
 def test_a_malformed_environment_id(client):
     answer = client.post("/v1/envs/", json={"env_id": "bad string"})
     assert answer.status_code == 400
