@@ -8,9 +8,8 @@ from gym_server import spaces
 from gym_server.errors import GymServerError
 
 _CLIP = (
-    "the action lies outside of the bounds of its Box: Gymnasium's wrapper ClipAction keeps "
-    'actions inside, in R gym_wrap(..., "ClipAction"), else "wrappers": [{"name": "ClipAction"}] '
-    "when the environment is created"
+    "the action lies outside of the bounds of its Box; the wrapper ClipAction keeps actions "
+    'inside, in R by gym_wrap(..., "ClipAction")'
 )
 
 

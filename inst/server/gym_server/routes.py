@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -19,6 +19,7 @@ from gym_server.instance import Instance
 from gym_server.instances import Instances
 from gym_server.limits import Watchers
 from gym_server.monitor_directory import MonitorRoot
+from gym_server.registry import LONGEST_ID
 from gym_server.tensors import TENSORS, Tensor
 from gym_server.tensors import write as write_tensors
 from gym_server.watch_keys import WatchKeys
@@ -362,10 +363,13 @@ def shutdown(call: Call) -> dict | Content:
     return {"message": message}
 
 
+_SEARCH = replace(wire.TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
+
+
 @declare(
     "GET",
     "/v1/registry/",
-    Field("search", wire.TEXT, "A part of the id; when it is part of none, the nearest ids."),
+    Field("search", _SEARCH, "A part of the id; when it is part of none, the nearest ids."),
     answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available",
 )
 def env_registry(call: Call) -> dict:

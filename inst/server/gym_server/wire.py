@@ -244,7 +244,11 @@ def _request_id(value: object) -> RequestId:
 
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
-ANY_ID = Kind({"type": "string"}, "a string", lambda value: value)
+ANY_ID = Kind(
+    {"type": "string", "examples": ["CartPole-v1", "Pendulum-v1", "MountainCar-v0"]},
+    "a string",
+    lambda value: value,
+)
 # Also as numbers and words, which some classic clients send.
 _TRUE_OR_FALSE = [
     {"type": "boolean"},
