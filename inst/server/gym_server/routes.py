@@ -217,7 +217,7 @@ def env_reset(call: Call) -> dict:
     Field(
         "action",
         wire.ANYTHING,
-        "A member of the action space; with lanes a list of one for each lane that steps.",
+        "A member of the action space, a Box's bounds aside; with lanes one for each that steps.",
         required=True,
     ),
     Field(
