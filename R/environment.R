@@ -190,7 +190,8 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   mode `"SameStep"` the info has, when a lane has ended, `final_obs`: a list with
 #'   the last observation of each lane that ended, `NULL` for the others.
 #' @section Errors: `gym_error_space` for an action that does not fit the action
-#'   space, the environment has not moved then; with lanes also for a wrong number of
+#'   space, the environment has not moved then; a Box action outside of the bounds goes to
+#'   the environment, as in Gymnasium, and most clip it. With lanes also for a wrong number of
 #'   actions, and the message names the lane whose action does not fit: by its number
 #'   from 1, or where the server refuses it by its index from 0, such as `[2]` for the
 #'   third. `gym_error_argument` for `lanes` that are none. `gym_error_http_400` with

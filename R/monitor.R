@@ -1,10 +1,18 @@
 #' Record an environment's episodes
 #'
 #' From the next reset on the server writes one row for each finished episode
-#' into `episodes.csv`: its number, return, length in steps and seconds. Videos
-#' are recorded where `video_callable` asks for them. `env_monitor_close()`, or
-#' closing the environment, ends the monitor and finishes its files.
+#' into a table, `episodes.csv`: its number, return, length in steps and seconds.
+#' Videos are recorded where `video_callable` asks for them. `env_monitor_close()`,
+#' or closing the environment, ends the monitor and finishes its files; where there
+#' is no monitor it does nothing.
 #'
+#' @section Files: The first monitor in a directory writes `episodes.csv`, videos with the
+#'   number of their episode, `rl-video-episode-0.mp4`, and `gym-monitor.json`, a list
+#'   of these files. One that starts while another writes there, in this process of the server
+#'   or in another one, has files of its own, named by its `instance_id`:
+#'   `episodes-1a2b3c4d.csv`, `rl-video-1a2b3c4d-episode-0.mp4` and
+#'   `gym-monitor-1a2b3c4d.json`. `list.files(directory, "^episodes.*csv$")` finds all
+#'   tables.
 #' @inheritParams env_reset
 #' @param directory Where the server writes, a string: a path below the server's
 #'   directory for monitors (its option `--monitor-dir`), or, for a server on
@@ -12,19 +20,20 @@
 #'   started from R without `monitor_dir` has a new temporary directory for relative
 #'   paths: name an absolute one, such as `file.path(tempdir(), "runs")`, or start it
 #'   by `gym_server_start(monitor_dir = "runs")`.
-#' @param force Whether to delete what an earlier monitor left in the directory;
-#'   other files are never touched. Default `FALSE`.
-#' @param resume Whether to go on counting where an earlier monitor stopped.
-#'   Default `FALSE`: a directory with an earlier monitor's files is refused.
+#' @param force Whether to delete what monitors have left in the directory that are gone:
+#'   closed, or ended with their server. Files of monitors that still write, and all other
+#'   files, are never touched. Default `FALSE`.
+#' @param resume Whether to go on counting where an earlier monitor stopped: this
+#'   instance's, where it has files of its own, else the first one's. Default `FALSE`: a
+#'   directory with files of monitors that are gone is refused.
 #' @param video_callable Which episodes to record as videos: `FALSE`, the
 #'   default, for none, `TRUE` for each, or a whole number n for every n-th,
 #'   beginning with the first. Needs the server's extra `video` (the Python
 #'   package moviepy).
 #' @return Nothing, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance, a directory
-#'   that is refused, a monitor that is active already (or, to be closed, none), or
-#'   videos that cannot be made, with the reason; `gym_error_argument`;
-#'   `gym_error_connection`.
+#'   that is refused, a monitor that is active already, or videos that cannot be made, with
+#'   the reason; `gym_error_argument`; `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

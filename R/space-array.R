@@ -117,8 +117,8 @@ shape_values <- function(values, shape) {
 #' @exportS3Method
 check_value.gym_space_array <- function(space, value, path, call, bounds = FALSE) {
   refuse <- function(problem, path) abort_space(space, value, problem, call, path)
-  logical <- is.logical(value) && (space$dtype == "bool" || space$name == "MultiBinary")
-  if (!is.numeric(value) && !logical) {
+  takes_logical <- space$dtype == "bool" || space$name %in% c("MultiBinary", "MultiDiscrete")
+  if (!is.numeric(value) && !(is.logical(value) && takes_logical)) {
     refuse(paste("A value of a", space$name, "is numeric"), path)
   }
   if (!identical(value_shape(value, space), space$shape)) {

@@ -106,7 +106,8 @@ encode_value <- function(space, value, call) {
 #' Whole numbers are integer where they all fit, double up to 2^53 and
 #' [bit64::integer64] beyond. The smallest int64, -2^63, is `NA` for bit64, and
 #' uint64 goes on beyond its largest number: such a value is an error, not another
-#' number. A Box of dtype bool is logical.
+#' number. A Box of dtype bool is logical; for Discrete, MultiDiscrete and MultiBinary
+#' `TRUE` and `FALSE` may stand for 1 and 0.
 #'
 #' # Where a value is wrong
 #'

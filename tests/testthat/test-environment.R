@@ -227,8 +227,20 @@ test_that("a number of the wrong length is refused for a Box", {
   env <- local_env("Pendulum-v1")
   env$reset()
   expect_error(env$step(c(0, 0)), "<Box float32 \\[1\\]>", class = "gym_error_space")
-  expect_error(env$step(2.5), "2.5", class = "gym_error_space")
   expect_length(env$step(-2)$observation, 3)
+})
+
+test_that("a Box action outside of the bounds is the environment's affair", {
+  env <- local_env("Pendulum-v1", seed = 1)
+  twin <- local_env("Pendulum-v1", seed = 1)
+  env$reset()
+  twin$reset()
+  for (outside in c(2.5, -2.000000238, 1e30)) {
+    expect_false(space_contains(env$action_space, outside))
+    inside <- max(min(outside, 2), -2)
+    expect_identical(env$step(outside)$observation, twin$step(inside)$observation)
+  }
+  for (bad in c(1e39, Inf, NaN)) expect_error(env$step(bad), class = "gym_error_space")
 })
 
 test_that("a step before the first reset is an error", {

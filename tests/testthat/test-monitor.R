@@ -44,6 +44,28 @@ test_that("resume goes on counting, force begins anew, neither is refused", {
   expect_equal(readLines(keep), "mine")
 })
 
+test_that("several environments record into one directory, each into its own files", {
+  directory <- withr::local_tempdir()
+  envs <- list(local_env(seed = 1), local_env(seed = 2), local_env(seed = 3))
+  for (env in envs) {
+    env_monitor_start(env$client, env$instance_id, directory, force = TRUE)
+  }
+  lengths <- lapply(envs, play_episodes, episodes = 2)
+  ids <- vapply(envs, function(env) env$instance_id, "")
+  tables <- file.path(directory, c("episodes.csv", sprintf("episodes-%s.csv", ids[-1])))
+  recorded <- lapply(tables, function(table) read.csv(table)$length)
+  expect_equal(recorded, lengths)
+  expect_setequal(list.files(directory, "^episodes.*csv$"), basename(tables))
+})
+
+test_that("closing a monitor twice, or none, is no error", {
+  env <- local_env()
+  expect_invisible(env_monitor_close(env$client, env$instance_id))
+  env_monitor_start(env$client, env$instance_id, withr::local_tempdir())
+  env_monitor_close(env$client, env$instance_id)
+  expect_no_error(env_monitor_close(env$client, env$instance_id))
+})
+
 test_that("a directory outside is refused", {
   env <- local_env()
   for (directory in c("/usr/gym-monitor", "../../gym-monitor")) {

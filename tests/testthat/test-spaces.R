@@ -48,6 +48,18 @@ test_that("the error for an action shows the value", {
                class = "gym_error_space")
 })
 
+test_that("TRUE and FALSE are 1 and 0 in a MultiDiscrete, as in a Discrete", {
+  space <- new_space(list(
+    name = "MultiDiscrete", dtype = "int64", shape = 2L, nvec = c(2L, 2L), start = c(0L, 0L)
+  ))
+  expect_equal(encode_value(space, c(TRUE, FALSE), NULL), "[1,0]")
+  expect_identical(
+    to_tensors(space, c(TRUE, FALSE), "action", NULL), to_tensors(space, 1:0, "action", NULL)
+  )
+  expect_true(space_contains(space, c(TRUE, FALSE)))
+  expect_error(encode_value(space, c(TRUE, NA), NULL), class = "gym_error_space")
+})
+
 test_that("an action of a Box keeps its digits and its shape", {
   expect_equal(encode_value(box(1), 0.1, NULL), "[0.10000000000000001]")
   expect_equal(encode_value(box(integer()), 0.5, NULL), "0.5")
@@ -166,7 +178,9 @@ test_that("a bare number is an action of a Box of one number", {
   env <- make_odd("OneNumber", local_odd_server())
   env$reset()
   expect_equal(env$step(0.5)$reward, 1)
-  expect_error(env$step(2), class = "gym_error_space")
+  expect_false(space_contains(env$action_space, 2))
+  expect_equal(env$step(2)$reward, 1)
+  expect_error(env$step(NaN), class = "gym_error_space")
 })
 
 test_that("a space that is not known is refused at creation and named", {
@@ -261,7 +275,7 @@ test_that("a value outside of a nested space is named by a real server, too", {
   env$reset()
   good <- list(position = c(0, 0, 0), "a.b" = 1)
   expect_identical(env$step(good)$reward, 1)
-  expect_error(env$step(list(position = c(0, 0, 5), "a.b" = 1)), "$position[2]", fixed = TRUE,
+  expect_error(env$step(list(position = c(0, 0, Inf), "a.b" = 1)), "$position[2]", fixed = TRUE,
                class = "gym_error_space")
   expect_error(env$step(list(position = c(0, 0, NA), "a.b" = 1)), "$position[2]", fixed = TRUE,
                class = "gym_error_space")

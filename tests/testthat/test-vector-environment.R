@@ -285,8 +285,9 @@ test_that("actions that do not fit the lanes are refused with the lane, and no l
   expect_error(env$step(matrix(0, 3, 1)), "4, not 3", class = "gym_error_space")
   expect_error(env$step(matrix(0, 4, 2)), "4 x 1", class = "gym_error_space")
   expect_error(env$step(c(0, 0, NA, 0)), "Lane 3", class = "gym_error_space")
-  expect_error(env$step(c(0, 0, 0, 3)), "[3]", fixed = TRUE, class = "gym_error_space")
+  expect_error(env$step(c(0, 0, 0, NaN)), "[3]", fixed = TRUE, class = "gym_error_space")
   expect_identical(env$step(c(0.5, 1, -1, 0)), twin$step(matrix(c(0.5, 1, -1, 0))))
+  expect_identical(env$step(c(-3, 3, 0, 2)), twin$step(c(-2, 2, 0, 2)))
 })
 
 test_that("what an implementation cannot do is refused, and says what can", {

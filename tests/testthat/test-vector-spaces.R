@@ -166,7 +166,7 @@ test_that("a nested action of a lane that does not fit is named with its lane", 
   bad <- good
   bad$position[3, 2] <- NA
   expect_error(env$step(bad), "Lane 3: .*\\$position\\[1\\]", class = "gym_error_space")
-  bad$position[3, 2] <- 5
+  bad$position[3, 2] <- Inf
   expect_error(env$step(bad), "position", class = "gym_error_space")
   expect_error(env$step(list(position = matrix(0, 3, 3), "a.b" = c(1, 0))), "\\$a.b",
                class = "gym_error_space")

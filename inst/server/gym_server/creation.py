@@ -11,6 +11,7 @@ from gymnasium import error
 from gymnasium.envs import registration
 
 from gym_server import mujoco_setup
+from gym_server.atari import classic_game
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.plain import brief, from_words
@@ -77,10 +78,10 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
         GymServerError: as for ``make()``.
     """
     if not isinstance(env_id, str) or len(env_id) > LONGEST_ID:
-        raise _unusable("malformed_env_id", brief(env_id))
+        raise _malformed(brief(env_id))
     module, colon, name = env_id.rpartition(":")
     if registration.ENV_ID_RE.fullmatch(name) is None or (colon and not _is_module(module)):
-        raise _unusable("malformed_env_id", env_id)
+        raise _malformed(env_id)
     if module and module not in allowed_modules:
         raise GymServerError(
             "module_not_allowed",
@@ -103,28 +104,34 @@ def _is_module(text: str) -> bool:
 def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
     match failure:
         case error.DeprecatedEnv():
-            return _unusable(
-                "deprecated_env_id", env_id, "that version is deprecated", _use_latest(name)
+            return GymServerError(
+                "deprecated_env_id", f"The environment '{env_id}' is deprecated", _use_latest(name)
             )
         case error.VersionNotFound():
-            return _unusable(
-                "unknown_env_id", env_id, "there is no such version", _use_latest(name)
+            return GymServerError(
+                "unknown_env_id", f"There is no such version of '{env_id}'", _use_latest(name)
             )
         case _:
-            return _unusable(
+            return GymServerError(
                 "unknown_env_id",
-                env_id,
-                "no environment of that name is registered",
-                _did_you_mean(name),
+                f"There is no environment '{env_id}'",
+                _use_ale(name) or _did_you_mean(name),
             )
 
 
-def _unusable(
-    code: str, env_id: str, reason: str | None = None, hint: str | None = None
-) -> GymServerError:
-    # The classic server had these words for every id that it could not use.
-    message = f"Attempted to look up malformed environment ID '{env_id}'"
-    return GymServerError(code, f"{message}: {reason}" if reason else message, hint)
+def _malformed(env_id: str) -> GymServerError:
+    # The classic server's words.
+    return GymServerError(
+        "malformed_env_id", f"Attempted to look up malformed environment ID '{env_id}'"
+    )
+
+
+def _use_ale(name: str) -> str | None:
+    game = classic_game(name)
+    if game is None:
+        return None
+    env_id, shows_memory = game
+    return f'use {env_id} with kwargs {{"obs_type": "ram"}}' if shows_memory else f"use {env_id}"
 
 
 def _use_latest(name: str) -> str:

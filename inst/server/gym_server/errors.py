@@ -36,6 +36,10 @@ _STATUS = {
 _HEADERS = {"unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),)}
 
 
+# Where the routes are described for people.  The classic R client shows no message without it.
+_DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
+
+
 class GymServerError(Exception):
     """A call that cannot be served.
 
@@ -173,7 +177,7 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
             is logged.
 
     Returns:
-        The HTTP status and ``{"message", "code", "hint"?, "extra"?}``.
+        The HTTP status and ``{"message", "code", "documentation_url", "hint"?, "extra"?}``.
     """
     if isinstance(error, HTTPException):
         error = _from_http(error)
@@ -186,7 +190,11 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
         )
     elif error.code == "environment_error" and not error.is_logged:
         log.warning("%s", error.message, exc_info=error)
-    body = {"message": error.message, "code": error.code}
+    body = {
+        "message": error.message,
+        "code": error.code,
+        "documentation_url": _DOCUMENTATION,
+    }
     if error.hint:
         body["hint"] = error.hint
     if error.extra:

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from gym_server import spaces
+from gym_server.actions import ActionReader
 from gym_server.choices import Choices
 from gym_server.creation import ask
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
@@ -42,6 +43,7 @@ class Instance(Listed):
         self._learn_spaces()
         self._lane_action_space_info = spaces.describe(self._lane_action_space)
         self._lane_observation_space_info = spaces.describe(self._lane_observation_space)
+        self._actions = ActionReader(self._lane_action_space, self._lanes)
         self._observes_tensors = spaces.travels_as_tensors(self._lane_observation_space)
         # Whoever reads it can create another: with the module, and with the version found.
         module, colon, name = str(choices.env_id).rpartition(":")
@@ -146,7 +148,8 @@ class Instance(Listed):
         """Take one step.
 
         Args:
-            action: the JSON value of a member of the action space, or the member as ``Parts``.
+            action: the JSON value of an action, or the action as ``Parts``; the bounds of a
+                Box are the environment's affair.
             tensors: whether the observation is wanted as tensors.
             mask: for environments with lanes only.
             for_eyes: whether people want to see it: not faster than in real time, then, while
@@ -166,11 +169,12 @@ class Instance(Listed):
         with self.hold:
             if not self._was_reset:
                 raise reset_needed("step()")
+            decoded = self._actions.read(action)
             try:
-                decoded = self._decode(action)
-            except spaces.NotInSpace as refusal:
-                raise GymServerError("action_not_in_space", f"The action {refusal}") from None
-            return ask(self._step, decoded, tensors)
+                return ask(self._step, decoded, tensors)
+            except GymServerError as failure:
+                self._actions.explain(failure, action)
+                raise
 
     def _step(self, action: object, tensors: bool) -> dict:
         step = self._monitor.step if self._monitor else self._env.step
@@ -201,11 +205,6 @@ class Instance(Listed):
         if tensors and self._observes_tensors:
             return spaces.encode_tensors(self.observation_space, "observation", observation)
         return spaces.encode(self.observation_space, observation)
-
-    def _decode(self, action: object) -> object:
-        if isinstance(action, spaces.Parts):
-            return spaces.decode_tensors(self.action_space, "action", action)
-        return spaces.decode(self.action_space, action)
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
@@ -264,21 +263,21 @@ class Instance(Listed):
                     "close that monitor first",
                 )
             self._monitor = Monitor.start(
-                self._env, root, directory, force, resume, video_every, self.renderer
+                self._env,
+                root,
+                directory,
+                self.instance_id,
+                force,
+                resume,
+                video_every,
+                self.renderer,
             )
 
     def close_monitor(self) -> None:
-        """Stop recording and finish the files.
-
-        Raises:
-            GymServerError: ``monitor_not_active``.
-        """
+        """Stop recording and finish the files, if it is recorded."""
         with self.hold:
-            if self._monitor is None:
-                raise GymServerError(
-                    "monitor_not_active", f"Instance {self.instance_id} is not monitored"
-                )
-            self._finish_monitor()
+            if self._monitor is not None:
+                self._finish_monitor()
 
     def close(self) -> None:
         """Finish the monitor and close the environment; whoever waits learns that it is gone."""

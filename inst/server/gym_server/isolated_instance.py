@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -59,7 +58,6 @@ class IsolatedInstance(Listed):
         self._made = time.monotonic()
         self._num_envs = choices.num_envs
         self._steps = 0
-        self._reserved: tuple[MonitorRoot, Path] | None = None
         self._about: dict = {}
         hint = (
             f"the server's option --max-worker-mb lets it have {surroundings.max_mb} MiB"
@@ -188,30 +186,14 @@ class IsolatedInstance(Listed):
     def start_monitor(self, root: MonitorRoot, directory: str, *how: object) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
         with self.hold:
-            if self._reserved is not None or self._num_envs is not None:
-                # It says what is wrong.
-                self._worker.move("start_monitor", self.instance_id, None, directory, *how)
-                return
-            self._reserved = root, root.reserve(directory)
-            try:
-                path = self._reserved[1]
-                self._worker.move("start_monitor", self.instance_id, path, directory, *how)
-            except GymServerError:
-                self._release()
-                raise
+            # Lanes are refused by the process, which says why.
+            path = None if self._num_envs is not None else root.resolve(directory)
+            self._worker.move("start_monitor", self.instance_id, path, directory, *how)
 
     def close_monitor(self) -> None:
         """Stop recording and finish the files; see ``Instance.close_monitor()``."""
         with self.hold:
-            try:
-                self._worker.move("close_monitor", self.instance_id)
-            finally:
-                self._release()
-
-    def _release(self) -> None:
-        reserved, self._reserved = self._reserved, None
-        if reserved is not None:
-            reserved[0].release(reserved[1])
+            self._worker.move("close_monitor")
 
     # The end --------------------------------------------------------------------------------
 
@@ -226,7 +208,6 @@ class IsolatedInstance(Listed):
                 self._worker.move("close")
             finally:
                 self._worker.let_go(gone)
-                self._release()
 
     def condemn(self, why: GymServerError) -> None:
         """End the process at once.
@@ -235,11 +216,9 @@ class IsolatedInstance(Listed):
         """
         self._worker.condemn(why)
         self.screen.end(why)
-        self._release()
 
     def _end(self, why: GymServerError) -> None:
         self.screen.end(why)
-        self._release()
         self._on_end(self, why)
 
 

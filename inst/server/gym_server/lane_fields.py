@@ -22,12 +22,17 @@ def _num_envs(value: object) -> int:
 
 def _seed(value: object) -> int | tuple[int | None, ...]:
     if not isinstance(value, list):
-        return wire.integer(value)
+        return _one_seed(value)
     try:
-        return tuple(None if seed is None else wire.integer(seed) for seed in value)
+        return tuple(None if seed is None else _one_seed(seed) for seed in value)
     except ValueError:
         wanted = "an integer, 0 or greater, or a list of one, or null, for each lane"
         raise invalid_parameter("seed", value, wanted) from None
+
+
+def _one_seed(value: object) -> int:
+    # A classic client may count with what it calls true and false.
+    return int(value) if isinstance(value, bool) else wire.integer(value)
 
 
 def _mask(value: object) -> np.ndarray:
@@ -71,8 +76,12 @@ NUM_ENVS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _
 SEED = Kind(
     {
         "oneOf": [
-            {"type": "integer", "minimum": 0},
-            {"type": "array", "items": {"type": ["integer", "null"], "minimum": 0}, "minItems": 1},
+            {"type": ["integer", "boolean"], "minimum": 0},
+            {
+                "type": "array",
+                "items": {"type": ["integer", "boolean", "null"], "minimum": 0},
+                "minItems": 1,
+            },
         ]
     },
     "an integer, 0 or greater",

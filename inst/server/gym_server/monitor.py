@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import logging
 import time
-from pathlib import Path
-from typing import TextIO
 
 import gymnasium
 
 from gym_server.errors import GymServerError
 from gym_server.frames import RenderThread
-from gym_server.monitor_directory import MonitorDirectory, MonitorRoot, video_name
+from gym_server.monitor_directory import MonitorRoot
+from gym_server.monitor_files import MonitorFiles, refuse
 
 log = logging.getLogger(__name__)
 
@@ -22,8 +21,8 @@ COLUMNS = ("episode", "return", "length", "seconds")
 class Monitor:
     """Records the episodes of one environment into a directory.
 
-    ``episodes.csv`` gets a row when an episode is done: its number, the sum of its rewards, its
-    steps and its duration in seconds.  Numbers count the resets since the start of monitoring,
+    The table gets a row when an episode is done: its number, the sum of its rewards, its steps
+    and its duration in seconds.  Numbers count the resets since the start of monitoring,
     from 0, so an episode that is given up leaves a gap and a video's number is its episode's.
 
     The caller sees to it that only one call at a time is under way.
@@ -32,16 +31,14 @@ class Monitor:
     def __init__(
         self,
         env: gymnasium.Env,
-        directory: MonitorDirectory,
-        table: TextIO,
+        files: MonitorFiles,
         recorder: gymnasium.wrappers.RecordVideo | None,
         renderer: RenderThread,
     ) -> None:
-        """Take over an open directory; see ``start()``."""
+        """Take over files that are taken; see ``start()``."""
         self._env = env
-        self._directory = directory
-        self._table = table
-        self._rows = csv.writer(table, lineterminator="\n")
+        self._files = files
+        self._rows = csv.writer(files.table, lineterminator="\n")
         self._recorder = recorder
         self._renderer = renderer
         self._episode: int | None = None
@@ -54,6 +51,7 @@ class Monitor:
         env: gymnasium.Env,
         root: MonitorRoot,
         directory: str,
+        instance_id: str,
         force: bool,
         resume: bool,
         video_every: int,
@@ -65,7 +63,8 @@ class Monitor:
             env: the environment; it is recorded, never closed.
             root: where monitors may write.
             directory: where this one writes, created when it is missing.
-            force: first delete the files that an earlier monitor wrote there.
+            instance_id: the environment's; see ``MonitorRoot.claim()``, also for the next two.
+            force: first delete what monitors left there that are gone.
             resume: go on counting where the earlier monitor ended.
             video_every: record a video of each episode whose number this divides; 0 for none.
             renderer: the thread that draws.
@@ -75,25 +74,28 @@ class Monitor:
         """
         if video_every:
             _require_video(env)
-        claimed = root.claim(directory, force, resume)
+        files = root.claim(directory, instance_id, force, resume)
         try:
-            recorder = _recorder(env, claimed.path, video_every) if video_every else None
-            table = claimed.open_table(COLUMNS)
+            recorder = _recorder(env, files, video_every) if video_every else None
+            files.begin(COLUMNS)
+        except OSError as error:
+            files.leave()
+            raise refuse(directory, error.strerror or str(error)) from error
         except BaseException:
-            claimed.release()
+            files.leave()
             raise
-        return cls(env, claimed, table, recorder, renderer)
+        return cls(env, files, recorder, renderer)
 
     def reset(self, *, seed: int | None, options: dict | None) -> tuple:
         """Reset the environment and start to record an episode."""
         self._finish_video()
         self._episode = None
-        number = self._directory.next_episode
+        number = self._files.next_episode
         if self._recorder is None:
             result = self._env.reset(seed=seed, options=options)
         else:
             result = self._reset_recorder(number, seed, options)
-        self._directory.next_episode = number + 1
+        self._files.next_episode = number + 1
         self._episode = number
         self._return = 0.0
         self._length = 0
@@ -122,19 +124,22 @@ class Monitor:
         """
         self._finish_video()
         try:
-            self._table.close()
-            self._directory.release()
+            self._files.release()
         except OSError as error:
             self._remember(error)
         if self._failure is not None:
             raise GymServerError(
                 "monitor_directory",
-                f"What was recorded in {self._directory.path} is incomplete: {self._failure}",
+                f"What was recorded in {self._files.path} is incomplete: {self._failure}",
             ) from self._failure
 
     def about(self) -> dict:
-        """Return where the monitor writes and how many episodes it has written."""
-        return {"directory": str(self._directory.path), "episodes": self._episodes}
+        """Return where the monitor writes, and how many episodes it has written."""
+        return {
+            "directory": str(self._files.path),
+            "table": self._files.table_name,
+            "episodes": self._episodes,
+        }
 
     def _finish_episode(self) -> None:
         seconds = time.perf_counter() - self._started
@@ -143,7 +148,7 @@ class Monitor:
         try:
             self._rows.writerow(row)
             # A reader, or a crash, finds every episode that is done.
-            self._table.flush()
+            self._files.table.flush()
             self._episodes += 1
         except OSError as error:
             self._remember(error)
@@ -156,7 +161,7 @@ class Monitor:
         recorder.episode_id = number - 1
         if recorder.episode_trigger(number):
             try:
-                self._directory.add(video_name(number))
+                self._files.add(self._files.video_name(number))
             except OSError as error:
                 self._remember(error)
         return self._renderer.run(lambda: recorder.reset(seed=seed, options=options))
@@ -175,7 +180,7 @@ class Monitor:
     def _remember(self, error: Exception) -> None:
         # The step or reset that ends an episode was taken and must be answered; close() tells.
         self._failure = self._failure or error
-        log.error("A monitor in %s lost something", self._directory.path, exc_info=error)
+        log.error("A monitor in %s lost something", self._files.path, exc_info=error)
 
 
 def _require_video(env: gymnasium.Env) -> None:
@@ -196,9 +201,14 @@ def _require_video(env: gymnasium.Env) -> None:
         ) from error
 
 
-def _recorder(env: gymnasium.Env, path: Path, video_every: int) -> gymnasium.wrappers.RecordVideo:
+def _recorder(
+    env: gymnasium.Env, files: MonitorFiles, video_every: int
+) -> gymnasium.wrappers.RecordVideo:
     recorder = gymnasium.wrappers.RecordVideo(
-        env, str(path), episode_trigger=lambda number: number % video_every == 0
+        env,
+        str(files.path),
+        episode_trigger=lambda number: number % video_every == 0,
+        name_prefix=files.video_prefix,
     )
     # A garbage collection after each video would stop every other environment.  (Not an
     # argument in Gymnasium 1.0.)

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 _ERROR = {
     "type": "object",
-    "required": ["message", "code"],
+    "required": ["message", "code", "documentation_url"],
     "properties": {
         "message": {"type": "string"},
         "code": {"type": "string"},
+        "documentation_url": {"type": "string", "format": "uri"},
         "hint": {"type": "string"},
         "extra": {"type": "string", "description": "The extra of the server that is missing."},
     },
@@ -107,6 +108,8 @@ def _answer(route: Route) -> dict:
     is_json = route.content_type == wire.JSON
     schema = ANSWERS.get(route.handler.__name__, {"type": "object"})
     content: dict = {route.content_type: {"schema": schema} if is_json else {}}
+    if route.html:
+        content[wire.HTML] = {}
     if route.tensors:
         # Raw bytes have no schema.
         content[TENSORS] = {}

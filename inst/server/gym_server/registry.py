@@ -14,6 +14,7 @@ from gymnasium import error
 from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 
+from gym_server.atari import classic_game
 from gym_server.errors import GymServerError, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra
 
@@ -52,9 +53,18 @@ def look_up(name: str) -> EnvSpec:
             return gymnasium.spec(_with_version(name))
         except (error.NameNotFound, error.NamespaceNotFound):
             _register_packages()
-            if namespace in _PACKAGES and _PACKAGES[namespace] not in _registered:
-                raise missing_extra(name, "atari") from None
+            _require_atari(name, namespace)
             return gymnasium.spec(_with_version(name))
+
+
+def _require_atari(name: str, namespace: str | None) -> None:
+    """Name the extra that an Atari game needs, if it is missing."""
+    if _PACKAGES["ALE"] in _registered:
+        return
+    if namespace == "ALE":
+        raise missing_extra(name, "atari") from None
+    if game := classic_game(name):
+        raise missing_extra(f"{name}, today {game[0]},", "atari") from None
 
 
 _registered: set[str] = set()

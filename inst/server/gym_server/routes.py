@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -19,6 +19,7 @@ from gym_server.instance import Instance
 from gym_server.instances import Instances
 from gym_server.limits import Watchers
 from gym_server.monitor_directory import MonitorRoot
+from gym_server.registry import LONGEST_ID
 from gym_server.tensors import TENSORS, Tensor
 from gym_server.tensors import write as write_tensors
 from gym_server.watch_keys import WatchKeys
@@ -80,7 +81,7 @@ class Route:
     """One route of the protocol.
 
     Attributes:
-        method: "GET" or "POST".
+        method: "GET", "POST" or "DELETE".
         path: Flask's rule, which also matches without its last slash.
         fields: what the body may hold, or the query of a GET.
         handler: returns a JSON object, a content of its own, or None for 204.
@@ -89,6 +90,7 @@ class Route:
             often it arrives.
         content_type: what an ordinary answer is.
         tensors: whether the answer may also be tensors, when the client accepts them.
+        html: whether the answer may also be HTML, when the client asks for that.
         tensor_body: whether the body may also be tensors.
     """
 
@@ -100,6 +102,7 @@ class Route:
     once: bool = False
     content_type: str = wire.JSON
     tensors: bool = False
+    html: bool = False
     tensor_body: bool = False
 
     @property
@@ -214,7 +217,7 @@ def env_reset(call: Call) -> dict:
     Field(
         "action",
         wire.ANYTHING,
-        "A member of the action space; with lanes a list of one for each lane that steps.",
+        "A member of the action space, a Box's bounds aside; with lanes one for each that steps.",
         required=True,
     ),
     Field(
@@ -298,8 +301,8 @@ def env_render(call: Call) -> Content:
     "POST",
     INSTANCE + "monitor/start/",
     Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", wire.BOOLEAN, "Delete what an earlier monitor wrote there."),
-    Field("resume", wire.BOOLEAN, "Go on counting where the earlier monitor ended."),
+    Field("force", wire.BOOLEAN, "Delete what monitors left there that are gone."),
+    Field("resume", wire.BOOLEAN, "Go on counting where an earlier monitor ended."),
     Field("video_callable", wire.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
 )
 def env_monitor_start(call: Call) -> None:
@@ -316,7 +319,7 @@ def env_monitor_start(call: Call) -> None:
 
 @declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
-    """Finish the monitor's files."""
+    """Finish the monitor's files; without a monitor there is nothing to do."""
     call.instance.close_monitor()
 
 
@@ -324,6 +327,12 @@ def env_monitor_close(call: Call) -> None:
 def env_close(call: Call) -> None:
     """Close an environment."""
     call.services.instances.close(call.path["instance_id"])
+
+
+@declare("DELETE", INSTANCE, once=True)
+def env_delete(call: Call) -> None:
+    """Close an environment, as its route close/ does."""
+    env_close(call)
 
 
 @declare(
@@ -343,17 +352,24 @@ def upload(call: Call) -> None:
     )
 
 
-@declare("POST", "/v1/shutdown/", answer="message")
-def shutdown(call: Call) -> dict:
+@declare("POST", "/v1/shutdown/", answer="message", html=True)
+def shutdown(call: Call) -> dict | Content:
     """Answer the requests under way and stop the server."""
     call.services.stop()
-    return {"message": "Server shutting down"}
+    message = "Server shutting down"
+    if wire.HTML in call.accept:
+        # As the classic server answered.
+        return Content(message.encode(), f"{wire.HTML}; charset=utf-8")
+    return {"message": message}
+
+
+_SEARCH = replace(wire.TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
 
 
 @declare(
     "GET",
     "/v1/registry/",
-    Field("search", wire.TEXT, "A part of the id; when it is part of none, the nearest ids."),
+    Field("search", _SEARCH, "A part of the id; when it is part of none, the nearest ids."),
     answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available",
 )
 def env_registry(call: Call) -> dict:

@@ -211,17 +211,15 @@ class VectorInstance(Instance):
                 raise reset_needed("step()")
             lanes = None if mask is None else self._lanes_of(mask)
             rows = self._lanes if lanes is None else len(lanes)
-            try:
-                batch = self._decode_lanes(action, rows)
-            except spaces.NotInSpace as refusal:
-                raise GymServerError("action_not_in_space", f"The action {refusal}") from None
+            batch = self._actions.read(action, rows)
             if self._autoreset_mode is AutoresetMode.DISABLED:
                 self._refuse_ended(lanes)
             try:
                 result = ask(self._step_lanes, batch, lanes, tensors and self._observes_tensors)
-            except GymServerError:
+            except GymServerError as failure:
                 # Some lanes may have moved, and others not.
                 self._was_reset = False
+                self._actions.explain(failure, action, rows)
                 raise
             self._steps += rows
             return result
@@ -241,16 +239,6 @@ class VectorInstance(Instance):
                 f"step() needs a running episode in every lane, and {_named(ended)} ended",
                 "reset with a reset_mask, or step the others with a step_mask",
             )
-
-    def _decode_lanes(self, action: object, rows: int) -> object:
-        whose = f"the {rows} lanes"
-        if rows != self._lanes:
-            whose += " that step"
-        if isinstance(action, spaces.Parts):
-            return spaces.decode_lanes_tensors(
-                self._lane_action_space, "action", action, rows, whose
-            )
-        return spaces.decode_lanes(self._lane_action_space, action, rows, whose)
 
     def _step_lanes(self, batch: object, lanes: np.ndarray | None, tensors: bool) -> dict:
         if lanes is None:

@@ -22,6 +22,7 @@ from gym_server.tensors import write as write_tensors
 from gym_server.wrappers import Wrapper
 
 JSON = "application/json"
+HTML = "text/html"
 
 # JSON ---------------------------------------------------------------------------------------
 
@@ -177,10 +178,10 @@ def integer(value: object) -> int:
 
 
 def _boolean(value: object) -> bool:
-    if isinstance(value, bool):
-        return value
     if isinstance(value, str) and value.lower() in ("true", "false"):
         return value.lower() == "true"
+    if isinstance(value, (bool, int, float)) and value in (0, 1):
+        return bool(value)
     raise ValueError
 
 
@@ -243,10 +244,15 @@ def _request_id(value: object) -> RequestId:
 
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
-ANY_ID = Kind({"type": "string"}, "a string", lambda value: value)
-# Also as words, which some classic clients send.
+ANY_ID = Kind(
+    {"type": "string", "examples": ["CartPole-v1", "Pendulum-v1", "MountainCar-v0"]},
+    "a string",
+    lambda value: value,
+)
+# Also as numbers and words, which some classic clients send.
 _TRUE_OR_FALSE = [
     {"type": "boolean"},
+    {"enum": [0, 1]},
     {"type": "string", "pattern": "^([Tt][Rr][Uu][Ee]|[Ff][Aa][Ll][Ss][Ee])$"},
 ]
 BOOLEAN = Kind({"anyOf": _TRUE_OR_FALSE}, "true or false", _boolean)

@@ -26,7 +26,8 @@ from gym_server.errors import answer_to
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.making import make
-from gym_server.monitor_directory import MonitorDirectory, claim
+from gym_server.monitor_directory import claim
+from gym_server.monitor_files import MonitorFiles
 from gym_server.worker_messages import read_question, refusal_of, value_of
 from gym_server.worker_pipe import Pipe
 
@@ -185,12 +186,11 @@ class _Asked:
     def look(self, lane: int) -> _Look:
         return _Look(*self.instance.look(lane))
 
-    def start_monitor(self, instance_id: str, reserved: Path, *args: object) -> None:
+    def start_monitor(self, instance_id: str, path: Path, *args: object) -> None:
         self.instance.instance_id = instance_id
-        self.instance.start_monitor(_Reserved(reserved), *args)
+        self.instance.start_monitor(_Resolved(path), *args)
 
-    def close_monitor(self, instance_id: str) -> None:
-        self.instance.instance_id = instance_id
+    def close_monitor(self) -> None:
         self.instance.close_monitor()
 
     def close(self) -> None:
@@ -215,11 +215,11 @@ class _Asked:
         return self.instance.observation_contains(claim)
 
 
-class _Reserved:
-    """Stands for the server's ``MonitorRoot``, which has reserved the directory already."""
+class _Resolved:
+    """Stands for the server's ``MonitorRoot``, which has allowed the directory already."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def claim(self, directory: str, force: bool, resume: bool) -> MonitorDirectory:
-        return claim(self._path, directory, force, resume, lambda path: None)
+    def claim(self, directory: str, *how: object) -> MonitorFiles:
+        return claim(self._path, directory, *how)

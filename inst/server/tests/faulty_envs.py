@@ -316,6 +316,15 @@ class SpoilsOneLane(Uneven):
         return super().step(action)
 
 
+class Insists(Uneven):
+    """Takes members of its action space alone, and at times not even those."""
+
+    def step(self, action):
+        assert self.action_space.contains(action), "no action"
+        assert self.left > 1, "too late"
+        return super().step(action)
+
+
 class Rogue(Counting):
     """Does something to its process, by name, where it is told to."""
 
@@ -459,6 +468,7 @@ for _kind in (
     ExitsInStep,
     Hanging,
     HangsWhere,
+    Insists,
     KillsItself,
     Letters,
     LongDouble,

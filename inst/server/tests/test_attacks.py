@@ -240,19 +240,23 @@ def test_a_link_that_comes_and_goes_leads_nowhere(attacked, ask, made, tmp_path)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_of_many_who_want_one_directory_one_gets_it(ask, made):
+def test_many_who_want_one_directory_get_files_of_their_own(attacked, ask, made):
     urls = [made() for _ in range(6)]
     statuses = []
 
     def start(url):
-        statuses.append(ask("POST", f"{url}/monitor/start/", {"directory": "wanted"})[0])
+        fields = {"directory": "wanted", "force": True}
+        statuses.append(ask("POST", f"{url}/monitor/start/", fields)[0])
 
     threads = [threading.Thread(target=start, args=(url,)) for url in urls]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert sorted(statuses) == [204] + 5 * [400]
+    assert statuses == 6 * [204]
+    tables = {ask("GET", f"{url}/")[1]["monitor"]["table"] for url in urls}
+    assert len(tables) == 6
+    assert tables == {path.name for path in (attacked.root / "runs" / "wanted").glob("*.csv")}
 
 
 # Searching, depth ----------------------------------------------------------------------------

@@ -76,6 +76,27 @@ def test_an_unknown_instance(client):
         assert answer.json["message"] == "Instance_id bad id unknown"
 
 
+def test_every_error_names_its_documentation(client, create, faulty):
+    """The classic R client prints message and documentation_url, or nothing where one lacks."""
+    broken = faulty("RaisesInStep")
+    client.post(f"{broken}/reset/")
+    answers = [
+        client.post("/v1/envs/bad id/reset/"),
+        client.post("/v1/envs/", json={"env_id": "bad string"}),
+        client.post("/v1/envs/", json={}),
+        client.post("/v1/envs/", data=b"{"),
+        client.post(f"{create(ENV_ID)}/step/", json={"action": 0}),
+        client.post(f"{broken}/step/", json={"action": 1}),
+        client.post("/v1/upload/", json={"training_dir": "d", "api_key": "k"}),
+        client.get("/nowhere"),
+        client.get("/v1/shutdown/"),
+    ]
+    for answer in answers:
+        assert answer.status_code >= 400
+        assert answer.json["message"]
+        assert answer.json["documentation_url"].startswith("https://github.com/openai/gym-http-api")
+
+
 def test_a_malformed_environment_id(client):
     answer = client.post("/v1/envs/", json={"env_id": "bad string"})
     assert answer.status_code == 400
@@ -123,6 +144,7 @@ def test_what_uploads_used_to_be(client):
         {"directory": "tmp", "force": True},
         {"directory": "tmp", "force": "true", "resume": "false", "video_callable": "false"},
         {"directory": "tmp", "force": True, "resume": False, "video_callable": False},
+        {"directory": "tmp", "force": 0, "resume": 1, "video_callable": 0},
     ],
 )
 def test_a_monitor_is_started_and_closed(client, create, body):
@@ -139,6 +161,20 @@ def test_continuous_actions_as_classic_clients_send_them(client, create):
     client.post(f"{url}/reset/")
     for action in ([0.5], 0.5, [1], 2):
         assert client.post(f"{url}/step/", json={"action": action}).status_code == 200
+
+
+def test_a_boolean_is_a_discrete_action_and_a_number_a_flag(client, create):
+    """The classic R client sends ``observation[[3]] > 0`` as it is."""
+    urls = [create(ENV_ID) for _ in range(2)]
+    for url in urls:
+        client.post(f"{url}/reset/", json={"seed": 1})
+    for action in (True, False, False):
+        taken = [
+            client.post(f"{urls[0]}/step/", json={"action": action, "render": 1}),
+            client.post(f"{urls[1]}/step/", json={"action": int(action), "render": 0}),
+        ]
+        assert taken[0].status_code == 200
+        assert taken[0].json == taken[1].json
 
 
 def test_the_random_agents_loop(client, create):

@@ -5,7 +5,9 @@ import faulty_envs
 import gymnasium
 import pytest
 
-from gym_server.creation import make
+from gym_server import registry
+from gym_server.atari import _GAMES, classic_game
+from gym_server.creation import find_spec, make
 from gym_server.errors import GymServerError
 
 MALFORMED = "Attempted to look up malformed environment ID"
@@ -32,7 +34,7 @@ def test_an_id_that_is_no_string_is_malformed():
 def test_a_deprecated_id_names_its_successor():
     refused = refusal("FrozenLake-v0")
     assert refused.code == "deprecated_env_id"
-    assert refused.message == f"{MALFORMED} 'FrozenLake-v0': that version is deprecated"
+    assert refused.message == "The environment 'FrozenLake-v0' is deprecated"
     assert refused.hint == "use FrozenLake-v1"
     assert refusal("LunarLander-v2").hint == "use LunarLander-v3"
 
@@ -40,9 +42,70 @@ def test_a_deprecated_id_names_its_successor():
 def test_an_unknown_id_names_the_nearest():
     refused = refusal("CartPol-v1")
     assert refused.code == "unknown_env_id"
-    assert refused.message.startswith(f"{MALFORMED} 'CartPol-v1': no environment of that name")
+    assert refused.message == "There is no environment 'CartPol-v1'"
     assert refused.hint.startswith("did you mean CartPole-v1")
-    assert "CartPole-v1" in refusal("cartpole-v1").hint
+
+
+def test_an_id_in_lower_case_is_unknown_and_not_malformed():
+    refused = refusal("cartpole-v1")
+    assert (refused.code, refused.message) == (
+        "unknown_env_id",
+        "There is no environment 'cartpole-v1'",
+    )
+    assert refused.hint.startswith("did you mean CartPole-v1")
+
+
+CLASSIC_ATARI = {
+    "Breakout-v0": "ALE/Breakout-v5",
+    "Pong-v0": "ALE/Pong-v5",
+    "Skiing-v0": "ALE/Skiing-v5",
+    "pong-v0": "ALE/Pong-v5",
+    "Pong": "ALE/Pong-v5",
+    "SpaceInvadersNoFrameskip-v4": "ALE/SpaceInvaders-v5",
+    "UpNDownDeterministic-v4": "ALE/UpNDown-v5",
+    "MsPacman-ram-v0": "ALE/MsPacman-v5",
+    "Qbert-ramNoFrameskip-v4": "ALE/Qbert-v5",
+}
+
+
+@pytest.fixture
+def no_atari(monkeypatch):
+    """Take ale_py away, as if it were not installed."""
+    monkeypatch.setattr(registry, "_registered", set())
+    monkeypatch.setitem(sys.modules, "ale_py", None)
+    known = dict(gymnasium.registry)
+    for env_id, spec in known.items():
+        if str(spec.entry_point).startswith("ale_py"):
+            monkeypatch.delitem(gymnasium.registry, env_id)
+
+
+@pytest.mark.parametrize(("env_id", "today"), CLASSIC_ATARI.items())
+def test_a_classic_atari_id_gets_the_hint_that_todays_gets(no_atari, env_id, today):
+    refused, wanted = refusal(env_id), refusal(today)
+    assert (refused.code, refused.extra) == ("missing_dependency", "atari")
+    assert refused.message == f"{env_id}, today {today}, needs the server's extra 'atari'"
+    assert refused.hint == wanted.hint
+
+
+def test_a_classic_atari_id_that_ale_does_not_have_names_todays():
+    pytest.importorskip("ale_py")
+    refused = refusal("Pong-ram-v0")
+    assert refused.code == "unknown_env_id"
+    assert refused.hint == 'use ALE/Pong-v5 with kwargs {"obs_type": "ram"}'
+
+
+def test_the_games_of_classic_gym_are_those_that_ale_has():
+    pytest.importorskip("ale_py")
+    assert find_spec("ALE/Pong-v5", ()).id == "ALE/Pong-v5"
+    for game in _GAMES.split():
+        assert f"ALE/{game}-v5" in gymnasium.registry
+        assert classic_game(f"{game}-v0") == (f"ALE/{game}-v5", False)
+    assert len(_GAMES.split()) == 62
+
+
+@pytest.mark.parametrize("env_id", ["CartPole-v1", "PongPong-v0", "ram-v0", "Blackjack-v1"])
+def test_another_id_is_no_atari_game(env_id):
+    assert classic_game(env_id) is None
 
 
 def test_what_cannot_be_made_in_any_way_is_not_offered():

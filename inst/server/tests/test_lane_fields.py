@@ -16,5 +16,13 @@ def test_seeds_may_be_one_a_lane():
     seed = [Field("seed", lane_fields.SEED, "")]
     assert wire.read({"seed": [1, None, 3.0]}, seed) == {"seed": (1, None, 3)}
     assert wire.read({"seed": 3.0}, seed) == {"seed": 3}
-    for value in (-1, "5", [1, -1], [True], [[1]]):
+    for value in (-1, "5", [1, -1], [[1]]):
         assert code_of(wire.read, {"seed": value}, seed) == "invalid_parameter"
+
+
+def test_true_and_false_are_the_seeds_1_and_0():
+    seed = [Field("seed", lane_fields.SEED, "")]
+    for value, number in ((True, 1), (False, 0), ([False, None, True], (0, None, 1))):
+        read = wire.read({"seed": value}, seed)["seed"]
+        assert read == number
+        assert repr(read) == repr(number)

@@ -99,6 +99,7 @@ def test_an_instance_tells_of_its_monitor(client, create, monitor_dir):
     episode(client, url)
     assert client.get(url).json["monitor"] == {
         "directory": str(monitor_dir / "run"),
+        "table": "episodes.csv",
         "episodes": 1,
     }
     stop(client, url)
@@ -107,11 +108,18 @@ def test_an_instance_tells_of_its_monitor(client, create, monitor_dir):
 
 def test_there_is_one_monitor_at_a_time(client, create):
     url = create()
-    assert client.post(f"{url}/monitor/close/").json["code"] == "monitor_not_active"
     assert start(client, url) == 204
     assert start(client, url, "other") == "monitor_active"
     stop(client, url)
     assert start(client, url, "other") == 204
+
+
+def test_closing_a_monitor_that_there_is_not_is_no_error(client, create):
+    url = create()
+    stop(client, url)
+    assert start(client, url) == 204
+    stop(client, url)
+    stop(client, url)
 
 
 def test_closing_a_monitor_leaves_the_environment_open(client, create):

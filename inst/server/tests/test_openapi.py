@@ -1,5 +1,6 @@
 import json
 
+import jsonschema
 import openapi_spec_validator
 import pytest
 
@@ -105,3 +106,46 @@ def test_lanes_are_described():
     assert "reset_mask" in fields("/v1/envs/{instance_id}/reset/")
     drawn = paths["/v1/envs/{instance_id}/render/"]["get"]["parameters"]
     assert [parameter["name"] for parameter in drawn] == ["instance_id", "lane"]
+
+
+def test_the_environment_ids_that_it_names_can_be_created(client):
+    """A fuzzer that knows no others finds instances to go on with."""
+    body = document(ROUTES)["paths"]["/v1/envs/"]["post"]["requestBody"]
+    examples = body["content"]["application/json"]["schema"]["properties"]["env_id"]["examples"]
+    assert len(examples) > 1
+    for env_id in examples:
+        assert client.post("/v1/envs/", json={"env_id": env_id}).status_code == 200
+
+
+def test_the_longest_search_is_named(client):
+    (search,) = document(ROUTES)["paths"]["/v1/registry/"]["get"]["parameters"]
+    longest = search["schema"]["maxLength"]
+    for length, status in ((longest, 200), (longest + 1, 400)):
+        assert client.get(f"/v1/registry/?search={'x' * length}").status_code == status
+
+
+def test_errors_are_as_they_are_described(client, create):
+    schema = document(ROUTES)["components"]["schemas"]["Error"]
+    for answer in (
+        client.get("/nowhere"),
+        client.post("/v1/envs/", json={"env_id": "cartpole-v1"}),
+        client.post(f"{create()}/step/", json={"action": 0}),
+    ):
+        assert set(schema["required"]) <= set(answer.json) <= set(schema["properties"])
+
+
+@pytest.mark.parametrize("flag", [True, False, 0, 1, "true", "FALSE"])
+def test_flags_are_described_as_they_are_taken(client, create, flag):
+    body = document(ROUTES)["paths"]["/v1/envs/{instance_id}/step/"]["post"]["requestBody"]
+    render = body["content"]["application/json"]["schema"]["properties"]["render"]
+    assert jsonschema.Draft202012Validator(render["anyOf"][0]).is_valid(flag)
+    url = create()
+    client.post(f"{url}/reset/")
+    assert client.post(f"{url}/step/", json={"action": 0, "render": flag}).status_code == 200
+
+
+@pytest.mark.parametrize("seed", [True, False, 0, 7, [1, None, True]])
+def test_seeds_are_described_as_they_are_taken(seed):
+    body = document(ROUTES)["paths"]["/v1/envs/"]["post"]["requestBody"]
+    described = body["content"]["application/json"]["schema"]["properties"]["seed"]["anyOf"][0]
+    assert jsonschema.Draft202012Validator(described).is_valid(seed)

@@ -7,7 +7,7 @@ from gym_server import __version__
 from gym_server.app import Config, create_app
 
 
-@pytest.mark.parametrize("seed", [-1, 1.5, True, "1"])
+@pytest.mark.parametrize("seed", [-1, 1.5, [[1]], "1"])
 def test_a_seed_that_is_none_is_named(client, create, seed):
     answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1", "seed": seed})
     assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
@@ -45,7 +45,7 @@ def test_options_that_are_no_object_are_refused(client, create, options):
 
 @pytest.mark.parametrize(
     ("x", "member"),
-    [("0", True), ("1", True), ("1.0", True), ("2", False), ("true", False), ("left", False)],
+    [("0", True), ("1", True), ("1.0", True), ("2", False), ("true", True), ("left", False)],
 )
 def test_contains_reads_the_value_from_the_url(client, create, x, member):
     url = create()
@@ -86,6 +86,48 @@ def test_shutdown_answers_and_asks_for_the_stop(monitor_dir):
     assert (answer.status_code, answer.json) == (200, {"message": "Server shutting down"})
     assert stops == [True]
     app.close()
+
+
+@pytest.mark.parametrize("accept", ["text/html", "text/html,application/xml;q=0.9,*/*;q=0.8"])
+def test_shutdown_answers_html_to_who_asks_for_that(monitor_dir, accept):
+    app = create_app(Config(monitor_dir=monitor_dir))
+    answer = app.test_client().post("/v1/shutdown/", headers={"Accept": accept})
+    assert (answer.status_code, answer.text) == (200, "Server shutting down")
+    assert answer.content_type == "text/html; charset=utf-8"
+    app.close()
+
+
+@pytest.mark.parametrize("accept", ["*/*", "application/json", ""])
+def test_others_get_json(monitor_dir, accept):
+    app = create_app(Config(monitor_dir=monitor_dir))
+    answer = app.test_client().post("/v1/shutdown/", headers={"Accept": accept})
+    assert answer.json == {"message": "Server shutting down"}
+    app.close()
+
+
+@pytest.mark.parametrize("slash", ["", "/"])
+def test_delete_closes(client, create, slash):
+    url = create()
+    answer = client.delete(f"{url}{slash}")
+    assert (answer.status_code, answer.data) == (204, b"")
+    assert client.get("/v1/envs/").json == {"all_envs": {}}
+    assert client.delete(f"{url}{slash}").json["code"] == "unknown_instance"
+
+
+def test_a_numbered_delete_closes_once(client, create):
+    url = create()
+    request = {"key": "k", "number": 1}
+    for _ in range(2):
+        answer = client.delete(f"{url}/", json={"request": request})
+        assert (answer.status_code, answer.headers["Gym-Request"]) == (204, "k 1")
+
+
+def test_delete_finishes_the_monitor(client, create, monitor_dir):
+    url = create()
+    client.post(f"{url}/monitor/start/", json={"directory": "run"})
+    client.delete(f"{url}/")
+    assert (monitor_dir / "run" / "episodes.csv").read_text().startswith("episode,")
+    assert client.post(f"{create()}/monitor/start/", json={"directory": "run"}).status_code == 400
 
 
 @pytest.mark.parametrize(

@@ -216,7 +216,7 @@ def test_a_nested_space_travels_in_parts(client, faulty):
         ({"action/pixels": np.zeros((2, 2))}, {}, '"F64 [2, 2]" at $pixels is not in Box'),
         ({"action/pixels": np.zeros(4, np.uint8)}, {}, '"U8 [4]" at $pixels is not in Box'),
         ({"action/a~1b~0/0": np.array(7)}, {}, "7 at $`a/b~`[0] is not in Discrete(3, start=-1)"),
-        ({"action/a~1b~0/1": np.array([2.0])}, {}, "2.0 at $`a/b~`[1][0] is not in Box"),
+        ({"action/a~1b~0/1": np.array([np.nan])}, {}, '"NaN" at $`a/b~`[1][0] is not in Box'),
         ({"action/more": np.array(1)}, {}, '"action/more" is not in Dict('),
         ({}, {"action/word": "zzz"}, '"zzz" at $word is not in Text'),
         ({}, {"action/word": None}, "null at $word is not in Text"),

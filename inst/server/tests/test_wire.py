@@ -72,6 +72,18 @@ def test_an_action_is_missing_only_when_it_is_absent_or_null(value):
     assert code_of(wire.read, {"action": None}, action) == "missing_parameter"
 
 
+@pytest.mark.parametrize("value", [0, 1, 0.0, 1.0])
+def test_0_and_1_are_false_and_true(value):
+    flag = [Field("force", wire.BOOLEAN, "")]
+    assert wire.read({"force": value}, flag)["force"] is bool(value)
+
+
+@pytest.mark.parametrize("value", [2, -1, 0.5, [1], {}, "1"])
+def test_no_other_number_is_a_flag(value):
+    flag = [Field("force", wire.BOOLEAN, "")]
+    assert code_of(wire.read, {"force": value}, flag) == "invalid_parameter"
+
+
 def test_booleans_may_be_words():
     flag = [Field("force", wire.BOOLEAN, "")]
     assert wire.read({"force": "true"}, flag) == {"force": True}

@@ -34,6 +34,7 @@ from gym_server.spaces.tensor_parts import (
     encode_tensors,
     travels_as_tensors,
 )
+from gym_server.spaces.wide_boxes import with_wide_boxes
 
 __all__ = [
     "NotInSpace",
@@ -53,4 +54,5 @@ __all__ = [
     "encode_tensors",
     "stack",
     "travels_as_tensors",
+    "with_wide_boxes",
 ]

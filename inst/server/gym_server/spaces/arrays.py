@@ -55,6 +55,17 @@ def reader_of(dtype: np.dtype) -> Callable[[object], object]:
     return _READERS[dtype.kind]
 
 
+def as_number(value: object) -> object:
+    """Return true and false as 1 and 0, for Discrete and MultiDiscrete; others as they are."""
+    return int(value) if isinstance(value, bool) else value
+
+
+def choice_reader_of(dtype: np.dtype) -> Callable[[object], object]:
+    """Return what reads one element of a MultiDiscrete of a dtype out of JSON."""
+    read = reader_of(dtype)
+    return lambda value: read(as_number(value))
+
+
 @dataclass(frozen=True)
 class Bounds:
     """The smallest and the largest member, element by element."""

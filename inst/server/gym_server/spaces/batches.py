@@ -7,13 +7,21 @@ an array.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text, Tuple
 
-from gym_server.spaces.arrays import bounds_of, check_bounds, read_array, read_bit, reader_of
+from gym_server.spaces.arrays import (
+    bounds_of,
+    check_bounds,
+    choice_reader_of,
+    read_array,
+    read_bit,
+    reader_of,
+)
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode_part, encode
 from gym_server.spaces.stacking import stack, unstack
@@ -98,13 +106,23 @@ class _Batched(NamedTuple):
 def _all_at_once(space: Space, value: list) -> np.ndarray:
     batched = _Batched((len(value), *space.shape), space.dtype)
     if not isinstance(space, Discrete):
-        reader = read_bit if isinstance(space, MultiBinary) else reader_of(space.dtype)
+        reader = _reader_of(space)
         return read_array(batched, bounds_of(space), reader, value)  # type: ignore[arg-type]
-    if set(map(type, value)) != {int}:
+    if not set(map(type, value)) <= {int, bool}:
         raise TypeError("not only integers")
     array = np.array(value, dtype=wide_dtype(space))
     check_bounds(space, bounds_of(space), array)
     return array.astype(space.dtype)
+
+
+def _reader_of(space: Space) -> Callable[[object], object]:
+    match space:
+        case MultiBinary():
+            return read_bit
+        case MultiDiscrete():
+            return choice_reader_of(space.dtype)
+        case _:
+            return reader_of(space.dtype)
 
 
 # Tensors ------------------------------------------------------------------------------------

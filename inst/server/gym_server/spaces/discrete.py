@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import Discrete
 
-from gym_server.spaces.arrays import Bounds, bounds_of, read_integer
+from gym_server.spaces.arrays import Bounds, as_number, bounds_of, read_integer
 from gym_server.spaces.kinds import NotInSpace, decode, description, encode
 
 
@@ -38,7 +38,7 @@ def wide_dtype(space: Discrete) -> np.dtype:
 @decode.register
 def _(space: Discrete, value: object) -> object:
     try:
-        number = read_integer(value)
+        number = read_integer(as_number(value))
     except (TypeError, OverflowError):
         raise NotInSpace(space, value) from None
     if not 0 <= number - int(space.start) < int(space.n):

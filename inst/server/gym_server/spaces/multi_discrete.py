@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from gymnasium.spaces import MultiDiscrete
 
-from gym_server.spaces.arrays import Bounds, bounds_of, read_array, reader_of
+from gym_server.spaces.arrays import Bounds, bounds_of, choice_reader_of, read_array
 from gym_server.spaces.kinds import decode, description, encode
 
 
@@ -27,7 +27,7 @@ def _(space: MultiDiscrete, value: object) -> object:
 
 @decode.register
 def _(space: MultiDiscrete, value: object) -> object:
-    return read_array(space, bounds_of(space), reader_of(space.dtype), value)
+    return read_array(space, bounds_of(space), choice_reader_of(space.dtype), value)
 
 
 @bounds_of.register

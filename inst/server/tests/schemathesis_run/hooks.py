@@ -58,7 +58,7 @@ def before_call(context, case, kwargs):
         if not linked and not _takes_turns("unknown", 10):
             base = case.operation.base_url.rstrip("/")
             case.path_parameters["instance_id"] = _living(base)
-            if name == "env_close":
+            if name in ("env_close", "env_delete"):
                 _turn.living = None
     if isinstance(case.body, bytes) and not case.body.strip():
         # Of all random bytes blanks alone are a body: an empty one.

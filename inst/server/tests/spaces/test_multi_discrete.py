@@ -3,7 +3,7 @@ import pytest
 from gymnasium.spaces import MultiDiscrete
 from refusals import refused
 
-from gym_server.spaces import decode, describe
+from gym_server.spaces import decode, decode_lanes, describe
 
 SPACE = MultiDiscrete([[2, 3], [4, 5]], dtype=np.int32, start=[[0, -1], [0, 10]])
 
@@ -25,6 +25,14 @@ def test_a_list_gets_its_dtype_and_shape():
         assert member.tolist() == [[1, 1], [3, 14]]
 
 
+def test_true_and_false_are_1_and_0_as_for_discrete():
+    space = MultiDiscrete([2, 2], dtype=np.uint8)
+    assert decode(space, [True, False]).tolist() == [1, 0]
+    lanes = [[True, False], [0, True]]
+    assert decode_lanes(space, lanes, 2, "").tolist() == [[1, 0], [0, 1]]
+    assert refused(space, [-1, True]).startswith("-1 at [0]")
+
+
 @pytest.mark.parametrize(
     ("value", "words"),
     [
@@ -32,7 +40,7 @@ def test_a_list_gets_its_dtype_and_shape():
         ([[0, 2], [0, 10]], "2 at [0][1] is not in MultiDiscrete"),
         ([0, 0, 4, 10], "4 at [2] is not in MultiDiscrete"),
         ([[0, 0.5], [0, 10]], "0.5 at [0][1] is not in MultiDiscrete"),
-        ([[0, True], [0, 10]], "true at [0][1] is not in MultiDiscrete"),
+        ([[0, 1], [0, True]], "1 at [1][1] is not in MultiDiscrete"),
         ([[0, 0], [0, 2**40]], "1099511627776 at [1][1] is not in MultiDiscrete"),
         ([0, 0, 0], "[0, 0, 0] is not in MultiDiscrete"),
         (0, "0 is not in MultiDiscrete"),

@@ -1,0 +1,69 @@
+"""Read the actions that clients send, and say more where an environment refuses one."""
+
+from __future__ import annotations
+
+from gymnasium.spaces import Space
+
+from gym_server import spaces
+from gym_server.errors import GymServerError
+
+_CLIP = (
+    "the action lies outside of the bounds of its Box; the wrapper ClipAction keeps actions "
+    'inside, in R by gym_wrap(..., "ClipAction")'
+)
+
+
+class ActionReader:
+    """Reads what is sent as an action of one space.
+
+    A Box's bounds are the environment's affair, as they are in Gymnasium; everything else that
+    makes a member is asked for.
+    """
+
+    def __init__(self, space: Space, lanes: int) -> None:
+        """Name the space.
+
+        Args:
+            space: of one action.
+            lanes: how many lanes there are.
+        """
+        self._space = space
+        self._taken = spaces.with_wide_boxes(space)
+        self._lanes = lanes
+
+    def read(self, action: object, rows: int | None = None) -> object:
+        """Return the action, or with lanes the batch of actions, that was sent.
+
+        Args:
+            action: a JSON value or ``Parts``.
+            rows: how many lanes step; None for a single environment.
+
+        Raises:
+            GymServerError: ``action_not_in_space``.
+        """
+        try:
+            return self._decode(self._taken, action, rows)
+        except spaces.NotInSpace as refusal:
+            raise GymServerError("action_not_in_space", f"The action {refusal}") from None
+
+    def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
+        """Give an environment's own failure a hint, where the action was outside of a Box."""
+        if failure.code != "environment_error":
+            return
+        try:
+            self._decode(self._space, action, rows)
+        except spaces.NotInSpace:
+            failure.hint = _CLIP
+
+    def _decode(self, space: Space, action: object, rows: int | None) -> object:
+        is_parts = isinstance(action, spaces.Parts)
+        if rows is None:
+            if is_parts:
+                return spaces.decode_tensors(space, "action", action)
+            return spaces.decode(space, action)
+        whose = f"the {rows} lanes"
+        if rows != self._lanes:
+            whose += " that step"
+        if is_parts:
+            return spaces.decode_lanes_tensors(space, "action", action, rows, whose)
+        return spaces.decode_lanes(space, action, rows, whose)

@@ -1,0 +1,33 @@
+"""The ids that the Atari games had in OpenAI's Gym, and the ids that they have today."""
+
+from __future__ import annotations
+
+import re
+
+# Those of Gym 0.21, whose ids classic scripts have. Only ale_py knows them, if it is there.
+_GAMES = """
+    Adventure AirRaid Alien Amidar Assault Asterix Asteroids Atlantis BankHeist BattleZone
+    BeamRider Berzerk Bowling Boxing Breakout Carnival Centipede ChopperCommand CrazyClimber
+    Defender DemonAttack DoubleDunk ElevatorAction Enduro FishingDerby Freeway Frostbite Gopher
+    Gravitar Hero IceHockey Jamesbond JourneyEscape Kangaroo Krull KungFuMaster
+    MontezumaRevenge MsPacman NameThisGame Phoenix Pitfall Pong Pooyan PrivateEye Qbert
+    Riverraid RoadRunner Robotank Seaquest Skiing Solaris SpaceInvaders StarGunner Tennis
+    TimePilot Tutankham UpNDown Venture VideoPinball WizardOfWor YarsRevenge Zaxxon
+"""
+_BY_LOWER_CASE = {game.lower(): game for game in _GAMES.split()}
+
+_CLASSIC = re.compile(r"(\w+?)(-ram)?(?:Deterministic|NoFrameskip)?(?:-v\d+)?", re.IGNORECASE)
+
+
+def classic_game(name: str) -> tuple[str, bool] | None:
+    """Return what a classic id of an Atari game is called today, and whether it shows memory.
+
+    Args:
+        name: such as ``Breakout-v0`` or ``Pong-ramNoFrameskip-v4``.
+
+    Returns:
+        Such as ``("ALE/Pong-v5", True)``; None for any other id.
+    """
+    match = _CLASSIC.fullmatch(name)
+    game = match and _BY_LOWER_CASE.get(match[1].lower())
+    return (f"ALE/{game}-v5", match[2] is not None) if game else None

@@ -1,0 +1,43 @@
+"""Lock a file until it is closed: for one process alone, and gone with it however it ends."""
+
+from __future__ import annotations
+
+import errno
+import os
+from typing import IO
+
+if os.name == "nt":
+    import msvcrt
+
+    # Windows keeps others from reading what is locked, so that lies far behind the file's end.
+    _FAR_BEHIND = 2**30
+
+    def _lock(descriptor: int) -> None:
+        os.lseek(descriptor, _FAR_BEHIND, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_END)
+
+else:
+    import fcntl
+
+    def _lock(descriptor: int) -> None:
+        # Not lockf(): its locks are the process's, who could take them twice, and end when any
+        # other handle of the file is closed.
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def try_lock(file: IO) -> bool:
+    """Lock an open file until it is closed; tell whether nobody else had.
+
+    Raises:
+        OSError: the file system has no locks.
+    """
+    try:
+        _lock(file.fileno())
+    except OSError as error:
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK):
+            return False
+        raise
+    return True
