@@ -24,8 +24,9 @@
 #'   environment, without lanes.
 #' @param kwargs A named list of further arguments for the environment, such as
 #'   `list(gravity = -5)` for LunarLander or `list(map_name = "8x8")` for
-#'   FrozenLake. A vector of length one travels as a single value, wrapped in `I()`
-#'   as a list of one.
+#'   FrozenLake. `list(max_episode_steps = 1000)` sets another limit of steps for any
+#'   environment, higher or lower than its own, and -1 none. A vector of length one
+#'   travels as a single value, wrapped in `I()` as a list of one.
 #' @param wrappers A list of wrappers, applied in this order: each a list of the
 #'   wrapper's name, a string, and its arguments by name, such as
 #'   `list("TimeLimit", max_episode_steps = 50)`. [gym_wrap()] writes such a list

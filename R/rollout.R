@@ -40,7 +40,8 @@
 #' @param max_steps After how many steps to cut an episode short, a whole number of
 #'   at least 1. Such an episode counts as truncated. `NULL`, the default, leaves it
 #'   to the environment; most have a limit of their own, but without one a policy
-#'   that never fails plays forever.
+#'   that never fails plays forever. No episode goes on beyond the environment's own limit;
+#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one with another.
 #' @param seed A whole number that fixes all that is drawn: the result is that of
 #'   calling `set.seed(seed)` beforehand, but the session's generator is afterwards as
 #'   it was. `NULL`, the default, draws from the session's generator.
@@ -82,6 +83,7 @@
 #'   that does not return one action for each observation;
 #'   `gym_error_http` when the server refuses the environment or an action;
 #'   `gym_error_connection` when it does not answer.
+#' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -118,6 +120,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     # A policy that is made in the call draws its weights under the seed, too.
     check_policy(policy)
     play <- function(lanes) {
+      warn_of_own_limit(max_steps, lanes, call)
       policy <- policy_bind(policy, lanes, call = call)
       record <- new_record(episodes)
       seeds <- draw_block_seeds(lanes, episodes)

@@ -71,7 +71,9 @@
 #'   environment that has none there is no early end, nor with `target = Inf`.
 #' @param max_steps After how many steps to cut an episode short, a whole number of at least
 #'   1. `NULL`, the default, leaves it to the environment (200 steps in CartPole-v0); most have
-#'   a limit, but without one a policy that never fails plays forever.
+#'   a limit, but without one a policy that never fails plays forever. No episode goes on beyond
+#'   the environment's own limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one
+#'   with another.
 #' @param seed A whole number that fixes all that is drawn: the result is that of calling
 #'   `set.seed(seed)` beforehand, but the session's generator is afterwards as it was.
 #'   `NULL`, the default, draws from the session's generator.
@@ -114,6 +116,7 @@
 #'   search with other arguments (the message names them, and so does the field `argument`) or
 #'   cannot be written; `gym_error_search` for any error while it plays, with the classes of
 #'   that error, `gym_error_http` or `gym_error_connection` for instance.
+#' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
 #' @seealso [gym_search] for what to do with the result; [search_repeat()] for how long such
@@ -142,6 +145,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     return(finished_search(kept$saved, settings, client, kept$path))
   }
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
+    warn_of_own_limit(max_steps, lanes, call)
     settings <- settings_in(lanes, settings)
     bound <- policy_bind(policy, lanes, call = call)
     with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call, kept))

@@ -64,6 +64,35 @@ test_that("max_steps cuts an episode short, which counts as truncated", {
   expect_false(whole$episodes$truncated)
 })
 
+test_that("max_steps beyond the environment's own limit is warned of, with what raises it", {
+  env <- fake_environment(id = "MountainCar-v0")
+  env$spec$max_episode_steps <- 200L
+  for (play in list(
+    function(...) rollout(env, policy_random(), ...),
+    function(...) search_random(env, policy_network(c(4, 1)), rounds = 1, progress = FALSE, ...),
+    function(...) search_repeat(env, policy_network(c(4, 1)), rounds = 1, target = 1, seeds = 1:3,
+                                progress = FALSE, ...)
+  )) {
+    expect_silent(play())
+    expect_silent(play(max_steps = 200))
+    warning <- expect_warning(play(max_steps = 1000), class = "gym_warning_max_steps")
+    expect_match(conditionMessage(warning), "a limit of its own, 200 steps.", fixed = TRUE)
+    expect_match(
+      conditionMessage(warning), "`gym_make(\"MountainCar-v0\", max_episode_steps = 1000)`",
+      fixed = TRUE
+    )
+  }
+})
+
+test_that("what the warning of max_steps says raises the limit that is played", {
+  env <- local_env("MountainCar-v0", max_episode_steps = 230)
+  expect_identical(env$spec$max_episode_steps, 230L)
+  expect_silent(played <- rollout(env, function(observation) 0L, max_steps = 230))
+  expect_identical(played$episodes$length, 230L)
+  wrapped <- gym_wrap("MountainCar-v0", "TimeLimit", max_episode_steps = 1000)
+  expect_identical(local_env(wrapped)$spec$max_episode_steps, 200L)
+})
+
 test_that("a row of the steps has the observation that its action was taken on", {
   env <- fake_environment(id = "CartPole-v1", reward = by_seed)
   seen <- list()
