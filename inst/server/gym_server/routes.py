@@ -354,7 +354,8 @@ def shutdown(call: Call) -> dict:
     "GET",
     "/v1/registry/",
     Field("search", wire.TEXT, "A part of the id; when it is part of none, the nearest ids."),
-    answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available",
+    answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available, "
+    "reason (why one is not available)",
 )
 def env_registry(call: Call) -> dict:
     """List what can be created."""
