@@ -164,8 +164,10 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' last step of an episode the environment wants [env_reset()]; stepping on is
 #' left to the environment and warned of once an episode.
 #'
-#' With lanes it takes an action for each of them, and moves each on; what becomes of
-#' a lane whose episode has ended is a matter of `autoreset_mode`, see [env_create()].
+#' With lanes it takes an action for each of them, and moves each on. What becomes of
+#' a lane whose episode has ended is a matter of `autoreset_mode`, see [env_create()]: by
+#' default, `"NextStep"`, this step resets it, takes no action in it and returns its new first
+#' observation, the reward 0 and neither `terminated` nor `truncated`.
 #'
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete, a

@@ -16,6 +16,16 @@
 #' environment's own implementation of lanes may be another game than the single one
 #' in details, such as the size of the Atari games' pictures.
 #'
+#' # After an episode's end
+#'
+#' An environment without `num_envs` wants `$reset()` when a step has returned `done`. With
+#' `num_envs` `autoreset_mode` says what becomes of a lane that has ended while the others play
+#' on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken, its
+#' observation is the first of the new episode, its reward is 0, and neither `terminated` nor
+#' `truncated` is set. Whoever sums rewards or counts steps leaves that step out, as [rollout()]
+#' does. With `"SameStep"` the step that ends an episode already returns the first observation of
+#' the next one, with `"Disabled"` `$reset(mask = )` does it.
+#'
 #' @inheritParams env_create
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
@@ -24,7 +34,8 @@
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
 #'     episode and returns the first observation, as [env_reset()],
-#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()],
+#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()]; after an
+#'     episode's end see below,
 #'   * `$render(lane = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,

@@ -37,7 +37,8 @@
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
 #'   rollout that was played without the steps or frames that are to be shown.
 #' @references The density is that of [stats::density()] with its default bandwidth, within
-#'   the range of the returns, as in the figure of the post "Artificial Intelligence in R (I)".
+#'   the range of the returns, as in the figure of the tutorial *Artificial Intelligence in R (I)*
+#'   (2018).
 #' @seealso [animate()] for a moving picture.
 #' @export
 #' @examplesIf gym:::can_start_server()

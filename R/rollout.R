@@ -16,7 +16,9 @@
 #' are played at once, each in a lane of its own: 256 where the environment has a vector
 #' implementation of its own (CartPole has), elsewhere 16. They are played in blocks:
 #' all lanes begin an episode together, and the next block begins when all have ended, so
-#' that short episodes are not favoured.
+#' that short episodes are not favoured. The policy is asked about the episodes that still play:
+#' as they end, what a function is given has fewer and fewer rows, and it returns as many actions
+#' as there are. A row is not the same episode throughout.
 #'
 #' Only with `frames = TRUE` one episode is played after the other, in an environment without
 #' lanes: other episodes, in CartPole, than the same seed plays side by side, as they are
@@ -34,7 +36,8 @@
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with lanes or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
 #'   function of many observations that returns as many actions: for the usual
-#'   environments a function of a matrix with an observation in each row, see [act()].
+#'   environments a function of a matrix with an observation in each row, one for each episode
+#'   that still plays, see [act()].
 #' @param episodes How many episodes to play, a whole number of at least 1; the
 #'   default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of

@@ -93,6 +93,16 @@ test_that("what the warning of max_steps says raises the limit that is played", 
   expect_identical(local_env(wrapped)$spec$max_episode_steps, 200L)
 })
 
+test_that("a function is asked about the episodes that still play", {
+  rows <- integer()
+  count_rows <- function(observation) {
+    rows <<- c(rows, nrow(observation))
+    rep(0L, nrow(observation))
+  }
+  rollout(scripted_lanes(3, c(1, 1, 1), c(1L, 3L, 2L)), count_rows, episodes = 3)
+  expect_identical(utils::tail(rows, 3), 3:1)
+})
+
 test_that("a row of the steps has the observation that its action was taken on", {
   env <- fake_environment(id = "CartPole-v1", reward = by_seed)
   seen <- list()
