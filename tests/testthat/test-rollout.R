@@ -67,15 +67,16 @@ test_that("max_steps cuts an episode short, which counts as truncated", {
 test_that("max_steps beyond the environment's own limit is warned of, with what raises it", {
   env <- fake_environment(id = "MountainCar-v0")
   env$spec$max_episode_steps <- 200L
-  for (play in list(
-    function(...) rollout(env, policy_random(), ...),
-    function(...) search_random(env, policy_network(c(4, 1)), rounds = 1, progress = FALSE, ...),
-    function(...) search_repeat(env, policy_network(c(4, 1)), rounds = 1, target = 1, seeds = 1:3,
-                                progress = FALSE, ...)
-  )) {
-    expect_silent(play())
-    expect_silent(play(max_steps = 200))
-    warning <- expect_warning(play(max_steps = 1000), class = "gym_warning_max_steps")
+  network <- policy_network(c(4, 1))
+  plays <- list(
+    function(steps) rollout(env, policy_random(), max_steps = steps),
+    function(steps) search_random(env, network, rounds = 1, max_steps = steps),
+    function(steps) search_repeat(env, network, 1, target = 1, seeds = 1:3, max_steps = steps)
+  )
+  for (play in plays) {
+    expect_silent(play(NULL))
+    expect_silent(play(200))
+    warning <- expect_warning(play(1000), class = "gym_warning_max_steps")
     expect_match(conditionMessage(warning), "a limit of its own, 200 steps.", fixed = TRUE)
     expect_match(
       conditionMessage(warning), "`gym_make(\"MountainCar-v0\", max_episode_steps = 1000)`",
