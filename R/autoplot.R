@@ -30,23 +30,38 @@ autoplot.gym_rollout <- function(object, type = c("returns", "trajectory"), epis
 
 autoplot_returns <- function(x) {
   data <- rollout_plot_data(x)
-  label <- median_label(data)
-  plot <- ggplot2::ggplot(data.frame(value = data$returns), ggplot2::aes(x = .data$value))
-  if (!is.null(data$density)) {
-    plot <- plot + ggplot2::geom_area(
-      ggplot2::aes(x = .data$x, y = .data$y), data = data$density, stat = "identity",
-      fill = okabe_ito$sky_blue, alpha = 0.4, colour = okabe_ito$blue
-    )
-  }
-  plot +
-    ggplot2::geom_rug(sides = "b", colour = okabe_ito$blue) +
+  ggplot2::ggplot(data.frame(value = data$returns), ggplot2::aes(x = .data$value)) +
+    (if (is.null(data$bars)) density_layers(data$density) else bar_layers(data$bars)) +
     ggplot2::geom_vline(xintercept = data$median, colour = okabe_ito$vermillion,
                         linetype = "dashed") +
     ggplot2::coord_cartesian(xlim = data$xlim, ylim = data$ylim) +
     ggplot2::labs(
-      x = returns_label, y = if (!is.null(data$density)) "density", title = played_title(x),
-      subtitle = label
+      x = returns_label, y = returns_measure(data), title = played_title(x),
+      subtitle = median_label(data)
     )
+}
+
+density_layers <- function(density) {
+  list(
+    ggplot2::geom_area(
+      ggplot2::aes(x = .data$x, y = .data$y), data = density, stat = "identity",
+      fill = okabe_ito$sky_blue, alpha = 0.4, colour = okabe_ito$blue
+    ),
+    ggplot2::geom_rug(sides = "b", colour = okabe_ito$blue)
+  )
+}
+
+bar_layers <- function(bars) {
+  at <- bar_marks(bars) %||% ggplot2::waiver()
+  list(
+    ggplot2::geom_rect(
+      ggplot2::aes(xmin = .data$xmin, xmax = .data$xmax, ymin = 0, ymax = .data$episodes),
+      data = bars, inherit.aes = FALSE, fill = okabe_ito$sky_blue, alpha = 0.4,
+      colour = okabe_ito$blue
+    ),
+    ggplot2::scale_x_continuous(breaks = at),
+    ggplot2::scale_y_continuous(breaks = few_breaks)
+  )
 }
 
 autoplot_trajectory <- function(x, episode, data) {
@@ -65,7 +80,7 @@ autoplot_trajectory <- function(x, episode, data) {
     trajectory_layers(values, data) +
     ggplot2::facet_wrap(ggplot2::vars(.data$panel), scales = "free_y", ncol = 2L,
                         labeller = ggplot2::as_labeller(facet_labels(data))) +
-    ggplot2::scale_y_continuous(breaks = few_breaks) +
+    ggplot2::scale_y_continuous(breaks = trajectory_breaks(values)) +
     ggplot2::labs(x = "steps taken", y = NULL, title = played_title(x),
                   subtitle = trajectory_subtitle(x, episode, data))
 }
@@ -117,6 +132,19 @@ few_breaks <- function(limits) {
   from <- ceiling(limits[[1L]])
   to <- floor(limits[[2L]])
   if (from < to && to - from < 7) from:to else pretty(limits)
+}
+
+# In a panel of a constant its value alone. ggplot2 tells only what the panel shows: around a
+# constant that is 0.05 to either side.
+trajectory_breaks <- function(values) {
+  shown <- values[values$kind != "choice" & is.finite(values$value), ]
+  each <- split(shown$value, shown$panel)
+  constants <- unlist(lapply(each, function(value) if (length(unique(value)) == 1L) value[[1L]]))
+  function(limits) {
+    middle <- mean(limits)
+    own <- constants[abs(constants - middle) <= 1e-9 * max(1, abs(middle))]
+    if (length(own) && diff(limits) < 0.11) own[[1L]] else few_breaks(limits)
+  }
 }
 
 near_rows <- function(data) {

@@ -63,7 +63,8 @@ extra_hint <- function(extra, request) {
   paste0("`gym_server_install(extras = \"", extra, "\")` installs it; ", anew)
 }
 
-# The server's words begin in lower case and have no full stop, to stand anywhere.
+# The server's words begin in lower case and have no full stop, to stand anywhere. One after a
+# command that ends in a quote would be copied with it.
 sentence <- function(text) {
   if (is.null(text)) {
     return(NULL)
@@ -71,7 +72,7 @@ sentence <- function(text) {
   if (!grepl("^[a-z_]+\\(", text)) {
     text <- paste0(toupper(substr(text, 1L, 1L)), substring(text, 2L))
   }
-  if (grepl("[.?!]$", text)) text else paste0(text, ".")
+  if (grepl("[.?!\"]$", text)) text else paste0(text, ".")
 }
 
 # `reached`: whether the server can have had the call.

@@ -24,8 +24,9 @@
 #'   environment, without lanes.
 #' @param kwargs A named list of further arguments for the environment, such as
 #'   `list(gravity = -5)` for LunarLander or `list(map_name = "8x8")` for
-#'   FrozenLake. A vector of length one travels as a single value, wrapped in `I()`
-#'   as a list of one.
+#'   FrozenLake. `list(max_episode_steps = 1000)` sets another limit of steps for any
+#'   environment, higher or lower than its own, and -1 none. A vector of length one
+#'   travels as a single value, wrapped in `I()` as a list of one.
 #' @param wrappers A list of wrappers, applied in this order: each a list of the
 #'   wrapper's name, a string, and its arguments by name, such as
 #'   `list("TimeLimit", max_episode_steps = 50)`. [gym_wrap()] writes such a list
@@ -163,8 +164,10 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' last step of an episode the environment wants [env_reset()]; stepping on is
 #' left to the environment and warned of once an episode.
 #'
-#' With lanes it takes an action for each of them, and moves each on; what becomes of
-#' a lane whose episode has ended is a matter of `autoreset_mode`, see [env_create()].
+#' With lanes it takes an action for each of them, and moves each on. What becomes of
+#' a lane whose episode has ended is a matter of `autoreset_mode`, see [env_create()]: by
+#' default, `"NextStep"`, this step resets it, takes no action in it and returns its new first
+#' observation, the reward 0 and neither `terminated` nor `truncated`.
 #'
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete, a

@@ -16,14 +16,26 @@
 #' environment's own implementation of lanes may be another game than the single one
 #' in details, such as the size of the Atari games' pictures.
 #'
+#' # After an episode's end
+#'
+#' An environment without `num_envs` wants `$reset()` when a step has returned `done`. With
+#' `num_envs` `autoreset_mode` says what becomes of a lane that has ended while the others play
+#' on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken, its
+#' observation is the first of the new episode, its reward is 0, and neither `terminated` nor
+#' `truncated` is set. Whoever sums rewards or counts steps leaves that step out, as [rollout()]
+#' does. With `"SameStep"` the step that ends an episode already returns the first observation of
+#' the next one, with `"Disabled"` `$reset(mask = )` does it.
+#'
 #' @inheritParams env_create
 #' @param ... Further arguments for the environment, by name, such as
-#'   `sutton_barto_reward = TRUE` for CartPole.
+#'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
+#'   after how many steps its episodes are cut off, instead of its own limit; -1 for none.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
 #'     episode and returns the first observation, as [env_reset()],
-#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()],
+#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()]; after an
+#'     episode's end see below,
 #'   * `$render(lane = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,
@@ -34,9 +46,9 @@
 #'     lanes the same,
 #'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many lanes there are
 #'     and what was chosen for them, see [env_create()]; `NULL` without lanes,
-#'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` and `render_fps`
-#'     (how many frames make a second of it), the latter three `NULL` where the environment
-#'     has none,
+#'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
+#'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
+#'     the latter three `NULL` where the environment has none,
 #'   * `$client`, `$instance_id`: for the classic calls.
 #' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
 #'   started; `gym_error_install` when a Python environment was to be installed for it, and
@@ -48,9 +60,14 @@
 #' str(env$step(1))
 #' env$close()
 #'
-#' short <- gym_make("CartPole-v1", wrappers = list(list("TimeLimit", max_episode_steps = 5)))
-#' short$reset()
-#' short$close()
+#' # An episode of MountainCar has 200 steps at most, unless it is given more.
+#' long <- gym_make("MountainCar-v0", max_episode_steps = 1000)
+#' long$spec$max_episode_steps
+#' long$close()
+#'
+#' framed <- gym_make("CartPole-v1", wrappers = list(list("FrameStackObservation", stack_size = 4)))
+#' framed$observation_space$shape
+#' framed$close()
 #'
 #' # A hundred poles, each pushed to the side to which it leans.
 #' poles <- gym_make("CartPole-v1", num_envs = 100, seed = 1)

@@ -194,6 +194,22 @@ lanes_together <- function(env) {
   )
 }
 
+# A limit of the environment's own holds whatever is asked for here.
+warn_of_own_limit <- function(max_steps, lanes, call) {
+  own <- lanes$spec$max_episode_steps
+  if (!is.null(max_steps) && !is.null(own) && own < max_steps) {
+    wanted <- format(max_steps, scientific = FALSE)
+    id <- environment_label(lanes)
+    rlang::warn(
+      c(paste0("`max_steps = ", wanted, "` makes no episode longer: ", id,
+               " has a limit of its own, ", count_of(own, "step"), "."),
+        i = paste0("`gym_make(\"", id, "\", max_episode_steps = ", wanted,
+                   ")` makes one with another limit.")),
+      class = "gym_warning_max_steps", call = call
+    )
+  }
+}
+
 check_ended_lanes_step <- function(env, call) {
   if (identical(env$autoreset_mode, "Disabled")) {
     gym_abort(

@@ -3,8 +3,8 @@
 #' Shows how many rounds searches with different seeds needed, as bars, beside the
 #' geometric distribution with the chance of a round, as a line. The bars up to round `mark`
 #' stand out, and above the plot is told how many searches are as lucky as that: `mark = 3`,
-#' the default, is the post's "3 rounds". The searches that were given up have a bar of their
-#' own at the right end.
+#' the default, is as many as the tutorial *Artificial Intelligence in R (I)* (2018) needed. The
+#' searches that were given up have a bar of their own at the right end.
 #'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
@@ -18,7 +18,6 @@
 #' @return `x`, invisibly; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when no search was solved.
 #' @references The geometric distribution: [stats::dgeom()], counted from the first round.
-#'   "3 rounds": the post "Artificial Intelligence in R (I)" (2018).
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' plot(search_repeat("CartPole-v0", seeds = 1:10))

@@ -178,10 +178,10 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
                    linetype = .data$sign),
       weights[weights$width > 0, ], linewidth = widest * weights$width[weights$width > 0]
     ) +
-    ggplot2::geom_point(ggplot2::aes(.data$label_x, .data$label_y), labelled, shape = 15,
-                        colour = "white", size = 6) +
-    ggplot2::geom_text(ggplot2::aes(.data$label_x, .data$label_y, label = .data$label), labelled,
-                       size = 3) +
+    # The line is seen through what is behind its number.
+    ggplot2::geom_label(ggplot2::aes(.data$label_x, .data$label_y, label = .data$label), labelled,
+                        size = 3, fill = grDevices::adjustcolor("white", 0.8),
+                        label.padding = ggplot2::unit(0.12, "lines")) +
     ggplot2::geom_point(shape = 21, size = if (max(table(neurons$x)) > 8L) 5 else 9,
                         fill = "white") +
     ggplot2::geom_text(ggplot2::aes(label = "..."), data$dots, angle = 90) +

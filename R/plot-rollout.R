@@ -4,8 +4,9 @@
 #' of one of them what was observed and done, or how it looked.
 #'
 #' `"returns"` shows the density of the episodes' returns, the median marked, and each episode
-#' as a tick on the axis. When all episodes have the same return there is no density, and the
-#' mark stands alone.
+#' as a tick on the axis. Where there are few different returns, such as the 0 and 1 of
+#' FrozenLake, it shows a bar for each, as high as the number of its episodes: where there are
+#' at most 3, or at most 10 that come twice on average.
 #'
 #' `"trajectory"` shows an episode's observations, each in a panel of its own, and below them its
 #' actions, against the number of steps taken. Where Gymnasium's documentation tells units and what
@@ -36,7 +37,8 @@
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
 #'   rollout that was played without the steps or frames that are to be shown.
 #' @references The density is that of [stats::density()] with its default bandwidth, within
-#'   the range of the returns, as in the figure of the post "Artificial Intelligence in R (I)".
+#'   the range of the returns, as in the figure of the tutorial *Artificial Intelligence in R (I)*
+#'   (2018).
 #' @seealso [animate()] for a moving picture.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -64,44 +66,102 @@ plot.gym_rollout <- function(x, type = c("returns", "trajectory", "filmstrip"), 
 
 plot_returns <- function(x, main, xlab, ylab, ...) {
   data <- rollout_plot_data(x)
-  flat <- is.null(data$density)
+  bars <- !is.null(data$bars)
+  chosen <- list(...)
+  # The axes of bars have marks at their values, and at whole numbers of episodes.
+  axes <- if (bars) "n" else "s"
   open_plot(
     list(x = data$xlim, y = data$ylim, main = main %||% played_title(x),
-         xlab = xlab %||% returns_label, ylab = ylab %||% if (flat) "" else "density",
-         yaxs = "i", yaxt = if (flat) "n" else "s"),
-    list(...)
+         xlab = xlab %||% returns_label, ylab = ylab %||% returns_measure(data),
+         yaxs = "i", xaxt = axes, yaxt = axes),
+    chosen
   )
-  if (!flat) {
+  if (bars) {
+    draw_bars(data$bars, own_axes(chosen))
+  } else {
     draw_density(data$density)
+    graphics::rug(data$returns, col = okabe_ito$blue, quiet = TRUE)
   }
-  graphics::rug(data$returns, col = okabe_ito$blue, quiet = TRUE)
   draw_median(data)
 }
 
 returns_label <- "return (reward summed over an episode)"
 
+returns_measure <- function(data) if (is.null(data$bars)) "density" else "episodes"
+
+# Of few different returns a density would show values that no episode had.
+most_bars <- 10L
+
 #' Compute what a plot of a rollout shows
-#' @return A list: `returns`, `median`, `density` (data frame `x`, `y`, `NULL` when all
-#'   returns are equal), `xlim`, `ylim`.
+#' @return A list: `returns`, `median`, `bars` (data frame `value`, `episodes`, `xmin`, `xmax`,
+#'   `NULL` where there are many different returns), `density` (data frame `x`, `y`, `NULL` where
+#'   there are bars), `xlim`, `ylim`.
 #' @noRd
 rollout_plot_data <- function(x) {
   returns <- x$episodes$return
-  from <- min(returns)
-  to <- max(returns)
-  if (from < to) {
-    estimate <- stats::density(returns, from = from, to = to)
-    density <- data.frame(x = estimate$x, y = estimate$y)
-  } else {
-    density <- NULL
+  values <- sort(unique(returns))
+  few <- length(values) <= min(most_bars, max(3, length(returns) / 2))
+  bars <- if (few) return_bars(returns, values)
+  density <- if (!few) {
+    estimate <- stats::density(returns, from = min(returns), to = max(returns))
+    data.frame(x = estimate$x, y = estimate$y)
   }
   list(
     returns = returns,
     median = stats::median(returns),
+    bars = bars,
     density = density,
-    xlim = if (is.null(density)) from + c(-1, 1) * max(1, abs(from) / 10) else c(from, to),
-    # Room for the median's label above the curve.
-    ylim = c(0, if (is.null(density)) 1 else 1.15 * max(density$y))
+    xlim = if (few) bars_range(bars) else range(returns),
+    # Room for the median's label above the curve or the bars.
+    ylim = c(0, 1.15 * max(density$y, bars$episodes))
   )
+}
+
+# As wide as the nearest two values leave room for, and never too narrow to be seen.
+return_bars <- function(returns, values) {
+  half <- if (length(values) == 1L) {
+    0.2 * around(values)
+  } else {
+    max(0.4 * min(diff(values)), diff(range(values)) / 200)
+  }
+  data.frame(
+    value = values, episodes = tabulate(match(returns, values)), xmin = values - half,
+    xmax = values + half
+  )
+}
+
+bars_range <- function(bars) {
+  alone <- nrow(bars) == 1L
+  if (alone) bars$value + c(-1, 1) * around(bars$value) else range(bars$xmin, bars$xmax)
+}
+
+# What there is to see to either side of a value that stands alone.
+around <- function(value) max(1, abs(value) / 10)
+
+draw_bars <- function(bars, axes) {
+  graphics::rect(
+    bars$xmin, 0, bars$xmax, bars$episodes, border = okabe_ito$blue, lwd = 2,
+    col = grDevices::adjustcolor(okabe_ito$sky_blue, 0.4)
+  )
+  if ("xaxt" %in% axes) {
+    at <- bar_marks(bars)
+    labels <- if (is.null(at)) TRUE else number_text_each(at)
+    graphics::axis(1L, at = at, labels = labels, lwd = 0, lwd.ticks = 1)
+  }
+  if ("yaxt" %in% axes) {
+    at <- unique(round(graphics::axTicks(2L)))
+    graphics::axis(2L, at = at, las = number_direction(at))
+  }
+}
+
+# Those that the caller has not chosen something else for.
+own_axes <- function(chosen) {
+  if (!"axes" %in% names(chosen)) setdiff(c("xaxt", "yaxt"), names(chosen))
+}
+
+# The values themselves, unless two are too near each other for their numbers.
+bar_marks <- function(bars) {
+  if (nrow(bars) == 1L || min(diff(bars$value)) > diff(range(bars$value)) / 12) bars$value
 }
 
 draw_density <- function(density) {

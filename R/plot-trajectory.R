@@ -84,16 +84,16 @@ draw_panel <- function(data, i, at_bottom, title_cex) {
   choice <- panel$kind == "choice"
   at <- near_limits(limits$at, values$value)
   seen <- c(values$value[is.finite(values$value)], at)
-  ylim <- if (choice) range(data$choices$value) + c(-0.5, 0.5) else if (length(seen)) range(seen)
+  scale <- panel_scale(seen, panel$kind, data$choices)
   graphics::plot.new()
-  graphics::plot.window(c(0, data$length), ylim %||% 0:1)
+  graphics::plot.window(c(0, data$length), scale$ylim)
   graphics::abline(h = at, col = limit_colours[limits$kind[limits$at %in% at]], lty = "dashed",
                    lwd = 1.5)
   if (choice) {
     draw_choices(values, data$choices)
   } else {
     draw_lines(values, panel$kind)
-    graphics::axis(2L, cex.axis = 0.9)
+    graphics::axis(2L, at = scale$ticks, cex.axis = 0.9)
   }
   graphics::abline(v = data$length, col = ending_colours[[data$ending]], lwd = 1.5)
   at <- unique(round(graphics::axTicks(1L)))
@@ -101,6 +101,20 @@ draw_panel <- function(data, i, at_bottom, title_cex) {
   graphics::box(bty = "l")
   parts <- if (!choice) data$actions[intersect(names(data$actions), values$name)]
   draw_panel_title(panel$panel, limits, parts, title_cex)
+}
+
+# Which values a panel shows, and where its axis has marks: NULL leaves that to R. A constant
+# has a single mark, and whole numbers have whole marks.
+panel_scale <- function(seen, kind, choices = NULL) {
+  if (kind == "choice") {
+    list(ylim = range(choices$value) + c(-0.5, 0.5))
+  } else if (length(seen) == 0L) {
+    list(ylim = 0:1)
+  } else if (length(unique(seen)) == 1L) {
+    list(ylim = seen[[1L]] + c(-0.5, 0.5), ticks = seen[[1L]])
+  } else {
+    list(ylim = range(seen), ticks = if (kind == "stairs") few_breaks(range(seen)))
+  }
 }
 
 draw_lines <- function(values, kind) {

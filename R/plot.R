@@ -2,11 +2,13 @@
 
 # An empty plot with this package's defaults, over which what the caller says wins.
 open_plot <- function(frame, chosen) {
-  # Upright numbers read best, but long ones would run into the axis's label.
-  las <- if (max(nchar(pretty(frame$y))) > 3L) 0L else 1L
+  las <- number_direction(pretty(frame$y))
   frame <- c(frame, list(type = "n", las = las, bty = "l"))
   do.call(graphics::plot, c(chosen, frame[setdiff(names(frame), names(chosen))]))
 }
+
+# Upright numbers read best, but long ones would run into the axis's label.
+number_direction <- function(at) if (max(nchar(at)) > 3L) 0L else 1L
 
 # A title that tells environment and policy, the latter up to the first detail: "random" or
 # "network 4-2-1".

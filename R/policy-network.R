@@ -11,8 +11,8 @@
 #' itself to be in an environment with the actions 0, 1, ...):
 #'
 #' - One output and two actions: the output, brought to the range from 0 to 1, is
-#'   rounded, as in the post. Exactly one half gives the first action, as
-#'   [round()] gives 0.
+#'   rounded, as in the tutorial *Artificial Intelligence in R (I)* (2018). Exactly one
+#'   half gives the first action, as [round()] gives 0.
 #' - As many outputs as actions: the action with the largest output, of equal ones
 #'   the first. Where the actions do not start at 0, the first output is the first
 #'   action all the same.
@@ -35,9 +35,9 @@
 #'
 #' @param sizes How many inputs, neurons in each hidden layer, and outputs there
 #'   are: whole numbers, at least two of them. The default, `c(4, 2, 1)`, is the
-#'   network of the post: 4 x 2 + 2 x 1 = 10 weights.
+#'   network of the tutorial: 4 x 2 + 2 x 1 = 10 weights.
 #' @param activation The activations' names: one of the hidden layers and one of
-#'   the outputs (the default, `c("tanh", "logistic")`, as in the post), or one for
+#'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
 #'   each layer after the inputs. `"tanh"` and `"logistic"` are computed with base
 #'   R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package sigmoid,
 #'   which must then be installed.
@@ -52,9 +52,8 @@
 #' @section Errors: `gym_error_argument` when sizes, activations and weights do not
 #'   fit each other, or a package is missing; from [act()] when the observation
 #'   does not have as many numbers as there are inputs.
-#' @references The network and the way its weights are drawn are those of the post
-#'   "Artificial Intelligence in R (I)" (2018), whose code computes the activations
-#'   with the package sigmoid.
+#' @references The network and the way its weights are drawn are those of the tutorial,
+#'   whose code computes the activations with the package sigmoid.
 #' @seealso [plot()][plot.gym_policy_network()] draws a network, [decision_map()] what it
 #'   does; [policy_random()].
 #' @export
@@ -100,7 +99,7 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
   }
 }
 
-# In the order of the post: first the matrix of the hidden layer, then the
+# In the order of the tutorial: first the matrix of the hidden layer, then the
 # weights of the output.
 draw_weights <- function(sizes) {
   Map(

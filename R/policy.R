@@ -15,7 +15,9 @@
 #' environments they are the rows of a matrix, where observations are arrays themselves
 #' an array with one dimension more, the first, where they are single whole numbers an
 #' integer vector, and where they have several parts (Tuple and Dict) a list with the
-#' same for each part. What it returns has the same form: a vector with an action for
+#' same for each part. How many there are changes from call to call: while [rollout()] plays
+#' many episodes at once, those that have ended are no longer asked about. What it returns has
+#' the same form: a vector with an action for
 #' each observation (a logical one counts as 0 and 1), a matrix with an action in each
 #' row, an array, or a list of these for the parts.
 #'

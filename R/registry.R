@@ -1,7 +1,7 @@
 #' List the environments of Gymnasium
 #'
-#' Those that the server can make, and those that it could with an extra, see
-#' [gym_server_install()].
+#' Those that the server can make, those that it could with an extra, see
+#' [gym_server_install()], and some that it cannot make at all.
 #'
 #' @inheritParams env_create
 #' @param search A text to look for in the ids, whatever its case; where none has
@@ -11,8 +11,9 @@
 #'   `reward_threshold` (double, the mean return from which it counts as solved,
 #'   `NA` for none), `vectorised` (logical, whether it has a vector
 #'   implementation of its own), `extra` (a string, the part of the server that it
-#'   needs, such as `"box2d"`, `NA` for none) and `available` (logical, whether
-#'   that part is installed).
+#'   needs beyond what it always has, such as `"box2d"`, `NA` for none), `available`
+#'   (logical, whether it can be made) and `reason` (a string, why it cannot, `NA` where it
+#'   can, or where an older server gives none).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -33,7 +34,8 @@ env_registry <- function(x = gym_client(), search = NULL) {
     reward_threshold = registry_thresholds(environments),
     vectorised = column("vectorised", NA),
     extra = column("extra", NA_character_),
-    available = column("available", NA)
+    available = column("available", NA),
+    reason = column("reason", NA_character_)
   )
 }
 

@@ -16,7 +16,9 @@
 #' are played at once, each in a lane of its own: 256 where the environment has a vector
 #' implementation of its own (CartPole has), elsewhere 16. They are played in blocks:
 #' all lanes begin an episode together, and the next block begins when all have ended, so
-#' that short episodes are not favoured.
+#' that short episodes are not favoured. The policy is asked about the episodes that still play:
+#' as they end, what a function is given has fewer and fewer rows, and it returns as many actions
+#' as there are. A row is not the same episode throughout.
 #'
 #' Only with `frames = TRUE` one episode is played after the other, in an environment without
 #' lanes: other episodes, in CartPole, than the same seed plays side by side, as they are
@@ -34,13 +36,15 @@
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with lanes or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
 #'   function of many observations that returns as many actions: for the usual
-#'   environments a function of a matrix with an observation in each row, see [act()].
+#'   environments a function of a matrix with an observation in each row, one for each episode
+#'   that still plays, see [act()].
 #' @param episodes How many episodes to play, a whole number of at least 1; the
 #'   default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of
 #'   at least 1. Such an episode counts as truncated. `NULL`, the default, leaves it
 #'   to the environment; most have a limit of their own, but without one a policy
-#'   that never fails plays forever.
+#'   that never fails plays forever. No episode goes on beyond the environment's own limit;
+#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one with another.
 #' @param seed A whole number that fixes all that is drawn: the result is that of
 #'   calling `set.seed(seed)` beforehand, but the session's generator is afterwards as
 #'   it was. `NULL`, the default, draws from the session's generator.
@@ -82,6 +86,7 @@
 #'   that does not return one action for each observation;
 #'   `gym_error_http` when the server refuses the environment or an action;
 #'   `gym_error_connection` when it does not answer.
+#' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -118,6 +123,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     # A policy that is made in the call draws its weights under the seed, too.
     check_policy(policy)
     play <- function(lanes) {
+      warn_of_own_limit(max_steps, lanes, call)
       policy <- policy_bind(policy, lanes, call = call)
       record <- new_record(episodes)
       seeds <- draw_block_seeds(lanes, episodes)

@@ -1,9 +1,10 @@
 #' Search for a policy at random
 #'
-#' Plays the post's agent: each round draws the weights of a network anew, plays a batch
-#' of episodes with it, and the first round whose mean return reaches the target ends the
-#' search. `search_random()` without arguments solves CartPole. An environment named by
-#' its id is made for the purpose and closed afterwards, whatever happens.
+#' Plays the agent of the tutorial *Artificial Intelligence in R (I)* (2018): each round draws
+#' the weights of a network anew, plays a batch of episodes with it, and the first round whose
+#' mean return reaches the target ends the search. `search_random()` without arguments solves
+#' CartPole. An environment named by its id is made for the purpose and closed afterwards,
+#' whatever happens.
 #'
 #' # What is drawn
 #'
@@ -20,9 +21,9 @@
 #' beside it, nothing counts. With a single environment made by [gym_make()] one episode is
 #' played after the other.
 #'
-#' # Where it differs from the post's script
+#' # Where it differs from the tutorial's script
 #'
-#' The post's script recycles the weights of the output to twice their number, counts for
+#' The tutorial's script recycles the weights of the output to twice their number, counts for
 #' each episode one step too many, and takes the mean of the *different* returns of a batch.
 #' Here each weight counts once, an episode's return is the sum of its rewards, and the mean
 #' is over all episodes.
@@ -61,7 +62,8 @@
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
 #'   [gym_make()], with lanes or without.
 #' @param policy The kind of policy to search among: a network made by [policy_network()],
-#'   by default the post's, with 4 inputs, 2 hidden neurons and 1 output.
+#'   by default that of the tutorial *Artificial Intelligence in R (I)*, with 4 inputs, 2 hidden
+#'   neurons and 1 output.
 #' @param rounds How many rounds to play at most, a whole number of at least 1; the default
 #'   is 50.
 #' @param episodes How many episodes to play in each round, a whole number of at least 1; the
@@ -69,9 +71,11 @@
 #' @param target The mean return of a round that ends the search, a number. `NULL`, the
 #'   default, is the environment's own reward threshold (195 for CartPole-v0), and for an
 #'   environment that has none there is no early end, nor with `target = Inf`.
-#' @param max_steps After how many steps to cut an episode short, a whole number of at least
-#'   1. `NULL`, the default, leaves it to the environment (200 steps in CartPole-v0); most have
-#'   a limit, but without one a policy that never fails plays forever.
+#' @param max_steps After how many steps to cut an episode short, a whole number of at
+#'   least 1. `NULL`, the default, leaves it to the environment (200 steps in CartPole-v0); most
+#'   have a limit, but without one a policy that never fails plays forever. No episode goes on
+#'   beyond the environment's own limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)`
+#'   makes one with another.
 #' @param seed A whole number that fixes all that is drawn: the result is that of calling
 #'   `set.seed(seed)` beforehand, but the session's generator is afterwards as it was.
 #'   `NULL`, the default, draws from the session's generator.
@@ -114,7 +118,8 @@
 #'   search with other arguments (the message names them, and so does the field `argument`) or
 #'   cannot be written; `gym_error_search` for any error while it plays, with the classes of
 #'   that error, `gym_error_http` or `gym_error_connection` for instance.
-#' @references The method: the post "Artificial Intelligence in R (I)" (2018). The target of
+#' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
+#' @references The method: the tutorial *Artificial Intelligence in R (I)* (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
 #' @seealso [gym_search] for what to do with the result; [search_repeat()] for how long such
 #'   searches take.
@@ -142,6 +147,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     return(finished_search(kept$saved, settings, client, kept$path))
   }
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
+    warn_of_own_limit(max_steps, lanes, call)
     settings <- settings_in(lanes, settings)
     bound <- policy_bind(policy, lanes, call = call)
     with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call, kept))

@@ -53,6 +53,7 @@
 #'   6).
 #' @section Errors: Those of [search_random()]; `gym_error_argument` also for an environment
 #'   without a reward threshold when no target is given.
+#' @inheritSection search_random Warnings
 #' @references The geometric distribution and its estimate from censored numbers: J. F.
 #'   Lawless, *Statistical Models and Methods for Lifetime Data* (2003). The standard error is
 #'   that of the observed information, `sqrt(p (1 - p) / rounds played)`.
@@ -74,6 +75,7 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
   call <- rlang::current_env()
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
   with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
+    warn_of_own_limit(max_steps, lanes, call)
     settings <- settings_in(lanes, settings)
     check_target(settings, call)
     play_searches(lanes, policy_bind(policy, lanes, call = call), settings, seeds, progress, call)

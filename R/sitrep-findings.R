@@ -15,7 +15,7 @@ sitrep_versions <- function() {
 # What only some functions need.
 suggested_packages <- c(
   ggplot2 = "autoplot()", magick = "animate()", png = "frames of rollouts",
-  sigmoid = "the post's scripts", bit64 = "integers beyond 2^53"
+  sigmoid = "activations such as ReLU", bit64 = "integers beyond 2^53"
 )
 
 sitrep_suggested <- function(packages = suggested_packages) {

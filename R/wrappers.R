@@ -4,7 +4,9 @@
 #' [gym_make()], [env_create()], [rollout()] or [search_random()] make it on the
 #' server: a limit of steps, a scale for its actions, a smaller picture. With the
 #' pipe several are written in the order in which they are applied. Nothing is
-#' made yet. The spaces that R sees are the wrapped environment's.
+#' made yet. The spaces that R sees are the wrapped environment's. The environment's own limit
+#' of steps stays inside of a `"TimeLimit"`, which can only lower it:
+#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
 #'   `gym_wrap()` returned for one.

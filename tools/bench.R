@@ -16,7 +16,7 @@ for (file in c("turns", "workers", "classic", "contenders", "search", "results",
 
 progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 
-# `searches`: how often search_random() plays the rounds that the post's way plays once.
+# `searches`: how often search_random() plays the rounds that the tutorial's way plays once.
 settings <- function(quick) {
   if (quick) {
     list(turns = 3L, seconds = 0.3, lanes = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,

@@ -19,6 +19,29 @@ test_that("returns are those of the episodes", {
   expect_drawn(ggplot2::autoplot(rollout(fake_environment(), policy_random())))
 })
 
+test_that("few different returns have a bar each", {
+  returns <- rep(c(-1, 0, 1, -1), 5)
+  plot <- ggplot2::autoplot(rollout(scripted_environment(returns), policy_random(), episodes = 20))
+  expect_drawn(plot)
+  expect_equal(ggplot2::layer_data(plot, 1)$ymax, c(10, 5, 5))
+  expect_equal(ggplot2::layer_data(plot, 1)$xmin, c(-1, 0, 1) - 0.4)
+  expect_length(plot$layers, 2)
+})
+
+test_that("a panel of a constant has a mark at its value alone", {
+  played <- short_rollout()
+  played$steps$cart_position <- 0L
+  played$steps$cart_velocity <- 0.125
+  plot <- ggplot2::autoplot(played, type = "trajectory")
+  expect_drawn(plot)
+  marks <- lapply(ggplot2::ggplot_build(plot)$layout$panel_params, function(panel) {
+    Filter(Negate(is.na), panel$y$breaks)
+  })
+  expect_identical(marks[[1]], 0)
+  expect_identical(marks[[2]], 0.125)
+  expect_gt(length(marks[[3]]), 1)
+})
+
 test_that("a trajectory has the values of the steps, in a facet for each part", {
   played <- short_rollout()
   plot <- ggplot2::autoplot(played, type = "trajectory")

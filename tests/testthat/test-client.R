@@ -376,3 +376,9 @@ test_that("what httr's set_config() says holds for clients, too, and their own g
   options(httr_config = NULL)
   expect_null(gym_client()$config$options$cainfo)
 })
+
+test_that("a hint that ends with a command can be copied whole", {
+  expect_identical(sentence("in a terminal: \"python\" -m pip install \"gymnasium[box2d]\""),
+                   "In a terminal: \"python\" -m pip install \"gymnasium[box2d]\"")
+  expect_identical(sentence("did you mean this"), "Did you mean this.")
+})

@@ -47,3 +47,16 @@ test_that("the reference on the web names every help page", {
   known <- unlist(lapply(help_pages(), rd_texts, "\\alias"))
   expect_identical(setdiff(topics, known), character())
 })
+
+test_that("texts name the tutorial, and do not take it for known as a post", {
+  texts <- c(list.files(source_tree("man"), "[.]Rd$", full.names = TRUE),
+             list.files(source_tree("vignettes"), "[.](Rmd|md|csv)$", full.names = TRUE),
+             source_tree("README.md"))
+  for (file in texts) {
+    told <- paste(readLines(file), collapse = " ")
+    expect_false(grepl("\\b[Tt]he post\\b", told), info = basename(file))
+    if (grepl("[Tt]he tutorial('s)?\\b", told) && grepl("[.]Rd$", file)) {
+      expect_match(told, "Artificial Intelligence in R (I)", fixed = TRUE, info = basename(file))
+    }
+  }
+})

@@ -112,3 +112,8 @@ test_that("a cache folder that cannot be made is an error that says what to set"
   expect_error(make_folder(NULL), "R_USER_CACHE_DIR", class = "gym_error_install")
   expect_error(in_turn(1), "R_USER_CACHE_DIR", class = "gym_error_install")
 })
+
+test_that("tests see nothing of what the user has installed", {
+  expect_true(startsWith(install_root(), paste0(tempdir(), "/gym-cache-")))
+  expect_null(installed_server())
+})

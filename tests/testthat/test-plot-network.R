@@ -147,6 +147,17 @@ test_that("ggplot2 draws the same lines", {
   expect_silent(print(ggplot2::autoplot(policy_network(c(100, 1)))))
 })
 
+test_that("with ggplot2 a line is seen through what is behind its number", {
+  skip_if_not_installed("ggplot2")
+  plot <- ggplot2::autoplot(policy_network(c(4, 1), weights = list(matrix(1:4, 1))))
+  kinds <- vapply(plot$layers, function(layer) class(layer$geom)[[1]], "")
+  labels <- ggplot2::layer_data(plot, match("GeomLabel", kinds))
+  expect_identical(labels$label, c("1.00", "2.00", "3.00", "4.00"))
+  expect_true(all(grDevices::col2rgb(labels$fill, alpha = TRUE)["alpha", ] < 255))
+  # Nothing else is drawn over the lines but the neurons.
+  expect_identical(sum(kinds == "GeomPoint"), 1L)
+})
+
 test_that("an environment named by its id is made for its names and closed", {
   client <- local_server()
   local_device()

@@ -44,3 +44,10 @@ test_that("panels have their places, the last one a row of its own where one is 
   expect_equal(arrange_panels(4), matrix(c(1L, 3L, 2L, 4L), 2))
   expect_equal(arrange_panels(5), matrix(c(1, 3, 5, 2, 4, 5), 3))
 })
+
+test_that("a panel of a constant has a mark at its value alone, whole numbers have whole marks", {
+  expect_identical(panel_scale(c(0, 0, 0), "stairs"), list(ylim = c(-0.5, 0.5), ticks = 0))
+  expect_identical(panel_scale(0.25, "line")$ticks, 0.25)
+  expect_identical(panel_scale(c(0, 1, 0), "stairs"), list(ylim = c(0, 1), ticks = 0:1))
+  expect_null(panel_scale(c(0, 0.1), "line")$ticks)
+})

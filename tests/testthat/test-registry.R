@@ -3,7 +3,7 @@ test_that("the registry is a data frame of what can be made", {
   expect_identical(
     vapply(registry, typeof, ""),
     c(id = "character", max_episode_steps = "integer", reward_threshold = "double",
-      vectorised = "logical", extra = "character", available = "logical")
+      vectorised = "logical", extra = "character", available = "logical", reason = "character")
   )
   row <- registry[registry$id == "CartPole-v1", ]
   expect_identical(row$max_episode_steps, 500L)
@@ -11,6 +11,9 @@ test_that("the registry is a data frame of what can be made", {
   expect_true(row$available)
   expect_identical(row$extra, NA_character_)
   expect_identical(registry$extra[registry$id == "LunarLander-v3"], "box2d")
+  expect_identical(registry$extra[registry$id == "FrozenLake-v1"], NA_character_)
+  expect_identical(is.na(registry$reason), registry$available)
+  expect_match(registry$reason[registry$id == "Ant-v2"], "no longer part of Gymnasium")
   expect_false(anyDuplicated(registry$id) > 0)
 })
 

@@ -64,6 +64,46 @@ test_that("max_steps cuts an episode short, which counts as truncated", {
   expect_false(whole$episodes$truncated)
 })
 
+test_that("max_steps beyond the environment's own limit is warned of, with what raises it", {
+  env <- fake_environment(id = "MountainCar-v0")
+  env$spec$max_episode_steps <- 200L
+  network <- policy_network(c(4, 1))
+  plays <- list(
+    function(steps) rollout(env, policy_random(), max_steps = steps),
+    function(steps) search_random(env, network, rounds = 1, max_steps = steps),
+    function(steps) search_repeat(env, network, 1, target = 1, seeds = 1:3, max_steps = steps)
+  )
+  for (play in plays) {
+    expect_silent(play(NULL))
+    expect_silent(play(200))
+    warning <- expect_warning(play(1000), class = "gym_warning_max_steps")
+    expect_match(conditionMessage(warning), "a limit of its own, 200 steps.", fixed = TRUE)
+    expect_match(
+      conditionMessage(warning), "`gym_make(\"MountainCar-v0\", max_episode_steps = 1000)`",
+      fixed = TRUE
+    )
+  }
+})
+
+test_that("what the warning of max_steps says raises the limit that is played", {
+  env <- local_env("MountainCar-v0", max_episode_steps = 230)
+  expect_identical(env$spec$max_episode_steps, 230L)
+  expect_silent(played <- rollout(env, function(observation) 0L, max_steps = 230))
+  expect_identical(played$episodes$length, 230L)
+  wrapped <- gym_wrap("MountainCar-v0", "TimeLimit", max_episode_steps = 1000)
+  expect_identical(local_env(wrapped)$spec$max_episode_steps, 200L)
+})
+
+test_that("a function is asked about the episodes that still play", {
+  rows <- integer()
+  count_rows <- function(observation) {
+    rows <<- c(rows, nrow(observation))
+    rep(0L, nrow(observation))
+  }
+  rollout(scripted_lanes(3, c(1, 1, 1), c(1L, 3L, 2L)), count_rows, episodes = 3)
+  expect_identical(utils::tail(rows, 3), 3:1)
+})
+
 test_that("a row of the steps has the observation that its action was taken on", {
   env <- fake_environment(id = "CartPole-v1", reward = by_seed)
   seen <- list()

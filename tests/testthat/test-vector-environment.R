@@ -360,3 +360,17 @@ test_that("a wrong action of some lanes is named by its lane", {
   error <- expect_error(env$step(c(0, NA), lanes = c(2, 4)), "Lane 4", class = "gym_error_space")
   expect_identical(error$lane, 4)
 })
+
+test_that("by default the step after an end begins the next episode, without reward or end", {
+  env <- local_env("CartPole-v1", num_envs = 2, vectorization_mode = "sync", seed = 1)
+  env$reset()
+  for (step in 1:500) {
+    out <- env$step(c(1, 0))
+    if (out$done[[1]]) break
+  }
+  began <- env$step(c(1, 0))
+  expect_identical(began$reward[[1]], 0)
+  expect_false(began$terminated[[1]] || began$truncated[[1]])
+  # Where CartPole begins; a step moves the cart's velocity further than that.
+  expect_lt(max(abs(began$observation[1, ])), 0.05)
+})

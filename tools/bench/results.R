@@ -126,9 +126,9 @@ lanes_goals <- function(rows) {
 
 search_goals <- function(rows) {
   gym <- values_of(rows, "search", own[["search"]], unit = "s")
-  classic <- values_of(rows, "search", "the post's way", unit = "s")
+  classic <- values_of(rows, "search", "the tutorial's way", unit = "s")
   list(
-    goal("random search: at least 100 times faster than the post's way",
+    goal("random search: at least 100 times faster than the tutorial's way",
          stats::median(classic / gym), at_least = 100),
     goal("search in a fresh R session, server's start included: within 3 s",
          stats::median(values_of(rows, "fresh", own[["search"]])), at_most = 3)

@@ -10,7 +10,7 @@ compare_searches <- function(setup, turns, rounds) {
   rows <- NULL
   classic <- c(seconds = 0, steps = 0)
   for (turn in seq_len(turns)) {
-    progress("the post's way, piece ", turn, " of ", turns)
+    progress("the tutorial's way, piece ", turn, " of ", turns)
     started <- now()
     steps <- classic_rounds(setup$development$url, id, pieces[turn])
     classic <- classic + c(now() - started, steps)
@@ -22,7 +22,7 @@ compare_searches <- function(setup, turns, rounds) {
     gym <- c(now() - started, sum(search$rounds$steps))
     rows <- rbind(rows, search_rows("gym, search_random()", turn, rounds, gym))
   }
-  rbind(rows, search_rows("the post's way", 1L, rounds, classic))
+  rbind(rows, search_rows("the tutorial's way", 1L, rounds, classic))
 }
 
 search_rows <- function(name, turn, rounds, took) {

@@ -67,6 +67,7 @@ _LISTED = _object(
         "vectorised": _FLAG,
         "extra": _or_null(_TEXT),
         "available": _FLAG,
+        "reason": _or_null(_TEXT),
     }
 )
 

@@ -20,8 +20,8 @@ REQUIREMENTS = {
 }
 
 # By the package that an environment comes from: its extra, and the module that the extra brings.
+# Toy text needs nothing beyond the server's own dependencies.
 _PACKAGES = {
-    "gymnasium.envs.toy_text": ("toy-text", "pygame"),
     "gymnasium.envs.box2d": ("box2d", "Box2D"),
     "gymnasium.envs.mujoco": ("mujoco", "mujoco"),
     "gymnasium.envs.phys2d": (None, "jax"),
@@ -40,15 +40,30 @@ def extra_of(spec: EnvSpec) -> str | None:
 
 def is_available(spec: EnvSpec) -> bool:
     """Tell whether what an environment needs is installed, without importing it."""
+    return why_unavailable(spec) is None
+
+
+def why_unavailable(spec: EnvSpec) -> str | None:
+    """Return why an environment cannot be made here, or None; nothing is imported."""
     if not isinstance(spec.entry_point, str):
         # Gymnasium's word for an environment that has moved away is a function that raises.
-        return spec.entry_point is not None and not spec.entry_point.__name__.startswith("_raise")
-    _, module = _needs(spec)
-    if spec.id in _BEFORE_MUJOCO_3 and _is_installed("mujoco"):
-        return int(importlib.metadata.version("mujoco").partition(".")[0]) < 3
-    return _is_installed(spec.entry_point.partition(":")[0]) and (
-        module is None or _is_installed(module)
-    )
+        moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")
+        return "it is no longer part of Gymnasium" if moved else None
+    extra, module = _needs(spec)
+    if module and not _is_installed(module):
+        return f"it needs the server's extra '{extra}'" if extra else _needs_package(module)
+    if spec.id in _BEFORE_MUJOCO_3 and _major_version("mujoco") >= 3:
+        return "it needs a MuJoCo before version 3"
+    package = spec.entry_point.partition(":")[0].partition(".")[0]
+    return None if _is_installed(package) else _needs_package(package)
+
+
+def _needs_package(module: str) -> str:
+    return f"it needs the Python package '{module}', which no extra brings"
+
+
+def _major_version(package: str) -> int:
+    return int(importlib.metadata.version(package).partition(".")[0])
 
 
 def missing_extra(what: str, extra: str) -> GymServerError:
@@ -57,7 +72,7 @@ def missing_extra(what: str, extra: str) -> GymServerError:
     return GymServerError(
         "missing_dependency",
         f"{what} needs the server's extra '{extra}'",
-        f'"{sys.executable}" -m pip install {wanted}',
+        f'in a terminal: "{sys.executable}" -m pip install {wanted}',
         extra,
     )
 

@@ -23,7 +23,7 @@ from gym_server.observed import entries
 from gym_server.plain import plain
 from gym_server.screen import Screen
 from gym_server.tally import LaneTally, Tally, told
-from gym_server.wrappers import draws_when_stepped
+from gym_server.wrappers import draws_when_stepped, time_limit
 
 
 class Instance(Listed):
@@ -60,6 +60,7 @@ class Instance(Listed):
         self._tally = self._make_tally()
         self._observation: object = None
         self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
+        self._max_episode_steps = time_limit(env)
         self._for_eyes = choices.render_mode == "human"
         self._made = self.hold.used
         if choices.seed is not None:
@@ -339,7 +340,7 @@ class Instance(Listed):
             "observation_space": self._lane_observation_space_info,
             "action_space": self._lane_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,
-            "max_episode_steps": spec.max_episode_steps if spec else None,
+            "max_episode_steps": self._max_episode_steps,
             "render_fps": plain((self._env.metadata or {}).get("render_fps")),
             "lanes": self._lanes,
             "vectorization_mode": None,

@@ -104,7 +104,6 @@ class SyncLanes(SyncVectorEnv):
         """Make all lanes."""
         # What it returns is encoded before it moves again.
         super().__init__([lane] * num_envs, copy=False, autoreset_mode=autoreset_mode)
-        self.spec = self.envs[0].spec
 
     def step_lanes(self, lanes: np.ndarray, actions: Any) -> tuple:
         """Step some of the lanes.

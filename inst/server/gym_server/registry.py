@@ -16,7 +16,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from gym_server.atari import classic_game
 from gym_server.errors import GymServerError, invalid_parameter
-from gym_server.extras import extra_of, is_available, missing_extra
+from gym_server.extras import extra_of, is_available, missing_extra, why_unavailable
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +33,7 @@ _PACKAGES = {"ALE": "ale_py"}
 # The environments of older Gyms, when shimmy is installed. Their argument env_id names modules
 # that they import, whatever the operator allowed.
 _UNGUARDED = ("GymV21Environment", "GymV26Environment")
+_WHY_UNGUARDED = "may import any module that its env_id names, so this server makes none"
 
 
 def look_up(name: str) -> EnvSpec:
@@ -46,7 +47,7 @@ def look_up(name: str) -> EnvSpec:
     if bare_name in _UNGUARDED:
         raise GymServerError(
             "module_not_allowed",
-            f"{name} may import any module that its env_id names, so this server makes none",
+            f"{name} {_WHY_UNGUARDED}",
         )
     with importing:
         try:
@@ -134,11 +135,14 @@ def _matching(text: str | None) -> Iterable[EnvSpec]:
 
 
 def _entry(spec: EnvSpec) -> dict:
+    unguarded = spec.name in _UNGUARDED
+    reason = f"it {_WHY_UNGUARDED}" if unguarded else why_unavailable(spec)
     return {
         "id": spec.id,
         "max_episode_steps": spec.max_episode_steps,
         "reward_threshold": spec.reward_threshold,
         "vectorised": spec.vector_entry_point is not None,
         "extra": extra_of(spec),
-        "available": spec.name not in _UNGUARDED and is_available(spec),
+        "available": reason is None,
+        "reason": reason,
     }

@@ -370,7 +370,8 @@ _SEARCH = replace(wire.TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
     "GET",
     "/v1/registry/",
     Field("search", _SEARCH, "A part of the id; when it is part of none, the nearest ids."),
-    answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available",
+    answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available, "
+    "reason (why one is not available)",
 )
 def env_registry(call: Call) -> dict:
     """List what can be created."""

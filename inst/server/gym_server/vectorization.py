@@ -190,11 +190,17 @@ def _make_entry_point(asked: _Asked) -> VectorEnv:
 
 
 def _with_time_limit(asked: _Asked) -> EnvSpec:
-    """Return the spec with the time limit that the client chose."""
+    """Return the spec with the smallest of the time limits that each sub-environment has."""
     spec = copy.copy(asked.spec)
     chosen = asked.kwargs.get("max_episode_steps")
     if chosen is not None:
         spec.max_episode_steps = None if chosen == -1 else chosen
+    limits = [
+        from_words(wrapper.kwargs["max_episode_steps"])
+        for wrapper in asked.choices.wrappers
+        if wrapper.name == "TimeLimit"
+    ]
+    spec.max_episode_steps = min(filter(None, [spec.max_episode_steps, *limits]), default=None)
     return spec
 
 
@@ -206,9 +212,7 @@ def _make_sync(asked: _Asked) -> VectorEnv:
 
 
 def _make_async(asked: _Asked) -> VectorEnv:
-    env = _make_lanes(AsyncLanes, asked)
-    env.spec = _with_time_limit(asked)
-    return env
+    return _make_lanes(AsyncLanes, asked)
 
 
 def _make_lanes(kind: type[SyncLanes] | type[AsyncLanes], asked: _Asked) -> VectorEnv:
@@ -216,4 +220,6 @@ def _make_lanes(kind: type[SyncLanes] | type[AsyncLanes], asked: _Asked) -> Vect
         creation.load_creator(asked.spec), asked.spec, asked.choices.render_mode
     )
     lane = Lane(asked.spec, render_mode, asked.kwargs, asked.choices.wrappers, asked.renderer)
-    return creation.ask(kind, lane, asked.num_envs, asked.autoreset_mode)
+    env = creation.ask(kind, lane, asked.num_envs, asked.autoreset_mode)
+    env.spec = _with_time_limit(asked)
+    return env

@@ -107,6 +107,18 @@ def wrap(env: gymnasium.Env, wrappers: Sequence[Wrapper], renderer: RenderThread
     return env
 
 
+def time_limit(env: gymnasium.Env) -> int | None:
+    """Return the smallest time limit of an environment and the wrappers around it, or None.
+
+    Each layer's spec tells the outermost limit from there inwards, and all of them are counted.
+    """
+    limits = [env.spec.max_episode_steps if env.spec else None]
+    while isinstance(env, gymnasium.Wrapper):
+        env = env.env
+        limits.append(env.spec.max_episode_steps if env.spec else None)
+    return min(filter(None, limits), default=None)
+
+
 def draws_when_stepped(env: gymnasium.Env) -> bool:
     """Tell whether an environment draws in each reset and step, not only in ``render()``."""
     if type(env.unwrapped).__module__ in _DRAWING_ENVIRONMENTS:

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import threading
@@ -275,6 +276,22 @@ def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
     label = browser.find_element(By.ID, "picture").get_attribute("aria-label")
     assert "lane 3" in label
     assert "of all lanes" in text(browser, "caption")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("num_envs", "together", "each"), [(None, "", ""), (4, ", all 4 together", " each")]
+)
+def test_the_pace_is_that_of_all_and_real_time_that_of_each(
+    browser, server, play, look, eventually, num_envs, together, each
+):
+    url = server.create("CartPole-v1", num_envs=num_envs, render_mode="human")
+    play(url)
+    look(url)
+    eventually(lambda: "a second" in text(browser, "pace"))
+    words, real = text(browser, "pace").split(" · ")
+    assert re.fullmatch(rf"about [\d,]+ steps a second{together}", words)
+    assert real == f"real time (at most 50{each})"
 
 
 @pytest.mark.slow

@@ -180,13 +180,16 @@ function showReturns({ returns, lanes, reward_threshold: goal }) {
   drawChart($("chart"), returns, goal);
 }
 
-function showPace({ steps, fps }) {
+// The steps of all sub-environments are counted; real time holds for each of them.
+function showPace({ steps, fps, lanes }) {
   const now = performance.now();
   if (!pace || steps < pace.steps) pace = { steps, now, rate: null };
   const seconds = (now - pace.now) / 1000;
   if (seconds > 1) pace = { steps, now, rate: (steps - pace.steps) / seconds };
-  const rate = pace.rate === null ? "" : `${number(Math.round(pace.rate))} steps a second`;
-  const real = fps === null ? "" : `real time (at most ${number(fps)})`;
+  const [together, each] = lanes > 1 ? [`, all ${number(lanes)} together`, " each"] : ["", ""];
+  const rate =
+    pace.rate === null ? "" : `about ${number(Math.round(pace.rate))} steps a second${together}`;
+  const real = fps === null ? "" : `real time (at most ${number(fps)}${each})`;
   $("pace").textContent = [rate, real].filter(Boolean).join(" · ");
 }
 
