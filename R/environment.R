@@ -335,22 +335,21 @@ env_close <- function(x, instance_id) {
 #'
 #' @inheritParams env_create
 #' @param training_dir The directory of a monitor's results, a string.
-#' @param algorithm_id,api_key What the service asked for: a name for the
-#'   algorithm and a key, by default that of the environment variable
-#'   `OPENAI_GYM_API_KEY`.
+#' @param api_key,algorithm_id What the service asked for: a key, by default that
+#'   of the environment variable `OPENAI_GYM_API_KEY`, and a name for the algorithm.
 #' @return It does not return.
 #' @section Errors: `gym_error_http_410`, as the service is gone;
 #'   `gym_error_http_400` when `training_dir` or the key is missing.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' try(upload(gym_client(), "results", api_key = "none"))
-upload <- function(x, training_dir, algorithm_id = NULL, api_key = NULL) {
+upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
   check_client(x)
   check_string(training_dir)
   post_answer(x, "/v1/upload/", json_texts(list(
     training_dir = training_dir,
-    algorithm_id = algorithm_id,
-    api_key = api_key %||% Sys.getenv("OPENAI_GYM_API_KEY")
+    api_key = api_key %||% Sys.getenv("OPENAI_GYM_API_KEY"),
+    algorithm_id = algorithm_id
   )))
   invisible()
 }

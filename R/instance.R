@@ -167,7 +167,7 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
   }
   if (isTRUE(instance$done)) {
     warn_step_after_done(instance, call)
-  } else {
+  } else if (isFALSE(instance$done)) {
     instance$done <- answer$done
   }
   list(
