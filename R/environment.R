@@ -301,6 +301,9 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   single <- instance[[paste0("single_", which)]]
   lanes <- instance$num_envs
   space <- lanes_space(single, lanes)
+  if (instance$classic) {
+    return(fits_space(space, value, bounds = TRUE))
+  }
   if (!fits_space(space, value)) {
     return(FALSE)
   }
@@ -368,6 +371,10 @@ upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
 #' shutdown_server(server)
 shutdown_server <- function(x) {
   check_client(x)
-  post_answer(x, "/v1/shutdown/")
+  response <- send(x, "/v1/shutdown/", character())
+  # The original server says so in words, not in JSON.
+  if (response$status_code != 200L) {
+    read_answer(response, "POST")
+  }
   invisible()
 }
