@@ -40,7 +40,7 @@
 #'   * `$client`, `$instance_id`: for the classic calls.
 #' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
 #'   started; `gym_error_install` when a Python environment was to be installed for it, and
-#'   could not be.
+#'   could not be. `gym_error_argument` for a name after the dollar that the object does not have.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
