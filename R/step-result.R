@@ -24,20 +24,28 @@ check_step_result <- function(out, n, call) {
     problem <- paste0("What `step()` of this environment returns lacks `", absent[[1L]], "`", has)
     abort_step_result(problem, out, call)
   }
+  check_reward(out, n, call)
+  for (flag in flags) {
+    check_step_flag(out, flag, n, call)
+  }
+}
+
+check_reward <- function(out, n, call) {
   if (length(out$reward) != n || !(is.numeric(out$reward) || is.logical(out$reward))) {
     abort_step_element("reward", if (n == 1L) "a number" else paste(n, "numbers"), out, call)
   }
-  for (flag in flags) {
-    if (!is.logical(out[[flag]]) || length(out[[flag]]) != n || anyNA(out[[flag]])) {
-      must <- if (n == 1L) "TRUE or FALSE" else paste("TRUE or FALSE for each of", n, "lanes")
-      abort_step_element(flag, must, out, call)
-    }
+}
+
+check_step_flag <- function(out, flag, n, call) {
+  if (!is.logical(out[[flag]]) || length(out[[flag]]) != n || anyNA(out[[flag]])) {
+    must <- if (n == 1L) "TRUE or FALSE" else paste("TRUE or FALSE for each of", n, "lanes")
+    abort_step_element(flag, must, out, call)
   }
 }
 
 abort_step_element <- function(name, must, out, call) {
-  problem <- paste0("The element `", name, "` of what `step()` of this environment returns must be ",
-                    must, ", not ", describe_argument(out[[name]]))
+  problem <- paste0("The element `", name, "` of what `step()` of this environment returns must ",
+                    "be ", must, ", not ", describe_argument(out[[name]]))
   abort_step_result(problem, out, call)
 }
 

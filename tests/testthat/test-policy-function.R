@@ -112,8 +112,8 @@ test_that("a function without an argument is refused before anything is made", {
   expect_error(rollout("CartPole-v1", function() 1L, client = no_client()),
                "function of observations; this one has no argument", class = "gym_error_argument")
   # Primitives declare their arguments in another way, or not at all.
-  expect_identical(rollout(fake_environment(action_space = box_space(-1, 1)), length)$episodes$length,
-                   3L)
+  env <- fake_environment(action_space = box_space(-1, 1))
+  expect_identical(rollout(env, length)$episodes$length, 3L)
 })
 
 test_that("a function that cannot be asked about one observation fails before the first step", {
