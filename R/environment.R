@@ -305,6 +305,9 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   single <- instance[[paste0("single_", which)]]
   lanes <- instance$num_envs
   space <- lanes_space(single, lanes)
+  if (instance$classic) {
+    return(fits_space(space, value, bounds = TRUE))
+  }
   if (!fits_space(space, value)) {
     return(FALSE)
   }
@@ -339,22 +342,21 @@ env_close <- function(x, instance_id) {
 #'
 #' @inheritParams env_create
 #' @param training_dir The directory of a monitor's results, a string.
-#' @param algorithm_id,api_key What the service asked for: a name for the
-#'   algorithm and a key, by default that of the environment variable
-#'   `OPENAI_GYM_API_KEY`.
+#' @param api_key,algorithm_id What the service asked for: a key, by default that
+#'   of the environment variable `OPENAI_GYM_API_KEY`, and a name for the algorithm.
 #' @return It does not return.
 #' @section Errors: `gym_error_http_410`, as the service is gone;
 #'   `gym_error_http_400` when `training_dir` or the key is missing.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' try(upload(gym_client(), "results", api_key = "none"))
-upload <- function(x, training_dir, algorithm_id = NULL, api_key = NULL) {
+upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
   check_client(x)
   check_string(training_dir)
   post_answer(x, "/v1/upload/", json_texts(list(
     training_dir = training_dir,
-    algorithm_id = algorithm_id,
-    api_key = api_key %||% Sys.getenv("OPENAI_GYM_API_KEY")
+    api_key = api_key %||% Sys.getenv("OPENAI_GYM_API_KEY"),
+    algorithm_id = algorithm_id
   )))
   invisible()
 }
@@ -373,6 +375,10 @@ upload <- function(x, training_dir, algorithm_id = NULL, api_key = NULL) {
 #' shutdown_server(server)
 shutdown_server <- function(x) {
   check_client(x)
-  post_answer(x, "/v1/shutdown/")
+  response <- send(x, "/v1/shutdown/", character())
+  # The original server says so in words, not in JSON.
+  if (response$status_code != 200L) {
+    read_answer(response, "POST")
+  }
   invisible()
 }

@@ -52,7 +52,7 @@
 #'   * `$client`, `$instance_id`: for the classic calls.
 #' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
 #'   started; `gym_error_install` when a Python environment was to be installed for it, and
-#'   could not be.
+#'   could not be. `gym_error_argument` for a name after the dollar that the object does not have.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -89,12 +89,39 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   instance_id <- NULL
   on.exit(if (is.null(env)) abandon_instance(client, instance_id))
   # No interrupt comes between the instance and its name.
-  suspendInterrupts(instance_id <- allowInterrupts(create_instance(
-    client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
-    autoreset_mode, name
+  create <- function(call) {
+    create_instance(
+      client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
+      autoreset_mode, name, call
+    )
+  }
+  call <- rlang::current_env()
+  suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
+    create(call),
+    gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
   env <- gym_env$new(client, instance_id)
   env
+}
+
+# In R's words, where the environment has been given an argument that it does not have.
+explain_unknown_argument <- function(cnd, given, call) {
+  pattern <- "unexpected keyword argument '([^']+)'"
+  name <- regmatches(cnd$message, regexec(pattern, cnd$message))[[1L]][2L]
+  if (!name %in% given) {
+    return()
+  }
+  # The last is an argument of all environments.
+  choices <- c(setdiff(names(formals(gym_make)), c("env_id", "...")), "max_episode_steps")
+  near <- nearest_name(name, choices)
+  gym_abort(
+    c(
+      paste0("Neither `gym_make()` nor the environment has an argument `", name, "`."),
+      i = if (length(near)) paste0("Did you mean `", near, "`?")
+    ),
+    class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
+    status = cnd$status, code = cnd$code, argument = name, call = call
+  )
 }
 
 gym_env <- R6Class(
@@ -113,7 +140,7 @@ gym_env <- R6Class(
     initialize = function(client, instance_id) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
-      self$client <- client
+      private$connected <- self$client <- client
       self$instance_id <- instance_id
       for (name in c("single_action_space", "single_observation_space", "num_envs",
                      "vectorization_mode", "autoreset_mode")) {
@@ -128,7 +155,7 @@ gym_env <- R6Class(
     },
     step = function(action, lanes = NULL) {
       private$check_open()
-      step_instance(self$client, private$instance, action, render = FALSE, lanes)
+      step_instance(private$connected, private$instance, action, render = FALSE, lanes)
     },
     render = function(lane = 1) {
       private$check_open()
@@ -164,9 +191,11 @@ gym_env <- R6Class(
   ),
   private = list(
     instance = NULL,
+    # The client again, as `self$` costs more than `private$`.
+    connected = NULL,
     pid = NULL,
     closed = FALSE,
-    check_open = function(call = rlang::caller_env()) check_open(self, call),
+    check_open = function(call = rlang::caller_env()) if (private$closed) check_open(self, call),
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
@@ -175,6 +204,34 @@ gym_env <- R6Class(
     }
   )
 )
+
+# A name that is none is an error: R's own `$` gives NULL, and "attempt to apply non-function" if
+# that is called. `[[` asks without an error. Every step comes through here: no call that is not
+# needed.
+#' @export
+`$.gym_env` <- function(x, name) {
+  member <- .subset2(x, name)
+  if (is.null(member)) member_or_abort(x, name) else member
+}
+
+member_or_abort <- function(x, name, call = rlang::caller_env()) {
+  if (exists(name, envir = x, inherits = FALSE)) {
+    return(NULL)
+  }
+  members <- setdiff(ls(x), c("initialize", "print"))
+  near <- nearest_name(name, members)
+  gym_abort(
+    c(
+      paste0("An environment has no `$", name, "`."),
+      i = if (length(near)) paste0("Did you mean `$", near, "`?"),
+      i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), ".")
+    ),
+    class = "gym_error_argument", argument = name, call = call
+  )
+}
+
+#' @export
+format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
 
 check_open <- function(env, call = rlang::caller_env()) {
   if (!env$is_open) {

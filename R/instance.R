@@ -31,6 +31,12 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   }
   close_abandoned(x)
   instance_id <- make_instance(x, fields, call)
+  if (isTRUE(connection(x)$classic)) {
+    withCallingHandlers(
+      check_classic_fields(x, fields, c("env_id", "seed"), call),
+      gym_error = function(cnd) close_if_there(x, instance_id, call)
+    )
+  }
   if (for_eyes) {
     show_instance(x, known_instance(x, instance_id, call), call)
   }
@@ -74,8 +80,13 @@ known_instance <- function(x, instance_id, call = rlang::caller_env()) {
 
 ask_instance <- function(x, instance_id, call) {
   route <- instance_route(instance_id)
-  answer <- get_answer(x, route, call = call)
+  answer <- tryCatch(
+    get_answer(x, route, call = call),
+    gym_error_http_404 = function(cnd) classic_description(x, instance_id, cnd, call)
+  )
   instance <- new.env(parent = emptyenv())
+  instance$classic <- isTRUE(answer$classic)
+  space_of <- if (instance$classic) new_classic_space else new_space
   instance$id <- instance_id
   instance$route <- route
   instance$reset_route <- paste0(route, "reset/")
@@ -83,12 +94,13 @@ ask_instance <- function(x, instance_id, call) {
   instance$num_envs <- answer$num_envs
   instance$vectorization_mode <- answer$vectorization_mode
   instance$autoreset_mode <- answer$autoreset_mode
-  instance$single_action_space <- new_space(answer$action_space)
-  instance$single_observation_space <- new_space(answer$observation_space)
+  instance$single_action_space <- space_of(answer$action_space)
+  instance$single_observation_space <- space_of(answer$observation_space)
   instance$actions <- lanes_space(instance$single_action_space, answer$num_envs)
   instance$observations <- lanes_space(instance$single_observation_space, answer$num_envs)
-  instance$takes_tensors <- travels_as_tensors(instance$single_observation_space, answer$num_envs)
-  instance$sends_tensors <- travels_as_tensors(instance$single_action_space, answer$num_envs)
+  as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
+  instance$takes_tensors <- as_tensors(instance$single_observation_space)
+  instance$sends_tensors <- as_tensors(instance$single_action_space)
   instance$spec <- list(
     id = answer$env_id,
     reward_threshold = answer$reward_threshold,
@@ -121,6 +133,9 @@ reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask
     options = encode_options(options, call),
     reset_mask = if (!is.null(mask)) to_json(I(mask))
   )
+  if (instance$classic) {
+    check_classic_fields(x, fields, NULL, call)
+  }
   answer <- post_once(
     x, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
   )
@@ -143,14 +158,14 @@ decode_observation <- function(space, answer, name = "observation") {
 
 info_from <- function(instance, answer) {
   if (is.null(instance$num_envs)) {
-    info_from_json(answer$info)
+    info_from_json(answer$info %||% empty_object)
   } else {
     info_by_lane(answer$info, instance$num_envs)
   }
 }
 
 step_instance <- function(x, instance, action, render, lanes = NULL, call = rlang::caller_env()) {
-  if (render) {
+  if (render && !instance$classic) {
     show_instance(x, instance, call)
   }
   fields <- c(render = if (render) "true" else "false")
@@ -164,10 +179,12 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
     answer[c("reward", "terminated", "truncated")] <-
       answer$tensors[c("reward", "terminated", "truncated")]
     answer$done <- answer$terminated || answer$truncated
+  } else if (instance$classic) {
+    answer <- classic_flags(answer)
   }
   if (isTRUE(instance$done)) {
     warn_step_after_done(instance, call)
-  } else {
+  } else if (isFALSE(instance$done)) {
     instance$done <- answer$done
   }
   list(
@@ -182,6 +199,30 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
 
 # `json` is the action as JSON, written only if it travels so.
 send_action <- function(x, instance, space, action, json, fields, call) {
+  withCallingHandlers(
+    send_checked_action(x, instance, space, action, json, fields, call),
+    gym_error_space = function(cnd) {
+      cnd$body <- c(i = actions_text(instance$single_action_space), cnd$body)
+      rlang::cnd_signal(cnd)
+    }
+  )
+}
+
+# For those who count from 1, as R does.
+actions_text <- function(space) {
+  if (!inherits(space, "gym_space_discrete")) {
+    return(NULL)
+  }
+  bounds <- lapply(space_bounds(space), whole_text)
+  if (space$n == 1) {
+    return(paste0("The only action is ", bounds$low, "."))
+  }
+  between <- if (space$n == 2) " and " else " to "
+  counted <- if (space$start == 0) ", counted from 0"
+  paste0("Actions are ", bounds$low, between, bounds$high, counted, ".")
+}
+
+send_checked_action <- function(x, instance, space, action, json, fields, call) {
   route <- instance$step_route
   if (!instance$sends_tensors) {
     fields <- c(action = json, fields)

@@ -117,12 +117,12 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
 #' @noRd
 lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
   if (is.null(env$num_envs)) {
-    lanes <- single_lane(env)
+    lanes <- single_lane(env, call)
   } else if (identical(env$vectorization_mode, "sync")) {
-    lanes <- lanes_apart(env, block %||% env$num_envs)
+    lanes <- lanes_apart(env, block %||% env$num_envs, call)
   } else {
     check_ended_lanes_step(env, call)
-    lanes <- lanes_together(env)
+    lanes <- lanes_together(env, call)
   }
   lanes$spec <- env$spec
   lanes$client <- env$client
@@ -135,7 +135,7 @@ lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FAL
 }
 
 # Without lanes: one episode after the other.
-single_lane <- function(env) {
+single_lane <- function(env, call) {
   observed <- env$observation_space
   actions <- env$action_space
   list(
@@ -143,7 +143,7 @@ single_lane <- function(env) {
     draw_seeds = function() draw_environment_seeds(1L),
     reset = function(seeds) lanes_from(observed, list(env$reset(seed = seeds))),
     step = function(action, playing) {
-      out <- env$step(lane_value(actions, action, 1L))
+      out <- take_step(env, 1L, call, lane_value(actions, action, 1L))
       out$observation <- lanes_from(observed, list(out$observation))
       out
     }
@@ -152,7 +152,7 @@ single_lane <- function(env) {
 
 # Each lane is an environment of its own, with a seed of its own, and only those that
 # play are stepped.
-lanes_apart <- function(env, block) {
+lanes_apart <- function(env, block, call) {
   n <- env$num_envs
   list(
     observation_space = env$single_observation_space,
@@ -160,14 +160,18 @@ lanes_apart <- function(env, block) {
     draw_seeds = function() draw_environment_seeds(block),
     reset = function(seeds) env$reset(seed = seeds[seq_len(n)]),
     step = function(action, playing) {
-      if (length(playing) == n) env$step(action) else env$step(action, lanes = playing)
+      if (length(playing) == n) {
+        take_step(env, n, call, action)
+      } else {
+        take_step(env, length(playing), call, action, lanes = playing)
+      }
     }
   )
 }
 
 # All lanes are always stepped, those whose episode has ended too: what they do then is
 # of no interest. Where one generator serves them all, there is one seed.
-lanes_together <- function(env) {
+lanes_together <- function(env, call) {
   n <- env$num_envs
   observed <- env$single_observation_space
   actions <- env$single_action_space
@@ -179,11 +183,11 @@ lanes_together <- function(env) {
     reset = function(seeds) env$reset(seed = if (one_seed) seeds[[1L]] else seeds),
     step = function(action, playing) {
       if (length(playing) == n) {
-        return(env$step(action))
+        return(take_step(env, n, call, action))
       }
       row <- rep(1L, n)
       row[playing] <- seq_along(playing)
-      out <- env$step(lane_rows(actions, action, row))
+      out <- take_step(env, n, call, lane_rows(actions, action, row))
       list(
         observation = lane_rows(observed, out$observation, playing),
         reward = out$reward[playing],

@@ -53,6 +53,9 @@ play_block <- function(lanes, block, policy, record, max_steps, keep_steps) {
   playing <- block$lane
   observation <- lane_rows(lanes$observation_space, lanes$reset(block$seeds), playing)
   keep_frame(block, lanes)
+  if (block$episodes[[1L]] == 1L) {
+    ask_beforehand(policy, observation, playing, lanes)
+  }
   returns <- numeric(length(playing))
   at <- 0L
   while (length(playing)) {

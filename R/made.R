@@ -23,6 +23,7 @@ make_instance <- function(x, fields, call) {
     gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
   )
   suspendInterrupts({
+    note_protocol(state, answer)
     keep_made(made_place(x, answer$instance_id), x, answer$instance_id)
     outcome <- "made"
   })

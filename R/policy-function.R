@@ -1,4 +1,45 @@
-# What functions as policies answer. They are asked about many observations at once.
+# Functions as policies. They are asked about many observations at once.
+
+check_takes_observations <- function(policy, arg, call) {
+  # NULL for the few primitives that take whatever comes.
+  declared <- args(policy)
+  if (!is.null(declared) && !length(formals(declared))) {
+    gym_abort(
+      c(
+        paste0("`", arg, "` must be a function of observations; this one has no argument."),
+        i = "An example: `function(observation) as.integer(observation[, 3] > 0)`."
+      ),
+      class = "gym_error_argument", argument = arg, value = policy, call = call
+    )
+  }
+}
+
+#' Ask a function about one observation before the first step
+#'
+#' One that fails when a single episode is left would otherwise do so when most has been played.
+#' A single episode asks it so anyway.
+#' @param observation What is observed first, one row for each of the lanes `playing`.
+#' @noRd
+ask_beforehand <- function(policy, observation, playing, lanes) {
+  if (!is.function(policy) || length(playing) == 1L) {
+    return(invisible())
+  }
+  one <- lane_rows(lanes$observation_space, observation, 1L)
+  tryCatch(
+    keep_random_state(act_lanes(policy, one, playing[[1L]], lanes)),
+    gym_error = function(cnd) rlang::cnd_signal(cnd),
+    error = function(cnd) {
+      gym_abort(
+        c("The policy failed when it was asked about one observation, before the first step.",
+          i = asked_text(lanes$observation_space),
+          i = "There may be only one, as when all episodes but one have ended."),
+        class = "gym_error_argument", argument = "policy", value = policy, call = lanes$call,
+        parent = cnd
+      )
+    }
+  )
+  invisible()
+}
 
 #' Check that there is one action for each lane, and bring them in the form of lanes
 #'

@@ -3,6 +3,7 @@
 
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
+  check_weights(policy$weights, policy$sizes, "policy$weights", call)
   check_inputs(policy, env, call)
   check_outputs(policy, env, call)
   policy$observation_space <- env$observation_space

@@ -111,22 +111,27 @@ draw_weights <- function(sizes) {
   )
 }
 
-check_weights <- function(weights, sizes, call = rlang::caller_env()) {
+check_weights <- function(weights, sizes, name = "weights", call = rlang::caller_env()) {
   wanted <- Map(c, sizes[-1L], sizes[-length(sizes)])
   if (!is.list(weights) || length(weights) != length(wanted)) {
-    must <- paste("a list of", length(wanted), "matrices")
-    abort_argument(weights, must, "weights", call)
+    shapes <- vapply(wanted, paste, "", collapse = " x ")
+    must <- paste0("a list of ", length(wanted), " matrices (", paste(shapes, collapse = ", "), ")")
+    abort_argument(weights, must, name, call)
   }
   for (i in seq_along(wanted)) {
-    arg <- paste0("weights[[", i, "]]")
+    arg <- paste0(name, "[[", i, "]]")
     layer <- weights[[i]]
     if (!is.matrix(layer) || !is.numeric(layer)) {
       abort_argument(layer, "a numeric matrix", arg, call)
     }
     if (!identical(dim(layer), wanted[[i]])) {
+      turned <- identical(rev(dim(layer)), wanted[[i]])
       gym_abort(
-        paste0("`", arg, "` must be a matrix of ", paste(wanted[[i]], collapse = " x "),
-               " for these sizes, not of ", paste(dim(layer), collapse = " x "), "."),
+        c(
+          paste0("`", arg, "` must be a matrix of ", paste(wanted[[i]], collapse = " x "),
+                 " for these sizes, not of ", paste(dim(layer), collapse = " x "), "."),
+          i = if (turned) "`t()` turns it: a row is a neuron, a column one of what it takes."
+        ),
         class = "gym_error_argument", argument = arg, value = layer, call = call
       )
     }
@@ -140,6 +145,8 @@ check_weights <- function(weights, sizes, call = rlang::caller_env()) {
 
 #' @export
 act.gym_policy_network <- function(policy, observation, ...) {
+  # They may have been changed by hand.
+  check_weights(policy$weights, policy$sizes, "policy$weights")
   lanes <- observation_lanes(observation, policy$observation_space)
   outputs <- network_outputs(policy, lanes$values)
   network_action(policy$action_space, outputs, policy, lanes$one)

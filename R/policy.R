@@ -19,7 +19,8 @@
 #' many episodes at once, those that have ended are no longer asked about. What it returns has
 #' the same form: a vector with an action for
 #' each observation (a logical one counts as 0 and 1), a matrix with an action in each
-#' row, an array, or a list of these for the parts.
+#' row, an array, or a list of these for the parts. [rollout()] asks it about a single one
+#' before the first step, so that a function which cannot answer that fails at once.
 #'
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
@@ -92,14 +93,28 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
       class = "gym_error_argument", argument = arg, value = x, call = call
     )
   }
-  if (!inherits(x, "gym_policy") && !is.function(x)) {
+  if (!inherits(x, "gym_policy") && !is.function(x) && !has_act_method(x)) {
     abort_argument(x, "a policy or a function of observations", arg, call)
+  }
+  if (is.function(x)) {
+    check_takes_observations(x, arg, call)
   }
   invisible(x)
 }
 
+# Is there a method of `act()` for the object's own class?
+has_act_method <- function(x) {
+  if (!is.object(x)) {
+    return(FALSE)
+  }
+  methods <- lapply(setdiff(.class2(x), "function"), function(class) {
+    utils::getS3method("act", class, optional = TRUE)
+  })
+  !all(vapply(methods, is.null, NA))
+}
+
 policy_text <- function(policy) {
-  if (inherits(policy, "gym_policy")) format(policy) else "a function"
+  if (inherits(policy, "gym_policy")) format(policy) else describe_argument(policy)
 }
 
 # Questions that whoever plays or searches asks of a policy ------------------
@@ -150,7 +165,8 @@ act_lanes <- function(policy, observation, playing, lanes) UseMethod("act_lanes"
 
 #' @exportS3Method
 act_lanes.default <- function(policy, observation, playing, lanes) {
-  actions <- if (is.function(policy)) policy(observation) else act(policy, observation)
+  plain <- is.function(policy) && !has_act_method(policy)
+  actions <- if (plain) policy(observation) else act(policy, observation)
   lane_actions(actions, length(playing), lanes)
 }
 

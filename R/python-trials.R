@@ -45,8 +45,7 @@ end_trial <- function(python, trial, deadline) {
     return(outcome(reason = not_run_words(python)))
   }
   on.exit(unlink(trial$output))
-  left <- as.numeric(deadline - Sys.time(), units = "secs")
-  trial$process$wait(max(0, left) * 1000)
+  await_end(trial$process, as.numeric(deadline - Sys.time(), units = "secs"))
   said <- lapply(trial$output, log_tail)
   version <- grep("^[0-9.]+$", said[[1L]], value = TRUE)[1L]
   if (trial$process$is_alive()) {

@@ -30,7 +30,8 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
   if (!is.null(fields)) {
     load_body(line, channel, request_body(fields, request, tensors))
   }
-  repeatable <- once || is.null(fields)
+  # A classic server would do the repeat as well.
+  repeatable <- once && !isTRUE(client$state$classic) || is.null(fields)
   response <- fetch(client, line, channel, route, request, repeatable, call)
   response$request <- request
   response

@@ -8,10 +8,36 @@
 #' @param code Starts a process.
 #' @noRd
 with_own_mark <- function(code) {
+  load_processx()
   keep_random_state({
     set.seed(NULL)
     code
   })
+}
+
+# Processx and the package parallel both want the signal of ended children. When it is loaded,
+# processx reads from this variable whether to hand the signal on; without it parallel waits at
+# the session's end for forked children that ended long ago.
+load_processx <- function() {
+  variable <- "PROCESSX_NOTIFY_OLD_SIGCHLD"
+  if (!isNamespaceLoaded("processx") && !nzchar(Sys.getenv(variable))) {
+    do.call(Sys.setenv, stats::setNames(list("true"), variable))
+    on.exit(Sys.unsetenv(variable))
+    loadNamespace("processx")
+  }
+}
+
+#' Wait for a process to end
+#'
+#' By asking it again and again: the `wait()` of processx takes the signal of ended children from
+#' the package parallel, see [load_processx()].
+#' @param seconds How long at most.
+#' @noRd
+await_end <- function(process, seconds) {
+  deadline <- proc.time()[["elapsed"]] + seconds
+  while (process$is_alive() && proc.time()[["elapsed"]] < deadline) {
+    Sys.sleep(0.01)
+  }
 }
 
 #' Run a program that is only asked something

@@ -126,7 +126,7 @@ await_start <- function(process, log, timeout, call) {
       return(sub("^Server starting at: ", "", address))
     }
     if (!process$is_incomplete_output()) {
-      process$wait(5000)
+      await_end(process, 5)
       return(NULL)
     }
   }
@@ -155,9 +155,9 @@ stop_server <- function(server, patience = 15) {
     return(invisible())
   }
   close_server_input(server)
-  process$wait(1000)
+  await_end(process, 1)
   terminate_server(server)
-  process$wait(patience * 1000)
+  await_end(process, patience)
   if (process$is_alive()) {
     process$kill()
   }

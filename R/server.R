@@ -253,8 +253,7 @@ stop_session_servers <- function(servers, deadline) {
 
 await_ends <- function(servers, deadline) {
   for (server in servers) {
-    left <- deadline - proc.time()[["elapsed"]]
-    server$process$wait(max(0, left * 1000))
+    await_end(server$process, deadline - proc.time()[["elapsed"]])
   }
 }
 

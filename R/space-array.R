@@ -5,6 +5,8 @@
 #' @exportS3Method
 init_space.gym_space_box <- function(space) {
   space$shape <- shape_from_json(space$shape)
+  # Classic servers tell none, and their numbers are those of JSON.
+  space$dtype <- space$dtype %||% "float64"
   space$low <- bound_from_json(space$low)
   space$high <- bound_from_json(space$high)
   class(space) <- append(class(space), "gym_space_array", 1L)

@@ -22,3 +22,17 @@ seconds_text <- function(seconds) {
     paste(round(seconds / 60), "min")
   }
 }
+
+# The one of `choices` that somebody who wrote `name` seems to have meant; character(0) for none.
+nearest_name <- function(name, choices) {
+  plain <- function(x) gsub("[._]", "", tolower(x))
+  ordered <- function(x) {
+    vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
+  }
+  distance <- function(form) utils::adist(form(plain(name)), form(plain(choices)))[1L, ]
+  begins <- nchar(name) > 3L & startsWith(plain(choices), plain(name))
+  close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins
+  # Of equally near ones that with the same letters.
+  best <- order(distance(identity), distance(ordered))
+  utils::head(choices[best[close[best]]], 1L)
+}

@@ -1,3 +1,5 @@
+# As the package has it when it loads processx itself, which testthat loads before it.
+Sys.setenv(PROCESSX_NOTIFY_OLD_SIGCHLD = "true")
 library(testthat)
 library(gym)
 

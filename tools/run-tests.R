@@ -3,6 +3,8 @@
 # A test is one test_that() block: failed when anything in it failed, skipped when it was skipped
 # or holds no expectation. With LIBRARY, what that library holds must have been loaded from there.
 
+# As the package has it when it loads processx itself, which testthat loads before it.
+Sys.setenv(PROCESSX_NOTIFY_OLD_SIGCHLD = "true")
 library(testthat)
 Sys.setenv(NOT_CRAN = "true")
 Sys.unsetenv("GYM_SERVER_URL")

@@ -71,10 +71,9 @@ local_stalling <- function(how, frame = parent.frame()) {
 
 # A client whose connections to `server` are cut; see cutting_proxy.py.
 local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
-  python <- the_session$servers[[server$remote_base]]$python
   proxy <- processx::process$new(
-    python, c(test_path("cutting_proxy.py"), sub(".*:", "", server$remote_base), when, pattern,
-              times),
+    working_python(),
+    c(test_path("cutting_proxy.py"), sub(".*:", "", server$remote_base), when, pattern, times),
     stdin = "|", stdout = "|", stderr = NULL
   )
   withr::defer(proxy$kill(), envir = frame)

@@ -19,9 +19,10 @@ test_that("a rollout asks for all lanes that play at once", {
   }
   lengths <- function(seed, step, action) step == 1L + seed %% 3L
   played <- rollout(fake_lanes(5, ends = lengths), count, episodes = 5, seed = 1)
-  expect_identical(rows, vapply(seq_len(max(played$episodes$length)), function(step) {
+  # First about one, to see whether it can.
+  expect_identical(rows, c(1L, vapply(seq_len(max(played$episodes$length)), function(step) {
     sum(played$episodes$length >= step)
-  }, 0L))
+  }, 0L)))
   rows <- integer()
   rollout(fake_environment(), count, episodes = 2)
   expect_identical(rows, rep(1L, 6))
@@ -81,7 +82,68 @@ test_that("observations and actions with parts have them batched, in any order o
 test_that("policies of other classes are asked by their own method, in lanes too", {
   registerS3method("act", "follower", function(policy, observation, ...) follow_pole(observation),
                    envir = asNamespace("gym"))
-  follower <- structure(list(), class = c("follower", "gym_policy"))
-  steps <- rollout(fake_lanes(3), follower, episodes = 5, steps = TRUE)$steps
-  expect_identical(steps$action, as.integer(steps$obs_3 > 0))
+  for (follower in list(
+    structure(list(), class = "follower"),
+    structure(list(), class = c("follower", "gym_policy")),
+    # One that is a function as well is not called as one.
+    structure(function(observation) stop(), class = c("follower", "function"))
+  )) {
+    played <- rollout(fake_lanes(3), follower, episodes = 5, steps = TRUE)
+    expect_identical(played$steps$action, as.integer(played$steps$obs_3 > 0))
+  }
+  follower <- structure(list(), class = "follower")
+  played <- rollout(fake_environment(), follower)
+  expect_output(print(played), "Policy: an object of class follower")
+  map <- decision_map(follower, fake_environment(), x = 3, y = 4)
+  expect_output(print(map), "Policy: an object of class follower")
+  expect_error(search_random(fake_environment(), follower),
+               "weights to draw, not an object of class follower", class = "gym_error_argument")
+  expect_error(rollout(fake_environment(), structure(list(), class = "stranger")),
+               "must be a policy or a function", class = "gym_error_argument")
+})
+
+test_that("a function of a class without a method of its own is a function", {
+  kept <- structure(follow_pole, class = c("kept", "function"))
+  expect_identical(rollout(fake_lanes(3), kept, 5, seed = 1)$episodes,
+                   rollout(fake_lanes(3), follow_pole, 5, seed = 1)$episodes)
+})
+
+test_that("a function without an argument is refused before anything is made", {
+  expect_error(rollout("CartPole-v1", function() 1L, client = no_client()),
+               "function of observations; this one has no argument", class = "gym_error_argument")
+  # Primitives declare their arguments in another way, or not at all.
+  env <- fake_environment(action_space = box_space(-1, 1))
+  expect_identical(rollout(env, length)$episodes$length, 3L)
+})
+
+test_that("a function that cannot be asked about one observation fails before the first step", {
+  # One row of a matrix is a vector here, which has no columns.
+  drops <- function(observation) {
+    as.integer(observation[seq_len(nrow(observation)), ][, 3] > 0)
+  }
+  env <- fake_lanes(3, ends = function(seed, step, action) step == 1L + seed %% 3L)
+  cnd <- expect_error(rollout(env, drops, 3, seed = 1), class = "gym_error_argument")
+  expect_match(conditionMessage(cnd), "asked about one observation, before the first step")
+  expect_match(conditionMessage(cnd$parent), "number of dimensions")
+  expect_identical(env$lane_steps, 0L)
+  all_same <- function(observation) rep(1L, max(nrow(observation), 2L))
+  expect_error(rollout(env, all_same, 3), "for the one observation, not 2 actions",
+               class = "gym_error_argument")
+  expect_identical(env$lane_steps, 0L)
+})
+
+test_that("asking a function beforehand moves no generator and is done once a rollout", {
+  draws <- function(observation) {
+    asked <<- asked + 1L
+    sample(0:1, nrow(observation), replace = TRUE)
+  }
+  asked <- 0L
+  played <- rollout(fake_lanes(2), draws, 6, seed = 1, steps = TRUE)
+  expect_identical(asked, 3L * 3L + 1L)
+  set.seed(1)
+  replicate(3, draw_environment_seeds(2L))
+  expect_identical(played$steps$action, {
+    drawn <- replicate(9, sample(0:1, 2, replace = TRUE))
+    as.vector(aperm(array(drawn, c(2, 3, 3)), c(2, 1, 3)))
+  })
 })

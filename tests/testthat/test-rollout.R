@@ -342,3 +342,47 @@ test_that("a server that allows fewer lanes plays one episode after the other", 
   expect_identical(few$episodes$lane, 1:5)
   expect_length(env_list_all(server), 0)
 })
+
+test_that("an environment of one's own whose step lacks something is refused at its first step", {
+  making <- function(change) {
+    env <- fake_environment()
+    step <- env$step
+    env$step <- function(action) {
+      out <- step(action)
+      change(out)
+    }
+    env
+  }
+  refusal <- function(change) {
+    env <- making(change)
+    cnd <- expect_error(rollout(env, policy_random()), class = "gym_error_argument")
+    expect_identical(env$at, 1L)
+    expect_identical(as.character(cnd$call[[1L]]), "rollout")
+    conditionMessage(cnd)
+  }
+  without <- function(name) function(out) out[setdiff(names(out), name)]
+  expect_match(refusal(without("truncated")),
+               "lacks `truncated`; it has `observation`, `reward`, `done`, `info`, `terminated`.",
+               fixed = TRUE)
+  for (name in c("observation", "reward", "terminated")) {
+    expect_match(refusal(without(name)), paste0("lacks `", name, "`"), fixed = TRUE)
+  }
+  expect_match(refusal(function(out) NULL), "must return a list, not NULL", fixed = TRUE)
+  expect_match(refusal(function(out) unlist(out)), "must return a list", fixed = TRUE)
+  with <- function(...) function(out) utils::modifyList(out, list(...))
+  expect_match(refusal(with(truncated = NA)), "`truncated` .* must be TRUE or FALSE, not NA")
+  expect_match(refusal(with(terminated = 0)), "`terminated` .* must be TRUE or FALSE, not 0")
+  expect_match(refusal(with(reward = "1")), "`reward` .* must be a number, not \"1\"")
+  expect_match(refusal(with(reward = numeric())), "`reward` .* must be a number")
+})
+
+test_that("an environment of one's own with lanes says how each of its episodes stands", {
+  for (mode in c("sync", "vector_entry_point")) {
+    env <- fake_lanes(3, mode)
+    step <- env$step
+    env$step <- function(...) utils::modifyList(step(...), list(truncated = FALSE))
+    expect_error(rollout(env, policy_random(), 3),
+                 "`truncated` .* must be TRUE or FALSE for each of 3 lanes, not FALSE",
+                 class = "gym_error_argument")
+  }
+})

@@ -43,3 +43,29 @@ test_that("the end of one process is not that of others", {
   run_quietly("/bin/sh", c("-c", "exit 0"))
   expect_type(env_list_all(server), "list")
 })
+
+# What a session says at its end. It loads these packages first, plays on a server of its own, and
+# leaves a forked child behind.
+last_words <- function(packages, ...) {
+  script <- withr::local_tempfile(lines = c(
+    paste0(".libPaths(", deparse1(.libPaths()), ")"),
+    "Sys.unsetenv('PROCESSX_NOTIFY_OLD_SIGCHLD')",
+    paste0("invisible(loadNamespace('", packages, "'))"),
+    ...,
+    "cat(length(gym::env_list_all(gym::gym_client())))",
+    "child <- parallel::mcparallel(Sys.sleep(60))"
+  ))
+  rscript <- file.path(R.home("bin"), "Rscript")
+  run <- processx::run(rscript, c("--no-init-file", script), timeout = 120)
+  expect_identical(run$stdout, "0")
+  run$stderr
+}
+
+test_that("a session that forks ends in order with a server, too", {
+  skip_on_os("windows")
+  skip_if_no_server()
+  # The package parallel complains when it has waited for its children in vain.
+  expect_identical(last_words(c("parallel", "processx")), "")
+  fork <- "answers <- parallel::mclapply(1:2, identity, mc.cores = 2)"
+  expect_identical(last_words("parallel", fork), "")
+})

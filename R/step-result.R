@@ -1,0 +1,62 @@
+# What a step of an environment returns that somebody has written in R: it plays by the same
+# rules as those of the server, but nothing has checked that it does.
+
+#' Take a step, and check what comes of it if the environment is of the user's own making
+#' @param n For how many lanes it steps.
+#' @param ... As `env$step()` takes them.
+#' @noRd
+take_step <- function(env, n, call, ...) {
+  out <- env$step(...)
+  if (!inherits(env, "gym_env")) {
+    check_step_result(out, n, call)
+  }
+  out
+}
+
+check_step_result <- function(out, n, call) {
+  if (!is.list(out)) {
+    problem <- paste("`step()` of this environment must return a list, not", describe_argument(out))
+    abort_step_result(problem, out, call)
+  }
+  absent <- setdiff(c("observation", "reward", flags), names(out))
+  if (length(absent)) {
+    has <- if (length(out)) paste0("; it has `", paste(names(out), collapse = "`, `"), "`")
+    problem <- paste0("What `step()` of this environment returns lacks `", absent[[1L]], "`", has)
+    abort_step_result(problem, out, call)
+  }
+  check_reward(out, n, call)
+  for (flag in flags) {
+    check_step_flag(out, flag, n, call)
+  }
+}
+
+check_reward <- function(out, n, call) {
+  if (length(out$reward) != n || !(is.numeric(out$reward) || is.logical(out$reward))) {
+    abort_step_element("reward", if (n == 1L) "a number" else paste(n, "numbers"), out, call)
+  }
+}
+
+check_step_flag <- function(out, flag, n, call) {
+  if (!is.logical(out[[flag]]) || length(out[[flag]]) != n || anyNA(out[[flag]])) {
+    must <- if (n == 1L) "TRUE or FALSE" else paste("TRUE or FALSE for each of", n, "lanes")
+    abort_step_element(flag, must, out, call)
+  }
+}
+
+abort_step_element <- function(name, must, out, call) {
+  problem <- paste0("The element `", name, "` of what `step()` of this environment returns must ",
+                    "be ", must, ", not ", describe_argument(out[[name]]))
+  abort_step_result(problem, out, call)
+}
+
+abort_step_result <- function(problem, out, call) {
+  gym_abort(
+    c(
+      paste0(problem, "."),
+      i = paste("It must be a list of `observation`, `reward`, `terminated` (the episode ended by",
+                "the environment's own rules) and `truncated` (it was cut off, such as by a limit",
+                "of steps).")
+    ),
+    class = "gym_error_argument", argument = "env", value = out, call = call
+  )
+}

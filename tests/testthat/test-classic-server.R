@@ -1,0 +1,108 @@
+# A client of a server that has the protocol of gym-http-api and nothing more, see
+# classic_server.py.
+local_classic_client <- function(frame = parent.frame()) {
+  process <- processx::process$new(
+    working_python(), test_path("classic_server.py"), stdin = "|", stdout = "|", stderr = NULL
+  )
+  withr::defer(process$kill(), envir = frame)
+  port <- character()
+  while (!length(port) && process$is_alive()) {
+    process$poll_io(1000)
+    port <- process$read_output_lines()
+  }
+  create_GymClient(paste0("http://127.0.0.1:", port), timeout = 20)
+}
+
+test_that("the classic calls work with a server that has no others", {
+  client <- local_classic_client()
+  id <- env_create(client, "CartPole-v0")
+  expect_identical(env_list_all(client)[[id]], "CartPole-v0")
+  expect_length(env_reset(client, id), 4)
+  expect_identical(env_action_space_info(client, id)$n, 2L)
+  observed <- env_observation_space_info(client, id)
+  expect_identical(observed$shape, 4L)
+  expect_identical(is.finite(observed$high), c(TRUE, FALSE, TRUE, FALSE))
+  expect_true(env_action_space_sample(client, id) %in% 0:1)
+  expect_true(env_action_space_contains(client, id, 1))
+  expect_false(env_action_space_contains(client, id, 2))
+  expect_true(env_observation_space_contains(client, id, c(0, 100, 0, 0)))
+  expect_false(env_observation_space_contains(client, id, c(9, 0, 0, 0)))
+  env_monitor_start(client, id, "results", force = TRUE)
+  env_monitor_close(client, id)
+  expect_invisible(env_close(client, id))
+  expect_length(env_list_all(client), 0)
+  expect_error(env_reset(client, id), "unknown", class = "gym_error_http_400")
+  expect_error(env_reset(client, "0123abcd"), "0123abcd unknown", class = "gym_error_http_400")
+  expect_error(env_create(client, "Nothing-v0"), "malformed", class = "gym_error_http_400")
+  expect_invisible(shutdown_server(client))
+})
+
+test_that("an episode there ends as Gym told it", {
+  client <- local_classic_client()
+  env <- gym_make("CartPole-v1", client = client)
+  env$reset()
+  steps <- 0
+  repeat {
+    out <- env$step(1)
+    steps <- steps + 1
+    if (out$done) break
+    expect_false(out$terminated || out$truncated)
+  }
+  expect_named(out, c("observation", "reward", "done", "info", "terminated", "truncated"))
+  expect_lt(steps, 20)
+  expect_true(out$terminated)
+  expect_false(out$truncated)
+  expect_output(print(env), "CartPole-v1")
+  env$close()
+  pendulum <- gym_make("Pendulum-v1", client = client)
+  expect_identical(pendulum$reset(return_info = TRUE)$info, empty_object)
+  for (step in 1:200) out <- pendulum$step(0.5)
+  expect_identical(out[c("done", "terminated", "truncated")],
+                   list(done = TRUE, terminated = FALSE, truncated = TRUE))
+  pendulum$close()
+})
+
+test_that("a space of which that server tells only the name passes values as they are", {
+  env <- gym_make("Blackjack-v1", client = local_classic_client())
+  expect_length(env$reset(), 3)
+  expect_output(print(env), "Tuple (not described)", fixed = TRUE)
+  expect_error(space_sample(env$observation_space), "no more .* than its name",
+               class = "gym_error_argument")
+  expect_type(env$step(0)$reward, "double")
+})
+
+test_that("what that server would ignore is refused", {
+  client <- local_classic_client()
+  cnd <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = client),
+                      "which has no `num_envs`", class = "gym_error_http")
+  expect_identical(cnd$code, "not_supported")
+  expect_length(env_list_all(client), 0)
+  env <- gym_make("CartPole-v1", seed = 1, client = client)
+  expect_error(env$reset(seed = 1), "which has no `seed` here", class = "gym_error_http")
+  expect_error(rollout("CartPole-v1", policy_random(), client = client),
+               "which has no `seed` here", class = "gym_error_http")
+  expect_identical(names(env_list_all(client)), env$instance_id)
+})
+
+test_that("the post's script plays on that server", {
+  client <- local_classic_client()
+  id <- env_create(client, "CartPole-v0")
+  for (episode in 1:2) {
+    observation <- env_reset(client, id)
+    repeat {
+      results <- env_step(client, id, env_action_space_sample(client, id), render = TRUE)
+      expect_length(results[[1]], 4)
+      expect_identical(results[[2]], 1)
+      if (results[["done"]]) break
+    }
+  }
+  env_close(client, id)
+})
+
+test_that("a step that was cut is not repeated there, where it would be done twice", {
+  client <- local_cut_client(local_classic_client(), "answered", "/step")
+  env <- gym_make("CartPole-v1", client = client)
+  env$reset()
+  expect_error(env$step(1), class = "gym_error_connection")
+  expect_equal(env$step(1)$reward, 1)
+})
