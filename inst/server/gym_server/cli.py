@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gym_server import memory
 from gym_server.app import Config, GymApp, create_app
 from gym_server.guard import Access, is_loopback
 from gym_server.limits import Limits
@@ -94,6 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
+    memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
     # What environments print must not fill a pipe that nobody reads.
     os.dup2(2, 1)
