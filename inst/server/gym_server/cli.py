@@ -89,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(app, listener, max_body_bytes, on_stop=app.end_watching, admit=app.admit)
+    server = Server(app, listener, max_body_bytes, app.end_watching, app.admit, app.knows)
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)
