@@ -98,6 +98,8 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
+        "unread": python("unread", 4050, 20 if quick else 60),
+        "bodies": python("bodies", 2 if quick else 10),
         "os-exit": pytest("tests/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }

@@ -11,7 +11,7 @@ import socket
 import sys
 import time
 
-from serving import Client, ServerProcess
+from serving import Client, ServerProcess, allow_many_open_files
 
 HALF = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100\r\n\r\n{"
 
@@ -19,7 +19,7 @@ HALF = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100\r\n\r
 def main(number: int) -> int:
     """Run both; return the exit status."""
     server = ServerProcess()
-    _may_open_many_files()
+    allow_many_open_files()
     player = Client(server.port)
     url = f"/v1/envs/{player.post('/v1/envs/', env_id='CartPole-v1')['instance_id']}"
     player.post(f"{url}/reset/", seed=1)
@@ -48,16 +48,6 @@ def main(number: int) -> int:
     )
     print(f"idle: {figures}")
     return int(max(slowest.values()) > 1)
-
-
-def _may_open_many_files() -> None:
-    # After the server's start: it has to see to itself.
-    try:
-        import resource
-    except ImportError:
-        return
-    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, 8192), most))
 
 
 def _health_seconds(port: int) -> float:

@@ -19,8 +19,8 @@ SERVER = Path(__file__).resolve().parents[2] / "inst" / "server"
 class ServerProcess:
     """A server of its own; it ends with this process, however that ends."""
 
-    def __init__(self, *arguments: str) -> None:
-        """Start it and wait until it takes connections."""
+    def __init__(self, *arguments: str, **variables: str) -> None:
+        """Start it, with more environment variables, and wait until it takes connections."""
         self.process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "gym_server", "--port", "0", "--stop-on-stdin-eof"),
@@ -32,6 +32,7 @@ class ServerProcess:
             stdout=subprocess.PIPE,
             env={
                 **os.environ,
+                **variables,
                 "PYTHONPATH": os.pathsep.join([str(SERVER), str(SERVER / "tests")]),
                 "PYTHONDONTWRITEBYTECODE": "1",
             },
@@ -58,6 +59,16 @@ class ServerProcess:
             "files": sum(_count(pid, "fd") for pid in pids),
             "processes": len(pids),
         }
+
+
+def allow_many_open_files(most: int = 16384) -> None:
+    """Let this process open many connections; call it after a server's start, which has its own."""
+    try:
+        import resource
+    except ImportError:
+        return
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, hard), hard))
 
 
 def _descendants(pid: int) -> list[int]:
@@ -95,9 +106,10 @@ class RefusedError(Exception):
 class Client:
     """One kept connection; calls that change something are numbered."""
 
-    def __init__(self, port: int, timeout: float = 60) -> None:
+    def __init__(self, port: int, timeout: float = 60, token: str | None = None) -> None:
         """Connect at the first call."""
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=timeout)
+        self._token = {} if token is None else {"Authorization": f"Bearer {token}"}
         self._key, self._number = uuid.uuid4().hex, 0
 
     def close(self) -> None:
@@ -122,7 +134,7 @@ class Client:
         return _tensors(self._call("POST", path, json.dumps(fields), accept))
 
     def _call(self, method: str, path: str, body: str | None, headers: dict) -> dict | bytes:
-        self._connection.request(method, path, body, headers)
+        self._connection.request(method, path, body, {**self._token, **headers})
         answer = self._connection.getresponse()
         data = answer.read()
         is_json = answer.headers.get_content_type() == "application/json"

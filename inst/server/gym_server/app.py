@@ -157,6 +157,10 @@ class GymApp(Flask):
         """Raise the refusal of a request that would not be answered, before its body has come."""
         self._guard.check(environ)
 
+    def knows(self, environ: dict) -> bool:
+        """Tell whether a request comes from one who may talk to this server at all."""
+        return self._guard.knows(environ)
+
     def _give_up(self, thread: int, why: GymServerError) -> None:
         """Answer what a thread does that is stuck in an environment."""
         answer = self._exactly_once.give_up(thread, lambda number: _failure(why, number))

@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gym_server import memory
 from gym_server.app import Config, GymApp, create_app
 from gym_server.guard import Access, is_loopback
 from gym_server.limits import Limits
@@ -88,12 +89,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(app, listener, max_body_bytes, on_stop=app.end_watching, admit=app.admit)
+    server = Server(app, listener, max_body_bytes, app.end_watching, app.admit, app.knows)
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
+    memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
     # What environments print must not fill a pipe that nobody reads.
     os.dup2(2, 1)

@@ -29,11 +29,15 @@ _STATUS = {
     "environment_died": 500,
     "environment_error": 500,
     "internal_error": 500,
+    "busy_receiving": 503,
     "shutting_down": 503,
     "call_too_long": 504,
 }
 
-_HEADERS = {"unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),)}
+_HEADERS = {
+    "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
+    "busy_receiving": (("Retry-After", "5"),),
+}
 
 
 # Where the routes are described for people.  The classic R client shows no message without it.
@@ -166,6 +170,15 @@ def body_too_large() -> GymServerError:
         "body_too_large",
         "The request's body is larger than this server takes",
         "the server's option --max-body-mb sets the limit",
+    )
+
+
+def busy_receiving() -> GymServerError:
+    """So many large bodies come at once that there is no room for another."""
+    return GymServerError(
+        "busy_receiving",
+        "This server receives as many large requests at this moment as it has room for",
+        "send it again in some seconds; the room grows with the server's option --max-body-mb",
     )
 
 

@@ -27,6 +27,8 @@ _DEFAULT_PORTS = {"http": "80", "https": "443"}
 _WATCH = re.compile("/v1/envs/([0-9a-f]+)/watch(?:/(?:state/?|presence/?)?)?")
 _WATCH_FILE = re.compile("/v1/envs/[0-9a-f]+/watch/[a-z]+[.](?:css|js)/?")
 
+_READS = ("GET", "HEAD")
+
 # Names that were looked into; a client that thinks up others is looked into each time.
 _MOST_KNOWN = 100
 
@@ -146,18 +148,28 @@ class Guard:
             b"Bearer " + token.strip(), self._expected
         )
 
+    def knows(self, environ: dict) -> bool:
+        """Tell whether a request shows the token, or a key; where there is none, everybody does."""
+        if self._expected is None or self._has_token(environ):
+            return True
+        opens, _ = self._watch_key(environ)
+        return opens
+
+    def _watch_key(self, environ: dict) -> tuple[bool, str | None]:
+        """Return whether a request shows a key that opens what it asks for, and the key."""
+        match = _WATCH.fullmatch(environ["PATH_INFO"])
+        if match is None or environ["REQUEST_METHOD"] not in _READS:
+            return False, None
+        key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
+        return self._watch_keys.opens(key, match[1]), key
+
     def _check_watch_key(self, environ: dict) -> None:
-        path = environ["PATH_INFO"]
-        key = None
-        if environ["REQUEST_METHOD"] in ("GET", "HEAD"):
-            if _WATCH_FILE.fullmatch(path):
-                return
-            if match := _WATCH.fullmatch(path):
-                key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
-                if self._watch_keys.opens(key, match[1]):
-                    return
-        log.info("Refused a request from %s without a token", environ.get("REMOTE_ADDR"))
-        raise _unauthorized(key, "HTTP_AUTHORIZATION" in environ)
+        if environ["REQUEST_METHOD"] in _READS and _WATCH_FILE.fullmatch(environ["PATH_INFO"]):
+            return
+        opens, key = self._watch_key(environ)
+        if not opens:
+            log.info("Refused a request from %s without a token", environ.get("REMOTE_ADDR"))
+            raise _unauthorized(key, "HTTP_AUTHORIZATION" in environ)
 
 
 def is_loopback(host: str) -> bool:

@@ -10,15 +10,20 @@ from urllib.parse import unquote_to_bytes
 
 from httptools import HttpParserError, HttpParserUpgrade, HttpRequestParser, parse_url
 
-from gym_server.errors import GymServerError, body_too_large
+from gym_server.budget import Share
+from gym_server.errors import GymServerError, body_too_large, busy_receiving
 
 _LARGEST_HEAD_BYTES = 2**16
 
-# A body that is read before anybody asks whose it is.
+# A body that is read before anybody asks whose it is, or whether there is room for it; room is
+# asked for in pieces of this size.
 _UNASKED_BYTES = 2**16
 
 # Of a request that is refused for its size, so that its sender gets to see the answer.
 _DISCARD_BYTES = 2**30
+
+
+_WISH = (b"connection", b"upgrade")
 
 
 class Request:
@@ -27,8 +32,10 @@ class Request:
     def __init__(self) -> None:
         self.url = b""
         self.headers: list[tuple[bytes, bytes]] = []
-        self.body: list[bytes] = []
+        self.body: bytes | bytearray = b""
         self.body_bytes = 0
+        # How much room it was given beyond what nobody asks about.
+        self.held_bytes = 0
         self.method = ""
         self.version = ""
         self.keep_alive = False
@@ -46,11 +53,25 @@ class Request:
             and self.version == other.version
         )
 
+    def add(self, data: bytes) -> None:
+        """Take a piece of the body; most come in one, which is not copied."""
+        if not self.body:
+            self.body = data
+            return
+        if isinstance(self.body, bytes):
+            self.body = bytearray(self.body)
+        self.body += data
+
     def plain_head(self) -> bytes:
         """Return its head without the wish for another protocol."""
-        lines = [b"%s %s HTTP/1.1" % (self.method.encode("ascii"), self.url)]
-        lines += [b": ".join(h) for h in self.headers if h[0] not in (b"connection", b"upgrade")]
+        lines = [b"%s %s HTTP/%s" % (self.method.encode(), self.url, self.version.encode())]
+        lines += [b": ".join(header) for header in self.headers if header[0] not in _WISH]
+        lines += [b"connection: %s" % wish for wish in self._other_wishes()]
         return b"\r\n".join((*lines, b"", b""))
+
+    def _other_wishes(self) -> list[bytes]:
+        said = b",".join(value for name, value in self.headers if name == b"connection")
+        return [wish for wish in said.split(b",") if wish.strip().lower() not in (b"", b"upgrade")]
 
     def environ(self) -> dict:
         """Return what its head says to WSGI."""
@@ -90,10 +111,20 @@ class Reader:
         max_body_bytes: int,
         send: Callable[[bytes], None],
         why_not: Callable[[Request], GymServerError | None],
+        bodies: Share,
     ) -> None:
+        """Begin to read.
+
+        Args:
+            max_body_bytes: the size of the largest body.
+            send: sends what has to be said before a request is complete.
+            why_not: tells of a request whose large body is still to come why it is refused.
+            bodies: what large bodies may hold.
+        """
         self._max_body_bytes = max_body_bytes
         self._send = send
         self._why_not = why_not
+        self._bodies = bodies
         self._parser = HttpRequestParser(self)
         self._request = Request()
         self._complete: list[Request] = []
@@ -103,6 +134,23 @@ class Reader:
         self._fault: GymServerError | None = None
         # Whether a request has come in part.
         self.began = False
+
+    def release(self, request: Request) -> None:
+        """Let go of the room that a request's body had."""
+        self._bodies.give_back(request.held_bytes)
+        request.held_bytes = 0
+
+    def close(self) -> None:
+        """Let go of everything, also of a request that has come in part.
+
+        The parser and the connection know this reader, and it knows them. Without this all would
+        keep each other, and what they hold, until a collection of garbage comes across them.
+        """
+        self._bodies.give_all_back()
+        self._parser = HttpRequestParser(None)
+        self._send = self._why_not = lambda _: None
+        self._request = Request()
+        self._complete = []
 
     def feed(self, data: bytes) -> list[Request]:
         """Take what has arrived; return the requests that are complete with it."""
@@ -164,6 +212,9 @@ class Reader:
         request = self._request
         request.method = self._parser.get_method().decode("ascii")
         request.version = self._parser.get_http_version()
+        if self._parser.should_upgrade():
+            # It comes once more, without that wish.
+            return
         headers = dict(request.headers)
         if b"transfer-encoding" in headers and not _is_plainly_chunked(request):
             # A proxy may have seen its end elsewhere.
@@ -182,20 +233,32 @@ class Reader:
         request = self._request
         request.body_bytes += len(data)
         self._check_size(request.body_bytes)
+        while request.refusal is None and request.body_bytes > request.held_bytes + _UNASKED_BYTES:
+            self._hold_more(request)
         if request.refusal is None:
-            request.body.append(data)
+            request.add(data)
         elif request.body_bytes > _DISCARD_BYTES:
             self._give_up(request.refusal)
 
     def _check_size(self, size: int) -> None:
         if size > self._max_body_bytes:
-            self._request.body.clear()
-            self._request.refusal = body_too_large()
+            self._refuse(body_too_large())
         elif size > _UNASKED_BYTES and not self._request.asked:
             self._request.asked = True
-            self._request.refusal = self._why_not(self._request)
-            if self._request.refusal is not None:
-                self._request.body.clear()
+            if refusal := self._why_not(self._request):
+                self._refuse(refusal)
+
+    def _hold_more(self, request: Request) -> None:
+        if self._bodies.take(_UNASKED_BYTES):
+            request.held_bytes += _UNASKED_BYTES
+        else:
+            self._refuse(busy_receiving())
+
+    def _refuse(self, refusal: GymServerError) -> None:
+        """Throw away what comes of the body; its sender hears why at its end."""
+        self._request.refusal = refusal
+        self._request.body = b""
+        self.release(self._request)
 
     def on_message_complete(self) -> None:
         """Put the request with those that are complete."""

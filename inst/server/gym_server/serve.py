@@ -13,23 +13,28 @@ from __future__ import annotations
 import contextlib
 import errno
 import logging
+import math
 import os
 import select
 import socket
 import threading
 import time
 from collections.abc import Callable
-from itertools import islice
 
+from gym_server import connections
+from gym_server.budget import Budget
 from gym_server.connection import Connection
+from gym_server.connections import Connections
 
 log = logging.getLogger(__name__)
 
-# Threads that only wait for their client cost some memory.
-_MOST_CONNECTIONS = 4000
+# Between two looks after those who do not read, and between two warnings.
+_LOOK_SECONDS = 1.0
+_WARN_SECONDS = 10.0
 
-# How many of them leave at once for others.
-_MAKES_ROOM = 100
+# How many of the largest bodies may be on their way at a time; parts of bodies, and small ones,
+# which do not count, make it many more.
+_LARGEST_BODIES = 16
 
 # A client that sent half a request when the stop came may be gone.
 _HALF_SENT_SECONDS = 2.0
@@ -78,6 +83,7 @@ class Server:
         max_body_bytes: int,
         on_stop: Callable[[], None] = lambda: None,
         admit: Callable[[dict], None] = lambda environ: None,
+        knows: Callable[[dict], bool] = lambda environ: True,
     ) -> None:
         """Serve nothing yet: ``run()`` does.
 
@@ -87,12 +93,16 @@ class Server:
             max_body_bytes: the size of the largest request body.
             on_stop: called when the stop has come and requests are still under way.
             admit: raises the refusal of a request whose large body is still to come.
+            knows: tells by WSGI's environment whether a request comes from one who may stay
+                connected; asked until it does.
         """
         self._app = app
         self._on_stop = on_stop
         self._admit = admit
+        self._knows = knows
         self._listener = listener
         self._max_body_bytes = max_body_bytes
+        self._bodies = Budget(_LARGEST_BODIES * max_body_bytes)
         host, self.port = listener.getsockname()[:2]
         self._base_environ = {
             "SCRIPT_NAME": "",
@@ -104,8 +114,8 @@ class Server:
             "wsgi.multiprocess": False,
             "wsgi.run_once": False,
         }
-        self._connections: set[Connection] = set()
-        self._changed = threading.Condition()
+        self._connections = Connections()
+        self._warned = -math.inf
         self._stop_asked = threading.Event()
         self._wake, self._waker = socket.socketpair()
 
@@ -126,25 +136,19 @@ class Server:
             Whether all of them were answered.
         """
         self._listener.setblocking(False)
+        looked = time.monotonic()
         while not self._stop_asked.is_set():
             # Windows tells of a signal only when the wait is over.
             if self._listener in select.select([self._listener, self._wake], [], [], 1.0)[0]:
                 self._accept()
+            if time.monotonic() > looked + _LOOK_SECONDS:
+                looked = time.monotonic()
+                self._connections.shed_unsent()
         self._listener.close()
         self._wake.close()
         self._waker.close()
         self._on_stop()
-        return self._drain(grace)
-
-    def _drain(self, grace: float) -> bool:
-        stopped = time.monotonic()
-        with self._changed:
-            while self._connections and time.monotonic() < stopped + grace:
-                half_sent = time.monotonic() > stopped + _HALF_SENT_SECONDS
-                for connection in self._connections:
-                    connection.stop(half_sent)
-                self._changed.wait(0.05)
-            return not self._connections
+        return self._connections.drain(grace, _HALF_SENT_SECONDS)
 
     def answer_for(
         self, thread: int, status: str, headers: list[tuple[str, str]], body: bytes
@@ -157,37 +161,51 @@ class Server:
             headers: as for WSGI.
             body: what follows them.
         """
-        with self._changed:
-            stuck = [one for one in self._connections if one.thread == thread]
-        for connection in stuck:
+        for connection in self._connections.served_by(thread):
             connection.answer_for(status, headers, body)
-            self._forget(connection)
+            self._connections.remove(connection)
 
     def _accept(self) -> None:
-        if len(self._connections) >= _MOST_CONNECTIONS:
-            self._make_room()
+        if len(self._connections) >= connections.MOST_CONNECTIONS:
+            # The others wait in the queue of the listening socket.
+            self._connections.make_room()
             return
         try:
             client, address = self._listener.accept()
         except OSError as error:
             if error.errno in (errno.EMFILE, errno.ENFILE):
-                log.warning("No more connections: this process may open no more files")
-                time.sleep(1.0)
+                self._warn("No more connections: this process may open no more files")
+                self._connections.make_room()
             return  # Else it has left again.
         client.setblocking(True)
-        environ = {**self._base_environ, "REMOTE_ADDR": address[0]}
-        connection = Connection(client, self._app, environ, self._max_body_bytes, self._admit)
-        with self._changed:
-            self._connections.add(connection)
+        connection = Connection(
+            client,
+            self._app,
+            {**self._base_environ, "REMOTE_ADDR": address[0]},
+            self._max_body_bytes,
+            self._bodies.share(),
+            self._admit,
+            self._knows,
+        )
+        if not self._connections.add(connection, address[0]):
+            self._warn(f"No more connections from {address[0]}: all that it has are at work")
+            client.close()
+            return
         # A daemon: an environment that never comes back must not keep the process.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
             thread.start()
         except RuntimeError:
-            log.warning("No more connections: this process may start no more threads")
-            self._forget(connection)
+            self._warn("No more connections: this process may start no more threads")
+            self._connections.remove(connection)
             client.close()
-            time.sleep(1.0)
+            self._connections.make_room()
+
+    def _warn(self, message: str) -> None:
+        # Whoever brings this about can do so a thousand times a second.
+        if time.monotonic() > self._warned + _WARN_SECONDS:
+            self._warned = time.monotonic()
+            log.warning("%s", message)
 
     def _serve(self, connection: Connection) -> None:
         try:
@@ -195,18 +213,4 @@ class Server:
         except Exception:
             log.exception("A connection ended by a fault of the server's own")
         finally:
-            self._forget(connection)
-
-    def _forget(self, connection: Connection) -> None:
-        with self._changed:
-            self._connections.discard(connection)
-            self._changed.notify()
-
-    def _make_room(self) -> None:
-        """Send those away whose clients have been silent for longest; they may come again."""
-        with self._changed:
-            silent = sorted(self._connections, key=lambda connection: connection.silent_since)
-            leaving = list(islice((one for one in silent if one.give_way()), _MAKES_ROOM))
-            # The others wait in the queue of the listening socket.
-            if len(self._connections) >= _MOST_CONNECTIONS:
-                self._changed.wait(0.1 if leaving else 1.0)
+            self._connections.remove(connection)

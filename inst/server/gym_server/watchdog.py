@@ -1,4 +1,4 @@
-"""Looks after what nobody else would: calls without end, instances without a user.
+"""Looks after what nobody else would: calls without end, instances without a user, free memory.
 
 It is a thread of its own, because a thread that is stuck in an environment can do nothing about
 it, and so that no call pays for it.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 
+from gym_server import memory
 from gym_server.errors import GymServerError
 from gym_server.instances import Instances
 from gym_server.limits import Limits
@@ -19,6 +21,9 @@ log = logging.getLogger(__name__)
 # Between two looks, at most; short limits are looked at more often.
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
+
+# Between two times that memory is given back; it costs milliseconds.
+_GIVE_BACK_SECONDS = 30.0
 
 
 class Watchdog:
@@ -43,6 +48,7 @@ class Watchdog:
         self._limits = limits
         self._answer_for = answer_for
         self._forget = forget
+        self._gave_back = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         thread.start()
@@ -66,3 +72,6 @@ class Watchdog:
         if self._limits.idle_minutes:
             self._instances.close_idle(self._limits.idle_minutes)
         self._forget()
+        if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
+            memory.give_back()
+            self._gave_back = time.monotonic()

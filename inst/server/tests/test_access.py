@@ -47,6 +47,19 @@ def test_a_token_from_the_variable_is_asked_for_on_loopback_too(serve):
     assert ask(server, token=None)[0] == 401
 
 
+def test_who_shows_no_token_gets_one_answer_a_connection(serve):
+    server = serve(GYM_SERVER_TOKEN=TOKEN)
+    paths = {"/v1/health/": 401, "/v1/envs/00000000/watch/watch.js": 200}
+    for path, status in paths.items():
+        for token, closes in ((None, "close"), (TOKEN, None)):
+            headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+            with closing(server.connect()) as connection:
+                connection.request("GET", path, headers=headers)
+                answer = connection.getresponse()
+                assert answer.status == (status if token is None else 200)
+                assert answer.headers["Connection"] == closes
+
+
 def test_no_auth_says_that_the_variable_is_not_meant(serve):
     assert ask(serve("--no-auth", GYM_SERVER_TOKEN=TOKEN), token=None)[0] == 200
 

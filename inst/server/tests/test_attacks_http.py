@@ -13,6 +13,7 @@ from conftest import TOKEN
 
 from gym_server import connection as connection_module
 from gym_server.app import Config, create_app
+from gym_server.budget import Budget
 from gym_server.connection import Connection
 
 # Heads ---------------------------------------------------------------------------------------
@@ -183,6 +184,7 @@ def test_who_has_no_token_and_asks_first_is_refused_first(ask, attacked):
 def conversation(monkeypatch):
     """Talk to one connection's code whose patience is short."""
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
     ours, theirs = socket.socketpair()
     listener = socket.create_server(("127.0.0.1", 0))
     ours.close()
@@ -190,7 +192,8 @@ def conversation(monkeypatch):
     client = socket.create_connection(listener.getsockname())
     accepted, _ = listener.accept()
     app = create_app(Config())
-    served = Connection(accepted, app, {"wsgi.url_scheme": "http", "SERVER_NAME": "x"}, 2**20)
+    environ = {"wsgi.url_scheme": "http", "SERVER_NAME": "x"}
+    served = Connection(accepted, app, environ, 2**20, Budget(2**20).share())
     thread = threading.Thread(target=served.serve)
     thread.start()
     yield client

@@ -3,21 +3,27 @@
 import json
 import socket
 import threading
+import time
 
 import pytest
 
+from gym_server import connection as connection_module
+from gym_server import connections as connections_module
 from gym_server import serve
 from gym_server.app import create_app
 
 GET = b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+LARGE = b"GET /v1/openapi.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 MOST = 10
 
 
 @pytest.fixture
 def crowded(monkeypatch):
     """Run a server that takes few connections; return a function that makes one."""
-    monkeypatch.setattr(serve, "_MOST_CONNECTIONS", MOST)
-    monkeypatch.setattr(serve, "_MAKES_ROOM", 2)
+    monkeypatch.setattr(connections_module, "MOST_CONNECTIONS", MOST)
+    monkeypatch.setattr(connections_module, "MOST_OF_ONE_ADDRESS", MOST)
+    monkeypatch.setattr(connections_module, "MAKES_ROOM", 2)
+    monkeypatch.setattr(connection_module, "_STUCK_SECONDS", 0.3)
     app = create_app()
     server = serve.Server(app, serve.bind("127.0.0.1", 0), 2**20, on_stop=app.end_watching)
     running = threading.Thread(target=server.run, args=(5,))
@@ -25,10 +31,20 @@ def crowded(monkeypatch):
     connections = []
 
     def connect():
-        connection = socket.create_connection(("127.0.0.1", server.port), timeout=20)
+        connection = socket.socket()
+        # What is sent to somebody who does not read is soon too much.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        connection.settimeout(20)
+        connection.connect(("127.0.0.1", server.port))
         connections.append(connection)
         return connection
 
+    def turns(kind):
+        """Count those whose turn to leave is of this kind."""
+        now = [one.turn_to_leave(time.monotonic()) for one in list(server._connections._all)]
+        return sum(turn is not None and turn[0] == kind for turn in now)
+
+    connect.turns = turns
     yield connect
     for connection in connections:
         connection.close()
@@ -41,7 +57,9 @@ def is_well(connection):
     connection.sendall(GET)
     answer = b""
     while b"\r\n\r\n" not in answer or not answer.endswith(b"}"):
-        answer += connection.recv(65536)
+        more = connection.recv(65536)
+        assert more, "it was sent away"
+        answer += more
     return json.loads(answer.partition(b"\r\n\r\n")[2])["status"] == "ok"
 
 
@@ -59,6 +77,26 @@ def test_half_sent_requests_leave_as_well(crowded):
     for _ in range(MOST):
         crowded().sendall(GET[:20])
     assert is_well(crowded())
+
+
+def test_those_who_do_not_read_their_answers_leave_before_those_who_are_silent(crowded, eventually):
+    silent = crowded()
+    assert is_well(silent)
+    for _ in range(MOST - 1):
+        crowded().sendall(LARGE * 200)
+    eventually(lambda: crowded.turns(1) == MOST - 1)
+    assert all(is_well(crowded()) for _ in range(MOST // 2))
+    assert is_well(silent)
+
+
+def test_those_who_have_not_shown_that_they_belong_here_leave_first(crowded, eventually):
+    silent = crowded()
+    assert is_well(silent)
+    for _ in range(MOST - 1):
+        crowded().sendall(GET[:20])
+    eventually(lambda: crowded.turns(0) == MOST - 1)
+    assert all(is_well(crowded()) for _ in range(MOST // 2))
+    assert is_well(silent)
 
 
 def test_a_server_without_threads_turns_one_away_and_goes_on(crowded, monkeypatch):

@@ -1,0 +1,97 @@
+"""Memory goes back to the system."""
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+import weakref
+
+import pytest
+
+from gym_server import memory, watchdog
+
+SIZE = 64 * 2**20
+PIECE = 2**14
+
+
+class Circle:
+    def __init__(self):
+        self.itself = self
+
+
+def test_what_refers_to_itself_is_collected():
+    gc.disable()
+    try:
+        circle = weakref.ref(Circle())
+        assert circle() is not None
+        memory.give_back()
+        assert circle() is None
+    finally:
+        gc.enable()
+
+
+def resident():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(memory._malloc_trim is None, reason="glibc keeps what is free, others do not")
+def test_what_a_thread_has_freed_is_free_for_all():
+    kept = []
+
+    def use():
+        pieces = [bytes(PIECE) for _ in range(SIZE // PIECE)]
+        # It lies behind all that is freed.
+        kept.append(pieces[-1])
+
+    before = resident()
+    thread = threading.Thread(target=use)
+    thread.start()
+    thread.join()
+    held = resident() - before
+    memory.give_back()
+    assert held > SIZE / 2
+    assert resident() - before < SIZE / 4
+
+
+# In a process of its own, as it changes how that keeps memory.
+LARGE_BODIES = """
+import os, threading
+from gym_server import memory
+
+def resident():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+def receive():
+    body = bytearray()
+    for _ in range(2**8):
+        body += bytes(2**16)
+
+memory.prepare()
+before = resident()
+for _ in range(3):
+    threads = [threading.Thread(target=receive) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+memory.give_back()
+print((resident() - before) // 2**20)
+"""
+
+
+@pytest.mark.skipif(memory._mallopt is None, reason="glibc keeps what is free, others do not")
+def test_what_large_bodies_have_left_does_not_stay():
+    told = subprocess.run(
+        [sys.executable, "-c", LARGE_BODIES], stdout=subprocess.PIPE, text=True, check=True
+    )
+    assert int(told.stdout) < 8
+
+
+def test_the_watchdog_sees_to_it(monkeypatch, client, eventually):
+    given_back = []
+    monkeypatch.setattr(watchdog, "_GIVE_BACK_SECONDS", 0.0)
+    monkeypatch.setattr(memory, "give_back", lambda: given_back.append(1))
+    eventually(lambda: len(given_back) > 1)
