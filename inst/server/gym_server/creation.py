@@ -249,5 +249,7 @@ def ask(function: Callable, *args: object):
         raise
     except (error.DependencyNotInstalled, ImportError) as failure:
         raise GymServerError("missing_dependency", str(failure)) from failure
-    except (Exception, SystemExit) as failure:
+    except BaseException as failure:
+        # Also KeyboardInterrupt and SystemExit: Ctrl-C is a signal handler's affair in this server,
+        # so only an environment raises them, and its client is owed an answer as for any error.
         raise environment_error(failure) from failure

@@ -315,10 +315,10 @@ class Instance(Listed):
 
     def clear_away(self) -> None:
         """Close what was condemned, once the call that took too long has come back."""
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             if self._monitor is not None:
                 self._finish_monitor()
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             self._close_env()
 
     def _end_processes(self) -> None:

@@ -38,7 +38,8 @@ def make(
             choices.env_id, choices.render_mode, choices.kwargs or {}, allowed_modules
         )
         undo.push(_closing_quietly(renderer, env.close))
-        return Instance(wrappers.wrap(env, choices.wrappers, renderer), choices, renderer)
+        wrapped = creation.ask(wrappers.wrap, env, choices.wrappers, renderer)
+        return Instance(wrapped, choices, renderer)
     lanes, mode = vectorization.make(choices, allowed_modules, max_num_envs, renderer)
     undo.push(_closing_quietly(renderer, lanes.close))
     return VectorInstance(lanes, mode, choices, renderer)
@@ -50,7 +51,7 @@ def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Calla
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
         # What the client must hear of is why it gets no instance.
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             renderer.run(close)
 
     return leave

@@ -129,7 +129,7 @@ def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
             message = value_of(number, result.facts, result.frame)
         else:
             message = value_of(number, result)
-    except Exception as error:
+    except BaseException as error:
         message = refusal_of(number, answer_to(error)[1])
     try:
         channel.send(message)

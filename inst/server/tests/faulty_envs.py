@@ -335,6 +335,15 @@ class Rogue(Counting):
     def exits(self):
         os._exit(7)
 
+    def interrupts(self):
+        raise KeyboardInterrupt("by hand")
+
+    def leaves(self):
+        raise SystemExit(3)
+
+    def ends_a_generator(self):
+        raise GeneratorExit
+
     def is_killed(self):
         os.kill(os.getpid(), signal.SIGKILL)
 
