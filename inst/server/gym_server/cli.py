@@ -76,6 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 options.max_instances,
                 options.max_num_envs,
                 options.max_total_lanes,
+                options.max_processes,
+                options.max_memory_mb,
                 options.max_watchers,
                 options.max_call_seconds,
                 options.idle_minutes,

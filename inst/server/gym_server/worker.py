@@ -10,6 +10,7 @@ import contextlib
 import faulthandler
 import importlib
 import logging
+import math
 import os
 import signal
 import sys
@@ -21,6 +22,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from gym_server import processes, registry, wire, worker_messages
+from gym_server.budget import Account, Budget
 from gym_server.choices import Choices
 from gym_server.errors import answer_to
 from gym_server.frames import RenderThread
@@ -39,6 +41,7 @@ class Surroundings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
         max_num_envs: how many lanes an environment may have.
+        memory: how many bytes it may be reckoned to take; see ``budget``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -46,6 +49,7 @@ class Surroundings:
     allowed_modules: frozenset[str]
     imported: frozenset[str] = frozenset()
     max_num_envs: int = 16384
+    memory: float = math.inf
     max_mb: int = 0
     log_level: int = logging.WARNING
 
@@ -156,6 +160,7 @@ class _Asked:
         for module in self._surroundings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
+        account = Account(Budget(self._surroundings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make(
                 self._choices,
@@ -163,10 +168,15 @@ class _Asked:
                 self._surroundings.max_num_envs,
                 RenderThread(),
                 undo,
+                account,
             )
             undo.pop_all()
         self.instance = instance
-        return {"fps": instance.screen.fps, "about": instance.about()}
+        return {
+            "fps": instance.screen.fps,
+            "about": instance.about(),
+            "memory": account.taken,
+        }
 
     # Moves and looks ------------------------------------------------------------------------
 

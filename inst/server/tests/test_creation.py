@@ -5,10 +5,15 @@ import faulty_envs
 import gymnasium
 import pytest
 
-from gym_server.creation import make
+from gym_server import creation
+from gym_server.budget import Account
 from gym_server.errors import GymServerError
 
 MALFORMED = "Attempted to look up malformed environment ID"
+
+
+def make(env_id, render_mode, kwargs, allowed):
+    return creation.make(env_id, render_mode, kwargs, allowed, (), Account())
 
 
 def refusal(env_id, render_mode=None, kwargs=None, allowed=()):
