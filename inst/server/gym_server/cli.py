@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gym_server import processes
 from gym_server.app import Config, GymApp, create_app
 from gym_server.guard import Access, is_loopback
 from gym_server.limits import Limits
@@ -181,5 +182,6 @@ def _serve(app: GymApp, server: Server) -> None:
     if closer.is_alive() or not answered:
         log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
         logging.shutdown()
+        processes.remove_temporary_folder()
         # An ordinary exit would wait for its thread.
         os._exit(0)
