@@ -98,6 +98,9 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
+        "memory": python("guests", "memory", 2 if quick else 20),
+        "loops": python("guests", "loops", 1 if quick else 4),
+        "processes": python("guests", "processes", 1 if quick else 5),
         "os-exit": pytest("tests/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }

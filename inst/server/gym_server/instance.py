@@ -9,7 +9,7 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 
-from gym_server import spaces
+from gym_server import repeats, spaces
 from gym_server.choices import Choices
 from gym_server.creation import ask
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
@@ -118,6 +118,7 @@ class Instance(Listed):
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         if self._for_eyes:
             self.screen.pace()
+        repeats.check_options(self._env, options)
         with self.hold:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed

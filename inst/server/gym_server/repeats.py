@@ -11,7 +11,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import gymnasium
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import VectorEnv
 
 from gym_server.budget import module_of
 from gym_server.errors import GymServerError
@@ -53,6 +55,10 @@ _AT_MOST = {
 # A map of FrozenLake of 250 x 250, which takes a second to be made.
 _LONGEST_ARGUMENTS = 65_536
 
+# It turns an angle back by one round after the other, as often as it takes.
+_TURNING = "gymnasium.envs.classic_control.acrobot"
+_LARGEST_ANGLE = 100_000
+
 # A known environment's module begins so.
 _KNOWN = ("gymnasium", "ale_py")
 
@@ -72,6 +78,25 @@ def check(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: in
     if _is_known(spec):
         _check_arguments(kwargs)
     _check_steps(spec, kwargs, wrappers, num_envs)
+
+
+def check_options(env: gymnasium.Env | VectorEnv, options: dict | None) -> None:
+    """Refuse options of a reset that make a loop.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
+    """
+    spec = env.spec if options else None
+    if spec is None or module_of(spec) != _TURNING:
+        return
+    for name in ("low", "high"):
+        value = options.get(name)
+        if isinstance(value, (int, float)) and abs(value) > _LARGEST_ANGLE:
+            raise GymServerError(
+                "invalid_parameter",
+                f"The option '{name}' of {spec.id} must be between {-_LARGEST_ANGLE:,} and "
+                f"{_LARGEST_ANGLE:,}, not {brief(value)}",
+            )
 
 
 def _check_arguments(kwargs: dict) -> None:

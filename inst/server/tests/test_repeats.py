@@ -88,3 +88,14 @@ def test_there_are_only_so_many_wrappers(client, create):
     answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1", "wrappers": [wrapper] * 33})
     assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
     assert "at most 32, not 33" in answer.json["message"]
+
+
+@pytest.mark.parametrize("options", [{"low": 0, "high": 1e17}, {"low": -1e17}, {"low": -(10**309)}])
+@pytest.mark.parametrize("num_envs", [None, 2])
+def test_an_angle_is_turned_back_only_so_often(client, create, options, num_envs):
+    url = create("Acrobot-v1", num_envs=num_envs)
+    answer = client.post(f"{url}/reset/", json={"options": options})
+    assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
+    assert "of Acrobot-v1 must be between -100,000 and 100,000" in answer.json["message"]
+    answer = client.post(f"{url}/reset/", json={"options": {"low": -0.2, "high": 0.2}})
+    assert answer.status_code == 200
