@@ -21,7 +21,7 @@ MOST_SECONDS = 60
 GUESTS = 4
 
 # What the server grants at its default limits, beside itself.
-MOST_PROCESSES = 256
+MOST_PROCESSES = 128
 MOST_MB = 4096
 
 STACKS = [

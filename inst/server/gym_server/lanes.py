@@ -37,7 +37,7 @@ class Lane:
         kwargs: dict,
         wrappers: Sequence[Wrapper],
         renderer: RenderThread,
-        account: Account,
+        account: Account | None = None,
     ) -> None:
         """Note what to make; a call makes it.
 
@@ -47,7 +47,8 @@ class Lane:
             kwargs: handed to it.
             wrappers: see ``wrappers.wrap()``.
             renderer: where wrappers that draw are made.
-            account: what the memory of the wrappers is charged to, for all of them at the first.
+            account: what the memory of the wrappers is charged to, for all of them at the first;
+                None where it has been.
         """
         self._how = spec, render_mode, kwargs
         self._wrappers = wrappers

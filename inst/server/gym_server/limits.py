@@ -36,9 +36,10 @@ class Limits:
         max_num_envs: how many lanes one of them may have.
         max_total_lanes: how many all of them may have together, where one without lanes counts
             as one; None for four times as many as one may have.
-        max_processes: how many processes all of them may have together, each of which takes 8 MB
-            (the isolated ones) to 20 MB (those of "async"), and some files, also while it waits:
-            5 GB, whatever number of processors there is.
+        max_processes: how many processes all of them may have together. However many processors
+            there are, each takes 7 MB of its own when it is made and 20 MB in use, two threads
+            and 15 files, whether it is used or not; this is two environments of as many as one
+            may have, or a class in which everybody has some isolated ones.
         max_memory_mb: how much memory all of them may be reckoned to take together at their most,
             in MiB; see ``budget``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
@@ -52,7 +53,7 @@ class Limits:
     max_instances: int = 1000
     max_num_envs: int = 16384
     max_total_lanes: int | None = None
-    max_processes: int = 256
+    max_processes: int = 128
     max_memory_mb: int = 4096
     max_watchers: int = 100
     max_call_seconds: float = 300.0

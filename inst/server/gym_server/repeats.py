@@ -1,7 +1,8 @@
 """How many steps of its environment one call may take, and how large arguments may be.
 
-Arguments that say how often something is done make a loop, in Python or in an environment's own C
-code, which no limit of time can end in the server's process. So the loops themselves are limited.
+Arguments that say how often something is done make a loop. One in Python goes on until the limit of
+time breaks it off, and slows everybody meanwhile; one in an environment's own C code nothing breaks
+off in the server's process. So the loops themselves are limited.
 """
 
 from __future__ import annotations
