@@ -11,14 +11,14 @@ import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
 
-from gym_server import budget, mujoco_setup, repeats
+from gym_server import footprint, mujoco_setup, repeats
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.plain import brief, from_words
 from gym_server.registry import LONGEST_ID, importing, look_up, near
 
 if TYPE_CHECKING:
-    from gym_server.budget import Account
+    from gym_server.footprint import Account
     from gym_server.wrappers import Wrapper
 
 
@@ -49,7 +49,7 @@ def make(
     check_kwargs(kwargs)
     spec = find_spec(env_id, allowed_modules)
     repeats.check(spec, kwargs, wrappers)
-    account.charge(budget.environment_bytes(spec, kwargs), spec.id)
+    account.charge(footprint.environment_bytes(spec, kwargs), spec.id)
     with naming_extra(spec):
         chosen = choose_render_mode(load_creator(spec), spec, render_mode)
         return make_from_spec(spec, chosen, from_words(kwargs))

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from gym_server import registry, vectorization, wrappers
 from gym_server.allowed_paths import AllowedPaths
-from gym_server.budget import Account, Budget
 from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
+from gym_server.footprint import Account, Budget
 from gym_server.frames import RenderThread
 from gym_server.hold import SETTLED_SECONDS
 from gym_server.instance import Instance

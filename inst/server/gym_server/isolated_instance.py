@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gym_server.budget import Account
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 from gym_server.hold import Hold
 from gym_server.listed import Listed
 from gym_server.monitor_directory import MonitorRoot

@@ -16,8 +16,8 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import create_empty_array
 
 from gym_server import processes, spaces
-from gym_server.budget import Account
 from gym_server.creation import load_creator, make_from_spec
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.wrappers import Wrapper, wrap
 

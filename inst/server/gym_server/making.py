@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import Callable, Collection
 
 from gym_server import creation, vectorization, wrappers
-from gym_server.budget import Account
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.vector_instance import VectorInstance

@@ -16,8 +16,8 @@ import gymnasium
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import VectorEnv
 
-from gym_server.budget import module_of
 from gym_server.errors import GymServerError
+from gym_server.footprint import module_of
 from gym_server.plain import brief, from_words
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server import creation, repeats
-from gym_server.budget import Account, answer_bytes, environment_bytes, vector_bytes
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError, wrong_length
+from gym_server.footprint import Account, answer_bytes, environment_bytes, vector_bytes
 from gym_server.frames import RenderThread
 from gym_server.lanes import AsyncLanes, Lane, SyncLanes
 from gym_server.plain import from_words

@@ -22,9 +22,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from gym_server import processes, registry, wire, worker_messages
-from gym_server.budget import Account, Budget
 from gym_server.choices import Choices
 from gym_server.errors import answer_to
+from gym_server.footprint import Account, Budget
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.making import make
@@ -41,7 +41,7 @@ class Surroundings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
         max_num_envs: how many lanes an environment may have.
-        memory: how many bytes it may be reckoned to take; see ``budget``.
+        memory: how many bytes it may be reckoned to take; see ``footprint``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """

@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 from gymnasium import error
 
-from gym_server.budget import Account, answer_bytes, reckon_wrapper
 from gym_server.errors import GymServerError
 from gym_server.extras import missing_extra
+from gym_server.footprint import Account, answer_bytes, reckon_wrapper
 from gym_server.frames import RenderThread
 from gym_server.plain import brief, from_words
 

@@ -6,8 +6,8 @@ import gymnasium
 import pytest
 
 from gym_server import creation
-from gym_server.budget import Account
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 
 MALFORMED = "Attempted to look up malformed environment ID"
 

@@ -7,8 +7,8 @@ from gymnasium import spaces
 
 from gym_server import creation
 from gym_server.app import Config, create_app
-from gym_server.budget import Account, Budget, observation_bytes
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account, Budget, observation_bytes
 from gym_server.frames import RenderThread
 from gym_server.limits import Limits
 from gym_server.wrappers import Wrapper, wrap
