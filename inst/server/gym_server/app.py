@@ -234,7 +234,8 @@ class _Handler:
                     request.accept,
                 )
                 return wire.answer(route.handler(call), request_id)
-            except Exception as error:
+            except BaseException as error:
+                # What an environment raises must not pass by the answer that is stored.
                 return _failure(error, request_id)
 
         if request_id is None:
@@ -309,7 +310,7 @@ def _query(args: MultiDict) -> dict[str, str | list[str]]:
     return {name: values[0] if len(values) == 1 else values for name, values in args.lists()}
 
 
-def _failure(error: Exception, request_id: RequestId | None) -> Answer:
+def _failure(error: BaseException, request_id: RequestId | None) -> Answer:
     status, body = answer_to(error)
     answer = wire.answer(body, request_id, status)
     if isinstance(error, GymServerError):

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gym_server import memory
+from gym_server import memory, processes
 from gym_server.app import Config, GymApp, create_app
 from gym_server.guard import Access, is_loopback
 from gym_server.limits import Limits
@@ -77,6 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 options.max_instances,
                 options.max_num_envs,
                 options.max_total_lanes,
+                options.max_processes,
+                options.max_memory_mb,
                 options.max_watchers,
                 options.max_call_seconds,
                 options.idle_minutes,
@@ -181,5 +183,6 @@ def _serve(app: GymApp, server: Server) -> None:
     if closer.is_alive() or not answered:
         log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
         logging.shutdown()
+        processes.remove_temporary_folder()
         # An ordinary exit would wait for its thread.
         os._exit(0)

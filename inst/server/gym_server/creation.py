@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
 
-from gym_server import mujoco_setup
+from gym_server import footprint, mujoco_setup, repeats
 from gym_server.atari import classic_game
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.plain import brief, from_words
 from gym_server.registry import LONGEST_ID, importing, look_up, near
 
+if TYPE_CHECKING:
+    from gym_server.footprint import Account
+    from gym_server.wrappers import Wrapper
+
 
 def make(
-    env_id: object, render_mode: str | None, kwargs: dict, allowed_modules: Collection[str]
+    env_id: object,
+    render_mode: str | None,
+    kwargs: dict,
+    allowed_modules: Collection[str],
+    wrappers: Sequence[Wrapper],
+    account: Account,
 ) -> gymnasium.Env:
     """Make an environment.
 
@@ -29,14 +39,18 @@ def make(
             None for "rgb_array" where the environment can.
         kwargs: handed to the environment.
         allowed_modules: names of the modules that an id may import.
+        wrappers: what will be put around it.
+        account: what its memory is charged to.
 
     Raises:
         GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
             ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
-            ``invalid_kwargs``, ``environment_error``.
+            ``invalid_kwargs``, ``too_much_memory``, ``environment_error``.
     """
     check_kwargs(kwargs)
     spec = find_spec(env_id, allowed_modules)
+    repeats.check(spec, kwargs, wrappers)
+    account.charge(footprint.environment_bytes(spec, kwargs), spec.id)
     with naming_extra(spec):
         chosen = choose_render_mode(load_creator(spec), spec, render_mode)
         return make_from_spec(spec, chosen, from_words(kwargs))
@@ -256,5 +270,7 @@ def ask(function: Callable, *args: object):
         raise
     except (error.DependencyNotInstalled, ImportError) as failure:
         raise GymServerError("missing_dependency", str(failure)) from failure
-    except (Exception, SystemExit) as failure:
+    except BaseException as failure:
+        # Also KeyboardInterrupt and SystemExit: Ctrl-C is a signal handler's affair in this server,
+        # so only an environment raises them, and its client is owed an answer as for any error.
         raise environment_error(failure) from failure

@@ -20,6 +20,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from gym_server.interrupt import interrupt
+
 ResultT = TypeVar("ResultT")
 
 
@@ -161,6 +163,7 @@ class RenderThread:
                 return False
             self._running = None
             self._start()
+            interrupt(hanging.ident)
             return True
 
     def give_up_what_began_before(self, moment: float, why: Exception) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 
-from gym_server import spaces
+from gym_server import repeats, spaces
 from gym_server.actions import ActionReader
 from gym_server.choices import Choices
 from gym_server.creation import ask
@@ -121,6 +121,7 @@ class Instance(Listed):
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         if self._for_eyes:
             self.screen.pace()
+        repeats.check_options(self._env, options)
         with self.hold:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed
@@ -315,10 +316,10 @@ class Instance(Listed):
 
     def clear_away(self) -> None:
         """Close what was condemned, once the call that took too long has come back."""
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             if self._monitor is not None:
                 self._finish_monitor()
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             self._close_env()
 
     def _end_processes(self) -> None:

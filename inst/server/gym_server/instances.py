@@ -9,21 +9,31 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from gym_server import registry, vectorization, wrappers
 from gym_server.allowed_paths import AllowedPaths
 from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
+from gym_server.footprint import Account, Budget
 from gym_server.frames import RenderThread
 from gym_server.hold import SETTLED_SECONDS
 from gym_server.instance import Instance
+from gym_server.interrupt import interrupt
 from gym_server.isolated_instance import IsolatedInstance
 from gym_server.isolation import Isolation
-from gym_server.limits import Limits
+from gym_server.limits import Limits, Room
 from gym_server.making import make
 
 log = logging.getLogger(__name__)
+
+
+class _Share(NamedTuple):
+    """What an environment takes of what there is for all, until it is gone."""
+
+    room: Room
+    account: Account
 
 
 @dataclass
@@ -32,6 +42,7 @@ class _Making:
 
     Attributes:
         choices: what its client wants.
+        share: what it takes of what there is for all.
         condemn: ends what the making thread waits for, so that it answers for itself; None
             where that cannot be done.
         began: in the clock's seconds.
@@ -39,13 +50,10 @@ class _Making:
     """
 
     choices: Choices
+    share: _Share
     condemn: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
     settled: threading.Event = field(default_factory=threading.Event)
-
-    @property
-    def lanes(self) -> int:
-        return self.choices.num_envs or 1
 
     def too_long(self, seconds: float) -> GymServerError:
         return call_too_long(
@@ -80,8 +88,10 @@ class Instances:
         self._renderer = renderer
         self._lock = threading.Lock()
         self._instances: dict[str, Instance | IsolatedInstance] = {}
-        # By instance_id; by the thread that makes it; by instance_id.
-        self._lanes: dict[str, int] = {}
+        self._budget = Budget(self._limits.max_memory_mb * 2**20)
+        # By the thread that makes it until it comes back, then by instance_id until it is closed.
+        self._shares: dict[int | str, _Share] = {}
+        # By the thread that makes it; by instance_id.
         self._creating: dict[int, _Making] = {}
         self._closing: dict[str, Instance | IsolatedInstance] = {}
         self._departed = Departed()
@@ -92,17 +102,17 @@ class Instances:
 
         Raises:
             GymServerError: see ``making.make()``; ``invalid_kwargs``, ``shutting_down``,
-                ``environment_died``, ``too_many_instances``, ``too_many_lanes``;
-                ``call_too_long``.
+                ``environment_died``, ``too_many_instances``, ``too_many_lanes``,
+                ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
         # Before an environment is made for nothing.
         self._allowed_paths.check(choices)
-        wrappers.check_names(choices.wrappers)
+        wrappers.check(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)
         isolated = self._isolation.wants(choices.env_id, self._allowed_modules)
         make_it = self._make_isolated if isolated else self._make
-        with self._room_for(choices) as making, contextlib.ExitStack() as undo:
+        with self._room_for(choices, isolated) as making, contextlib.ExitStack() as undo:
             instance = make_it(choices, making, undo)
             if not self._enlist(instance, making):
                 undo.close()
@@ -117,22 +127,26 @@ class Instances:
         with self._lock:
             if self._stopping:
                 raise shutting_down()
-            if self._creating.pop(threading.get_ident(), None) is None:
+            thread = threading.get_ident()
+            if self._creating.pop(thread, None) is None:
                 return False
             instance.instance_id = self._new_id()
             self._instances[instance.instance_id] = instance
-            self._lanes[instance.instance_id] = making.lanes
+            self._shares[instance.instance_id] = self._shares.pop(thread)
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, choices: Choices) -> Iterator[_Making]:
+    def _room_for(self, choices: Choices, isolated: bool) -> Iterator[_Making]:
         """Keep room for an environment while it is made."""
-        making, thread = _Making(choices), threading.get_ident()
+        room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
+        share = _Share(room, Account(self._budget, room.lanes))
+        making, thread = _Making(choices, share), threading.get_ident()
         with self._lock:
-            others = list(self._creating.values())
-            lanes = sum(self._lanes.values()) + sum(other.lanes for other in others)
-            self._limits.check_room(len(self._instances) + len(others), lanes, making.lanes)
+            taken = sum((one.room for one in list(self._shares.values())), Room(0))
+            instances = len(self._instances) + len(self._creating)
+            self._limits.check_room(instances, taken, room)
             self._creating[thread] = making
+            self._shares[thread] = share
         try:
             yield making
         except BaseException:
@@ -140,23 +154,39 @@ class Instances:
                 # Given up. Else the answer that is given on its behalf might go to its next
                 # request.
                 making.settled.wait(SETTLED_SECONDS)
+                raise making.too_long(self._limits.max_call_seconds) from None
             raise
+        finally:
+            self._release(thread)
 
-    def _make(self, choices: Choices, _: _Making, undo: contextlib.ExitStack) -> Instance:
-        return make(choices, self._allowed_modules, self._limits.max_num_envs, self._renderer, undo)
+    def _release(self, whose: int | str) -> None:
+        """Give the share of an environment that is gone, or came to nothing, to the others."""
+        share = self._shares.pop(whose, None)
+        if share is not None:
+            share.account.give_back()
+
+    def _make(self, choices: Choices, making: _Making, undo: contextlib.ExitStack) -> Instance:
+        return make(
+            choices,
+            self._allowed_modules,
+            self._limits.max_num_envs,
+            self._renderer,
+            undo,
+            making.share.account,
+        )
 
     def _make_isolated(
         self, choices: Choices, making: _Making, undo: contextlib.ExitStack
     ) -> IsolatedInstance:
         surroundings = self._isolation.surroundings(
-            choices.env_id, self._allowed_modules, self._limits.max_num_envs
+            choices.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
         instance = IsolatedInstance(
             choices, surroundings, lambda one, why: self.bury(one.instance_id, why)
         )
         undo.callback(instance.condemn, shutting_down())
         making.condemn = instance.condemn
-        instance.create()
+        instance.create(making.share.account)
         return instance
 
     def registered(self, search: str | None) -> list[dict]:
@@ -197,7 +227,6 @@ class Instances:
             instance = self._instances.pop(instance_id, None)
             if instance is None:
                 return None
-            del self._lanes[instance_id]
             if why is not None:
                 instance.hold.why = why
                 self._departed.add(instance_id, why)
@@ -210,6 +239,7 @@ class Instances:
             instance.close()
         finally:
             self._closing.pop(instance.instance_id, None)
+            self._release(instance.instance_id)
 
     def _close_and_log(self, instance: Instance) -> None:
         try:
@@ -242,6 +272,7 @@ class Instances:
                     making.condemn(why)
                 elif not self._renderer.give_up(thread, why):
                     answer_for(thread, why)
+                    interrupt(thread)
                 making.settled.set()
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
@@ -252,6 +283,8 @@ class Instances:
                 stuck = instance.condemn(why)
                 if stuck is not None:
                     answer_for(stuck, why)
+                    # Until this is settled it does not go on to other things.
+                    interrupt(stuck)
                 instance.hold.settle()
         # What nobody waits for who is looked after: closing what was given up may hang, too.
         nobodys = call_too_long("Closing an environment", seconds, "the server leaves it alone")
@@ -276,6 +309,7 @@ class Instances:
         # Also where it was being closed.
         self._departed.add(instance_id, why)
         self._closing.pop(instance_id, None)
+        self._release(instance_id)
 
     def close_idle(self, minutes: float) -> None:
         """Close the instances that nobody has used or watched for so long."""
@@ -308,7 +342,6 @@ class Instances:
             self._stopping = True
             instances = list(self._instances.values())
             self._instances.clear()
-            self._lanes.clear()
         # One that never comes back must not keep the others from finishing their monitors.
         threads = [
             threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
@@ -324,3 +357,9 @@ class Instances:
             instance_id = secrets.token_hex(4)
             if instance_id not in self._instances and instance_id not in self._departed:
                 return instance_id
+
+
+def _processes_of(choices: Choices, isolated: bool) -> int:
+    """Return how many processes of its own run an environment."""
+    lanes = choices.num_envs or 1
+    return isolated + (lanes if choices.vectorization_mode == "async" else 0)

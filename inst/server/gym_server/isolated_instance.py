@@ -10,6 +10,7 @@ import numpy as np
 
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 from gym_server.hold import Hold
 from gym_server.listed import Listed
 from gym_server.monitor_directory import MonitorRoot
@@ -68,14 +69,18 @@ class IsolatedInstance(Listed):
             keep_instance, choices, surroundings, on_end=self._end, hint=hint
         )
 
-    def create(self) -> None:
+    def create(self, account: Account) -> None:
         """Wait until the environment is made.
+
+        Args:
+            account: what its memory is charged to, as far as its process tells it.
 
         Raises:
             GymServerError: see ``making.make()``; ``environment_died``.
         """
         made = self._value(self._worker.first_word())
         self._about = made["about"]
+        account.take(max(0.0, float(made["memory"])), self.env_id)
         self.env_id = str(self._about["env_id"])
         self._lanes = int(self._about["lanes"])
         self.screen = Screen(self, made["fps"])  # type: ignore[arg-type]

@@ -28,6 +28,7 @@ twice; with an environment that takes its time itself the share is smaller.)
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from collections.abc import Collection
 
@@ -81,7 +82,11 @@ class Isolation:
         return self.mode == "all" or _is_foreign(module or _home(name, allowed_modules))
 
     def surroundings(
-        self, env_id: object, allowed_modules: Collection[str], max_num_envs: int
+        self,
+        env_id: object,
+        allowed_modules: Collection[str],
+        max_num_envs: int,
+        memory: float = math.inf,
     ) -> Surroundings:
         """Return what the process of an environment is told; see ``Surroundings``."""
         allowed = frozenset(allowed_modules)
@@ -89,7 +94,7 @@ class Isolation:
         bare = isinstance(env_id, str) and ":" not in env_id
         imported = allowed if bare and _home(env_id, allowed) is _UNKNOWN else frozenset()
         return Surroundings(
-            allowed, imported, max_num_envs, self._max_mb, logging.getLogger().level
+            allowed, imported, max_num_envs, memory, self._max_mb, logging.getLogger().level
         )
 
     def search(

@@ -17,6 +17,7 @@ from gymnasium.vector.utils import create_empty_array
 
 from gym_server import processes, spaces
 from gym_server.creation import load_creator, make_from_spec
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.wrappers import Wrapper, wrap
 
@@ -36,6 +37,7 @@ class Lane:
         kwargs: dict,
         wrappers: Sequence[Wrapper],
         renderer: RenderThread,
+        account: Account | None = None,
     ) -> None:
         """Note what to make; a call makes it.
 
@@ -45,14 +47,18 @@ class Lane:
             kwargs: handed to it.
             wrappers: see ``wrappers.wrap()``.
             renderer: where wrappers that draw are made.
+            account: what the memory of the wrappers is charged to, for all of them at the first;
+                None where it has been.
         """
         self._how = spec, render_mode, kwargs
         self._wrappers = wrappers
         self._renderer = renderer
+        self._account: Account | None = account
 
     def __call__(self) -> gymnasium.Env:
         """Make another one."""
-        return wrap(make_from_spec(*self._how), self._wrappers, self._renderer)
+        account, self._account = self._account, None
+        return wrap(make_from_spec(*self._how), self._wrappers, self._renderer, account)
 
 
 class WorkerLane(Lane):
@@ -65,12 +71,12 @@ class WorkerLane(Lane):
             lane: the other.
             autoreset_mode: the lane resets itself when it is NEXT_STEP.
         """
-        super().__init__(*lane._how, lane._wrappers, lane._renderer)
+        super().__init__(*lane._how, lane._wrappers, lane._renderer, lane._account)
         self._resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
 
     def __getstate__(self) -> dict:
-        """Leave the render thread here."""
-        return {**self.__dict__, "_renderer": None}
+        """Leave the render thread and the account here."""
+        return {**self.__dict__, "_renderer": None, "_account": None}
 
     def __call__(self) -> gymnasium.Env:
         """Make another one."""

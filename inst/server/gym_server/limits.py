@@ -11,6 +11,23 @@ from gym_server.errors import GymServerError
 
 
 @dataclass(frozen=True)
+class Room:
+    """What an environment takes of what there is for all.
+
+    Attributes:
+        lanes: how many it has; one without lanes counts as one.
+        processes: how many of its own run it.
+    """
+
+    lanes: int = 1
+    processes: int = 0
+
+    def __add__(self, other: Room) -> Room:
+        """Return both together."""
+        return Room(self.lanes + other.lanes, self.processes + other.processes)
+
+
+@dataclass(frozen=True)
 class Limits:
     """What a server allows; the defaults leave a lab's server on one machine standing.
 
@@ -19,6 +36,12 @@ class Limits:
         max_num_envs: how many lanes one of them may have.
         max_total_lanes: how many all of them may have together, where one without lanes counts
             as one; None for four times as many as one may have.
+        max_processes: how many processes all of them may have together. However many processors
+            there are, each takes 7 MB of its own when it is made and 20 MB in use, two threads
+            and 15 files, whether it is used or not; this is two environments of as many as one
+            may have, or a class in which everybody has some isolated ones.
+        max_memory_mb: how much memory all of them may be reckoned to take together at their most,
+            in MiB; see ``footprint``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
         max_call_seconds: how long one call may take before its instance is given up; 0 for ever.
             Longer than any one call that means well, and short enough that somebody who comes
@@ -30,20 +53,22 @@ class Limits:
     max_instances: int = 1000
     max_num_envs: int = 16384
     max_total_lanes: int | None = None
+    max_processes: int = 128
+    max_memory_mb: int = 4096
     max_watchers: int = 100
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0
 
-    def check_room(self, instances: int, lanes: int, more: int) -> None:
+    def check_room(self, instances: int, taken: Room, more: Room) -> None:
         """Refuse an environment for which there is no room.
 
         Args:
             instances: how many there are.
-            lanes: how many they have.
-            more: how many the new one is to have.
+            taken: what they have.
+            more: what the new one is to have.
 
         Raises:
-            GymServerError: ``too_many_instances``, ``too_many_lanes``.
+            GymServerError: ``too_many_instances``, ``too_many_lanes``, ``too_many_processes``.
         """
         if instances >= self.max_instances:
             raise GymServerError(
@@ -54,13 +79,22 @@ class Limits:
             )
         most = self.max_total_lanes or 4 * self.max_num_envs
         # One that is too large for itself hears of that.
-        if lanes + more > most and more <= self.max_num_envs:
+        if taken.lanes + more.lanes > most and more.lanes <= self.max_num_envs:
             raise GymServerError(
                 "too_many_lanes",
-                f"All environments together may have {most} lanes, and {max(0, most - lanes)} "
-                f"are left, not {more}",
+                f"All environments together may have {most} lanes, and "
+                f"{max(0, most - taken.lanes)} are left, not {more.lanes}",
                 "close some, GET /v1/instances/ lists them; the server's option "
                 "--max-total-lanes sets the limit",
+            )
+        left = self.max_processes - taken.processes
+        if more.processes > max(0, left):
+            raise GymServerError(
+                "too_many_processes",
+                f"All environments together may have {self.max_processes} processes, and "
+                f"{max(0, left)} are left, not {more.processes}",
+                "close some, GET /v1/instances/ lists them, or leave vectorization_mode 'async' "
+                "out; the server's option --max-processes sets the limit",
             )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from gym_server import creation, vectorization, wrappers
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.vector_instance import VectorInstance
@@ -19,6 +20,7 @@ def make(
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
+    account: Account,
 ) -> Instance:
     """Make an instance of what a client wants.
 
@@ -28,6 +30,7 @@ def make(
         max_num_envs: how many lanes it may have.
         renderer: the process's render thread.
         undo: closes the environment when something goes wrong from here on.
+        account: what its memory is charged to.
 
     Raises:
         GymServerError: see ``creation.make()``, ``vectorization.make()``, ``wrappers.wrap()`` and
@@ -35,11 +38,17 @@ def make(
     """
     if choices.num_envs is None:
         env = creation.make(
-            choices.env_id, choices.render_mode, choices.kwargs or {}, allowed_modules
+            choices.env_id,
+            choices.render_mode,
+            choices.kwargs or {},
+            allowed_modules,
+            choices.wrappers,
+            account,
         )
         undo.push(_closing_quietly(renderer, env.close))
-        return Instance(wrappers.wrap(env, choices.wrappers, renderer), choices, renderer)
-    lanes, mode = vectorization.make(choices, allowed_modules, max_num_envs, renderer)
+        wrapped = creation.ask(wrappers.wrap, env, choices.wrappers, renderer, account)
+        return Instance(wrapped, choices, renderer)
+    lanes, mode = vectorization.make(choices, allowed_modules, max_num_envs, renderer, account)
     undo.push(_closing_quietly(renderer, lanes.close))
     return VectorInstance(lanes, mode, choices, renderer)
 
@@ -50,7 +59,7 @@ def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Calla
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
         # What the client must hear of is why it gets no instance.
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(BaseException):
             renderer.run(close)
 
     return leave

@@ -84,6 +84,20 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         help="lanes of all environments together (four times --max-num-envs)",
     )
     limits.add_argument(
+        "--max-processes",
+        type=_number(1, 100_000),
+        default=Limits.max_processes,
+        help="processes of all environments together: those of 'async' lanes, and of environments "
+        "that have one of their own (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-memory-mb",
+        type=_number(1, 2**24),
+        default=Limits.max_memory_mb,
+        help="memory that all environments together may be reckoned to take at their most "
+        "(%(default)s)",
+    )
+    limits.add_argument(
         "--max-watchers",
         type=_number(1, 1_000_000),
         default=Limits.max_watchers,

@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
 import threading
+from functools import cache
+from multiprocessing import util
 from multiprocessing.context import BaseContext
 
 # A forkserver copies a process that has only just imported what all of them need; Windows has
@@ -21,7 +24,28 @@ def context() -> BaseContext:
     """Return what starts processes."""
     context = multiprocessing.get_context(START_METHOD)
     context.set_forkserver_preload(_PRELOADED)
+    with _first:
+        _temporary_folder()
     return context
+
+
+_first = threading.Lock()
+
+
+@cache
+def _temporary_folder() -> str:
+    """Return the folder of the sockets that processes are started by, for all of them.
+
+    Each process that starts others makes one, unless it has got one from the process that started
+    it. So the server's is made first: those that are killed would leave theirs behind.
+    """
+    return util.get_temp_dir()
+
+
+def remove_temporary_folder() -> None:
+    """Remove what an ordinary exit removes by itself, before one that is not."""
+    if _temporary_folder.cache_info().currsize:
+        shutil.rmtree(_temporary_folder(), ignore_errors=True)
 
 
 def end_with_the_server(group: bool = False) -> None:

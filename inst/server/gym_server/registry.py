@@ -121,7 +121,7 @@ def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
         for module in allowed_modules:
             try:
                 importlib.import_module(module)
-            except Exception as failure:
+            except BaseException as failure:
                 log.warning("The allowed module %s cannot be imported: %s", module, failure)
         return [_entry(spec) for spec in _matching(text)]
 

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from gym_server import spaces
+from gym_server import repeats, spaces
 from gym_server.choices import Choices
 from gym_server.creation import ask
 from gym_server.errors import GymServerError, reset_needed, wrong_length
@@ -143,6 +143,7 @@ class VectorInstance(Instance):
             raise self._not_supported("one seed a lane")
 
     def _check_options(self, options: dict | None) -> None:
+        repeats.check_options(self._env, options)
         if options and "reset_mask" in options:
             raise GymServerError(
                 "invalid_parameter",

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from gym_server import creation
+from gym_server import creation, repeats
 from gym_server.choices import Choices
 from gym_server.errors import GymServerError, wrong_length
+from gym_server.footprint import Account, answer_bytes, environment_bytes, vector_bytes
 from gym_server.frames import RenderThread
 from gym_server.lanes import AsyncLanes, Lane, SyncLanes
 from gym_server.plain import from_words
@@ -21,7 +22,11 @@ MOST_PROCESSES = 64
 
 
 def make(
-    choices: Choices, allowed_modules: Collection[str], most: int, renderer: RenderThread
+    choices: Choices,
+    allowed_modules: Collection[str],
+    most: int,
+    renderer: RenderThread,
+    account: Account,
 ) -> tuple[VectorEnv, str]:
     """Make a vector environment.
 
@@ -30,19 +35,22 @@ def make(
         allowed_modules: as for ``creation.make()``.
         most: how many lanes the server allows.
         renderer: the process's render thread.
+        account: what its memory is charged to.
 
     Returns:
         It, and its vectorization_mode.
 
     Raises:
-        GymServerError: as for ``creation.make()``; ``too_many_lanes``, ``not_supported``.
+        GymServerError: as for ``creation.make()``; ``too_many_lanes``, ``too_much_memory``,
+            ``not_supported``.
     """
     kwargs = choices.kwargs or {}
     creation.check_kwargs(kwargs)
     spec = creation.find_spec(choices.env_id, allowed_modules)
     _check(choices, most)
+    repeats.check(spec, kwargs, choices.wrappers, choices.num_envs)
     with creation.naming_extra(spec):
-        asked = _Asked(spec, choices, from_words(kwargs), renderer)
+        asked = _Asked(spec, choices, from_words(kwargs), renderer, account)
         match choices.vectorization_mode:
             case None:
                 env = None if _against_entry_point(asked) else _try_entry_point(asked)
@@ -61,6 +69,7 @@ class _Asked:
     choices: Choices
     kwargs: dict
     renderer: RenderThread
+    account: Account
 
     @property
     def num_envs(self) -> int:
@@ -124,11 +133,12 @@ def _against_entry_point(asked: _Asked) -> str | None:
 def _try_entry_point(asked: _Asked) -> VectorEnv | None:
     try:
         env = _make_entry_point(asked)
+        if _is_the_same_task(env, asked):
+            return env
+        env.close()
     except _CannotDo:
-        return None
-    if _is_the_same_task(env, asked):
-        return env
-    env.close()
+        pass
+    asked.account.give_back()
     return None
 
 
@@ -168,6 +178,7 @@ class _CannotDo(Exception):  # noqa: N818 - where nothing was chosen, it is no e
 
 
 def _make_entry_point(asked: _Asked) -> VectorEnv:
+    asked.account.charge(vector_bytes(asked.spec, asked.kwargs), asked.spec.id)
     wanted = asked.choices.render_mode
     vector_spec = copy.copy(asked.spec)
     vector_spec.entry_point = asked.spec.vector_entry_point
@@ -186,6 +197,7 @@ def _make_entry_point(asked: _Asked) -> VectorEnv:
         env.close()
         raise _CannotDo(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
     env.spec = _with_time_limit(asked)
+    asked.account.charge(answer_bytes(env.single_observation_space), "What is observed")
     return env
 
 
@@ -219,7 +231,15 @@ def _make_lanes(kind: type[SyncLanes] | type[AsyncLanes], asked: _Asked) -> Vect
     render_mode = creation.choose_render_mode(
         creation.load_creator(asked.spec), asked.spec, asked.choices.render_mode
     )
-    lane = Lane(asked.spec, render_mode, asked.kwargs, asked.choices.wrappers, asked.renderer)
+    asked.account.charge(environment_bytes(asked.spec, asked.kwargs), asked.spec.id)
+    lane = Lane(
+        asked.spec,
+        render_mode,
+        asked.kwargs,
+        asked.choices.wrappers,
+        asked.renderer,
+        asked.account,
+    )
     env = creation.ask(kind, lane, asked.num_envs, asked.autoreset_mode)
     env.spec = _with_time_limit(asked)
     return env

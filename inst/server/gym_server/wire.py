@@ -127,7 +127,8 @@ class Kind:
     Attributes:
         schema: its JSON schema.
         wanted: what it must be, in words that follow "must be".
-        parse: turns the JSON value into ours; raises ValueError for what does not fit.
+        parse: turns the JSON value into ours; raises ValueError for what does not fit, and
+            OverflowError for a number that is larger than every float.
         empty_is_absent: classic clients send "" or [] for a parameter that they do not set.
     """
 
@@ -165,11 +166,17 @@ def read(body: dict, fields: Iterable[Field]) -> dict:
             values[field.name] = field.kind.parse(value)
         except ValueError:
             raise invalid_parameter(field.name, value, field.kind.wanted) from None
+        except OverflowError:
+            wanted = f"{field.kind.wanted}, with no number above 1e308"
+            raise invalid_parameter(field.name, value, wanted) from None
     return values
 
 
 def integer(value: object) -> int:
-    """Return an integer or an integer-valued float as an integer >= 0, else raise ValueError."""
+    """Return an integer or an integer-valued float as an integer >= 0, else raise ValueError.
+
+    An integer that is larger than every float raises OverflowError: JSON has one kind of numbers.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError
     if not math.isfinite(value) or value % 1 != 0 or value < 0:

@@ -10,6 +10,7 @@ import contextlib
 import faulthandler
 import importlib
 import logging
+import math
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ from pathlib import Path
 from gym_server import processes, registry, wire, worker_messages
 from gym_server.choices import Choices
 from gym_server.errors import answer_to
+from gym_server.footprint import Account, Budget
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.making import make
@@ -40,6 +42,7 @@ class Surroundings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
         max_num_envs: how many lanes an environment may have.
+        memory: how many bytes it may be reckoned to take; see ``footprint``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -47,6 +50,7 @@ class Surroundings:
     allowed_modules: frozenset[str]
     imported: frozenset[str] = frozenset()
     max_num_envs: int = 16384
+    memory: float = math.inf
     max_mb: int = 0
     log_level: int = logging.WARNING
 
@@ -130,7 +134,7 @@ def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
             message = value_of(number, result.facts, result.frame)
         else:
             message = value_of(number, result)
-    except Exception as error:
+    except BaseException as error:
         message = refusal_of(number, answer_to(error)[1])
     try:
         channel.send(message)
@@ -157,6 +161,7 @@ class _Asked:
         for module in self._surroundings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
+        account = Account(Budget(self._surroundings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make(
                 self._choices,
@@ -164,10 +169,15 @@ class _Asked:
                 self._surroundings.max_num_envs,
                 RenderThread(),
                 undo,
+                account,
             )
             undo.pop_all()
         self.instance = instance
-        return {"fps": instance.screen.fps, "about": instance.about()}
+        return {
+            "fps": instance.screen.fps,
+            "about": instance.about(),
+            "memory": account.taken,
+        }
 
     # Moves and looks ------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from gymnasium import error
 
 from gym_server.errors import GymServerError
 from gym_server.extras import missing_extra
+from gym_server.footprint import Account, answer_bytes, reckon_wrapper
 from gym_server.frames import RenderThread
 from gym_server.plain import brief, from_words
 
@@ -65,6 +66,9 @@ _AT_MOST = {
     "ResizeObservation": {"shape": 4_096},
 }
 
+# One in another: each takes its time in each step.
+_MOST_WRAPPERS = 32
+
 # They draw when they are made and in each step.
 _DRAWING = ("AddRenderObservation",)
 
@@ -84,8 +88,18 @@ def allowed() -> list[str]:
     return [name for name in _ALLOWED if hasattr(gymnasium.wrappers, name)]
 
 
-def check_names(wrappers: Sequence[Wrapper]) -> None:
-    """Raise ``wrapper_not_allowed`` for a wrapper that is not on the list."""
+def check(wrappers: Sequence[Wrapper]) -> None:
+    """Refuse a wrapper that is not on the list, and too many of them.
+
+    Raises:
+        GymServerError: ``wrapper_not_allowed``, ``invalid_parameter``.
+    """
+    if len(wrappers) > _MOST_WRAPPERS:
+        raise GymServerError(
+            "invalid_parameter",
+            f"The parameter 'wrappers' must be a list of at most {_MOST_WRAPPERS}, "
+            f"not {len(wrappers)}",
+        )
     for wrapper in wrappers:
         if wrapper.name not in allowed():
             raise GymServerError(
@@ -95,15 +109,29 @@ def check_names(wrappers: Sequence[Wrapper]) -> None:
             )
 
 
-def wrap(env: gymnasium.Env, wrappers: Sequence[Wrapper], renderer: RenderThread) -> gymnasium.Env:
-    """Put wrappers around an environment, the first one innermost; see ``check_names()``.
+def wrap(
+    env: gymnasium.Env,
+    wrappers: Sequence[Wrapper],
+    renderer: RenderThread,
+    account: Account | None = None,
+) -> gymnasium.Env:
+    """Put wrappers around an environment, the first one innermost; see ``check()``.
+
+    Args:
+        env: the environment.
+        wrappers: what is put around it.
+        renderer: where wrappers that draw are made.
+        account: what memory is charged to, before it is taken; None where it has been.
 
     Raises:
-        GymServerError: ``invalid_kwargs``, ``missing_dependency``.
+        GymServerError: ``invalid_kwargs``, ``missing_dependency``, ``too_much_memory``.
     """
     for wrapper in wrappers:
         drawing = wrapper.name in _DRAWING
-        env = renderer.run(_wrap, env, wrapper) if drawing else _wrap(env, wrapper)
+        how = env, wrapper, account
+        env = renderer.run(_wrap, *how) if drawing else _wrap(*how)
+    if account is not None:
+        account.charge(answer_bytes(env.observation_space), "What is observed")
     return env
 
 
@@ -130,7 +158,7 @@ def draws_when_stepped(env: gymnasium.Env) -> bool:
     return False
 
 
-def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
+def _wrap(env: gymnasium.Env, wrapper: Wrapper, account: Account | None) -> gymnasium.Env:
     kind = getattr(gymnasium.wrappers, wrapper.name)
     try:
         # What it does not know says more than what is missing.
@@ -139,6 +167,9 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
     except TypeError as failure:
         raise GymServerError("invalid_kwargs", f"{wrapper.name}: {failure}") from failure
     _check_sizes(wrapper)
+    if account is not None:
+        reckoned = reckon_wrapper(wrapper.name, from_words(wrapper.kwargs), env)
+        account.charge(reckoned.kept, wrapper.name, reckoned.answer)
     try:
         return kind(
             env, **{name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}

@@ -96,6 +96,32 @@ class HangsWhere(Counting):
         type(self).closed += 1
 
 
+class Spins(Counting):
+    """Loops without an end where its kwarg says: in "init", "step", "render" or "close"."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, where, render_mode=None):
+        super().__init__()
+        self.where, self.render_mode = where, render_mode
+        self.spin("init")
+
+    def spin(self, here):
+        while self.where == here:
+            pass
+
+    def step(self, action):
+        self.spin("step")
+        return super().step(action)
+
+    def render(self):
+        self.spin("render")
+        return np.zeros((2, 2, 3), dtype=np.uint8)
+
+    def close(self):
+        self.spin("close")
+
+
 class Echo(Counting):
     """Observes the action that it got; its Box is what the kwargs say."""
 
@@ -362,6 +388,15 @@ class Rogue(Counting):
     def exits(self):
         os._exit(7)
 
+    def interrupts(self):
+        raise KeyboardInterrupt("by hand")
+
+    def leaves(self):
+        raise SystemExit(3)
+
+    def ends_a_generator(self):
+        raise GeneratorExit
+
     def is_killed(self):
         os.kill(os.getpid(), signal.SIGKILL)
 
@@ -482,6 +517,7 @@ for _kind in (
     RaisesInStep,
     Rogue,
     Shifted,
+    Spins,
     SpoilsOneLane,
     Uneven,
     Variables,

@@ -37,6 +37,25 @@ def test_the_end_of_standard_input_stops_it_when_asked(serve):
     assert server.stop(how=None)[0] == 0
 
 
+@needs_signals
+@pytest.mark.parametrize("isolate", ["all", "none"])
+def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
+    server = serve("--isolate", isolate, TMPDIR=str(tmp_path))
+    how = {"num_envs": 1, "vectorization_mode": "async"}
+    # The second is made by processes that the first has left as they are.
+    urls = [server.create("faulty_envs:Hanging-v0", **how) for _ in range(2)]
+    assert any(tmp_path.iterdir())
+    for url in urls:
+        server.post(f"{url}/reset/")
+    with server.socket() as hanging:
+        body = b'{"action": [0]}'
+        head = f"POST {urls[0]}/step/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {len(body)}"
+        hanging.sendall(head.encode() + b"\r\n\r\n" + body)
+        server.get("/v1/health")
+        assert server.stop()[0] == 0
+    assert not list(tmp_path.glob("pymp-*"))
+
+
 def test_the_end_of_standard_input_means_nothing_otherwise(serve):
     server = serve()
     server.process.stdin.close()

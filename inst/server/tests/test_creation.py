@@ -5,12 +5,17 @@ import faulty_envs
 import gymnasium
 import pytest
 
-from gym_server import registry
+from gym_server import creation, registry
 from gym_server.atari import _GAMES, classic_game
-from gym_server.creation import find_spec, make
+from gym_server.creation import find_spec
 from gym_server.errors import GymServerError
+from gym_server.footprint import Account
 
 MALFORMED = "Attempted to look up malformed environment ID"
+
+
+def make(env_id, render_mode, kwargs, allowed):
+    return creation.make(env_id, render_mode, kwargs, allowed, (), Account())
 
 
 def refusal(env_id, render_mode=None, kwargs=None, allowed=()):

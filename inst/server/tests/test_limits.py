@@ -6,7 +6,8 @@ import pytest
 
 from gym_server.app import Config, create_app
 from gym_server.errors import GymServerError
-from gym_server.limits import Limits, Watchers
+from gym_server.lanes import AsyncLanes
+from gym_server.limits import Limits, Room, Watchers
 
 
 @pytest.fixture
@@ -14,10 +15,10 @@ def limited():
     """Return a client of an application with limits."""
     apps = []
 
-    def limited(**limits):
+    def limited(isolate="none", **limits):
         apps.append(
             create_app(
-                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate=isolate)
             )
         )
         return apps[-1].test_client()
@@ -100,9 +101,9 @@ def test_one_that_is_too_large_hears_of_that(limited):
 
 
 def test_the_lanes_of_all_follow_those_of_one():
-    Limits(max_num_envs=100_000).check_room(0, 0, 100_000)
+    Limits(max_num_envs=100_000).check_room(0, Room(0), Room(100_000))
     with pytest.raises(GymServerError, match="may have 400000 lanes"):
-        Limits(max_num_envs=100_000).check_room(4, 400_000, 1)
+        Limits(max_num_envs=100_000).check_room(4, Room(400_000), Room(1))
 
 
 def test_watchers_leave_room_for_others():
@@ -129,3 +130,82 @@ def test_one_watcher_too_many_is_told_so(limited):
     assert answers[-1].json["code"] == "too_many_watchers"
     client.post(f"{url}/close/")
     waiting.join()
+
+
+def ask_for_processes(client, number):
+    return make(client, num_envs=number, vectorization_mode="async")
+
+
+def test_all_together_have_only_so_many_processes(limited):
+    client = limited(max_processes=3)
+    first = ask_for_processes(client, 2)
+    assert first.status_code == 200
+    refusal = ask_for_processes(client, 2)
+    assert refused(refusal, "too_many_processes")
+    assert refusal.json["message"] == (
+        "All environments together may have 3 processes, and 1 are left, not 2"
+    )
+    assert "--max-processes" in refusal.json["hint"]
+    assert ask_for_processes(client, 1).status_code == 200
+    # What takes none is not refused.
+    assert make(client, num_envs=8).status_code == make(client).status_code == 200
+    client.post(f"/v1/envs/{first.json['instance_id']}/close/")
+    assert ask_for_processes(client, 2).status_code == 200
+
+
+def test_processes_that_are_started_at_once_are_no_more(limited):
+    client = limited(max_processes=4)
+    answers = []
+
+    def ask():
+        answers.append(ask_for_processes(client.application.test_client(), 2).status_code)
+
+    threads = [threading.Thread(target=ask) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(answers) == [200] * 2 + [429] * 4
+
+
+def test_processes_count_until_they_have_ended(limited, monkeypatch):
+    client = limited(max_processes=2)
+    closing, released = threading.Event(), threading.Event()
+    close = AsyncLanes.close_extras
+
+    def close_when_released(self, **how):
+        closing.set()
+        released.wait(20)
+        close(self, **how)
+
+    url = f"/v1/envs/{ask_for_processes(client, 2).json['instance_id']}"
+    monkeypatch.setattr(AsyncLanes, "close_extras", close_when_released)
+    closer = threading.Thread(target=lambda: client.post(f"{url}/close/"))
+    closer.start()
+    assert closing.wait(20)
+    assert refused(ask_for_processes(client.application.test_client(), 1), "too_many_processes")
+    released.set()
+    closer.join()
+    assert ask_for_processes(client, 2).status_code == 200
+
+
+def test_isolated_environments_and_their_processes_count(limited):
+    client = limited(max_processes=4, isolate="all")
+    first = ask_for_processes(client, 2)
+    assert first.status_code == 200
+    assert refused(ask_for_processes(client, 1), "too_many_processes")
+    second = make(client)
+    assert second.status_code == 200
+    assert refused(make(client), "too_many_processes")
+    assert client.post(f"/v1/envs/{second.json['instance_id']}/close/").status_code == 204
+    assert make(client).status_code == 200
+
+
+def test_a_process_that_ended_by_itself_makes_room(limited, eventually):
+    client = limited(max_processes=1, isolate="all")
+    kwargs = {"does": "exits", "at": "step"}
+    answer = make(client, env_id="faulty_envs:Rogue-v0", kwargs=kwargs)
+    url = f"/v1/envs/{answer.json['instance_id']}"
+    client.post(f"{url}/reset/")
+    assert client.post(f"{url}/step/", json={"action": 0}).json["code"] == "environment_died"
+    eventually(lambda: make(client).status_code == 200)

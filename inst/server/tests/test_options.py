@@ -24,7 +24,15 @@ def test_limits_of_time_are_numbers(name, value, capsys):
 
 
 @pytest.mark.parametrize(
-    "name", ["--max-instances", "--max-total-lanes", "--max-watchers", "--max-num-envs"]
+    "name",
+    [
+        "--max-instances",
+        "--max-total-lanes",
+        "--max-watchers",
+        "--max-num-envs",
+        "--max-processes",
+        "--max-memory-mb",
+    ],
 )
 def test_limits_of_numbers_are_at_least_1(name):
     with pytest.raises(SystemExit):

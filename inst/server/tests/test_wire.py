@@ -146,3 +146,29 @@ def test_what_can_be_read_can_be_written_however_deep():
 
         assert further_down(20).startswith(b'{"a":')
     assert deepest > 500
+
+
+@pytest.mark.parametrize("digits", [310, 4000])
+@pytest.mark.parametrize("sign", ["", "-"])
+@pytest.mark.parametrize(
+    ("path", "fields"),
+    [
+        ("", '"env_id": "CartPole-v1", "seed": NUMBER'),
+        ("", '"env_id": "CartPole-v1", "num_envs": 2, "seed": [NUMBER, 1]'),
+        ("", '"env_id": "CartPole-v1", "num_envs": NUMBER'),
+        ("", '"env_id": "CartPole-v1", "request": {"key": "a", "number": NUMBER}'),
+        ("reset/", '"seed": NUMBER'),
+        ("monitor/start/", '"directory": "run", "video_callable": NUMBER'),
+    ],
+)
+def test_an_integer_that_is_larger_than_every_float_is_refused(
+    client, create, path, fields, sign, digits
+):
+    body = "{" + fields.replace("NUMBER", f"{sign}1{'0' * (digits - 1)}") + "}"
+    answer = client.post(f"{create()}/{path}" if path else "/v1/envs/", data=body)
+    assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
+    assert "with no number above 1e308, not" in answer.json["message"]
+
+
+def test_the_largest_integers_that_are_floats_are_taken(client, create):
+    assert client.post(f"{create()}/reset/", json={"seed": 10**308}).status_code == 200
