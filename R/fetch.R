@@ -6,12 +6,18 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
   started <- proc.time()[["elapsed"]]
   attempt <- 1L
   reached <- FALSE
+  state <- client$state
+  state$most_bytes <- max_answer_bytes(call)
   repeat {
     response <- exchange(client, line, handle, url, request)
     if (!inherits(response, "error")) {
       return(response)
     }
     reason <- conditionMessage(response)
+    if (state$overlong) {
+      state$overlong <- FALSE
+      abort_overlong(state$most_bytes, base = client$remote_base, call = call)
+    }
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
