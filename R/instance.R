@@ -75,25 +75,31 @@ known_instance <- function(x, instance_id, call = rlang::caller_env()) {
 ask_instance <- function(x, instance_id, call) {
   route <- instance_route(instance_id)
   answer <- get_answer(x, route, call = call)
+  check_about(answer)
   instance <- new.env(parent = emptyenv())
   instance$id <- instance_id
   instance$route <- route
   instance$reset_route <- paste0(route, "reset/")
   instance$step_route <- paste0(route, "step/")
   instance$num_envs <- answer$num_envs
-  instance$vectorization_mode <- answer$vectorization_mode
-  instance$autoreset_mode <- answer$autoreset_mode
-  instance$single_action_space <- new_space(answer$action_space)
-  instance$single_observation_space <- new_space(answer$observation_space)
+  instance$vectorization_mode <- shown_line(answer$vectorization_mode)
+  instance$autoreset_mode <- shown_line(answer$autoreset_mode)
+  instance$single_action_space <- read_values(new_space(answer$action_space), "Its `action_space`")
+  instance$single_observation_space <- read_values(
+    new_space(answer$observation_space), "Its `observation_space`"
+  )
   instance$actions <- lanes_space(instance$single_action_space, answer$num_envs)
   instance$observations <- lanes_space(instance$single_observation_space, answer$num_envs)
   instance$takes_tensors <- travels_as_tensors(instance$single_observation_space, answer$num_envs)
   instance$sends_tensors <- travels_as_tensors(instance$single_action_space, answer$num_envs)
   instance$spec <- list(
-    id = answer$env_id,
-    reward_threshold = answer$reward_threshold,
+    id = shown_line(answer$env_id),
+    reward_threshold = if (!is.null(answer$reward_threshold)) {
+      number_from(answer$reward_threshold, "reward_threshold")
+    },
     max_episode_steps = answer$max_episode_steps,
-    render_fps = answer$render_fps
+    # An environment's own word, which may be anything.
+    render_fps = if (is_number(answer$render_fps)) answer$render_fps
   )
   instance$draws <- !is.null(answer$render_mode)
   instance$done <- FALSE
@@ -125,6 +131,7 @@ reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask
     x, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
   )
   instance$done <- FALSE
+  check_info(answer)
   observation <- decode_observation(instance$observations, answer)
   if (return_info) {
     list(observation = observation, info = info_from(instance, answer))
@@ -134,11 +141,14 @@ reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask
 }
 
 decode_observation <- function(space, answer, name = "observation") {
-  if (is.null(answer$tensors)) {
-    decode_value(space, answer[[name]])
-  } else {
-    from_tensors(space, name, answer)
-  }
+  read_values(
+    if (is.null(answer$tensors)) {
+      decode_value(space, answer[[name]])
+    } else {
+      from_tensors(space, name, answer)
+    },
+    paste0("Its `", name, "`")
+  )
 }
 
 info_from <- function(instance, answer) {
@@ -163,8 +173,11 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
   if (!is.null(answer$tensors)) {
     answer[c("reward", "terminated", "truncated")] <-
       answer$tensors[c("reward", "terminated", "truncated")]
+    check_results(answer, 1L)
     answer$done <- answer$terminated || answer$truncated
   }
+  check_flags(answer)
+  check_info(answer)
   if (isTRUE(instance$done)) {
     warn_step_after_done(instance, call)
   } else {
@@ -172,7 +185,7 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
   }
   list(
     observation = decode_observation(instance$observations, answer),
-    reward = number_from_json(answer$reward),
+    reward = number_from(answer$reward, "reward"),
     done = answer$done,
     info = info_from_json(answer$info),
     terminated = answer$terminated,
