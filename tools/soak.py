@@ -98,6 +98,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
+        "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }

@@ -265,7 +265,8 @@ def test_what_all_keep_together_is_bounded():
     )
     once.answer(RequestId("first", 1), "", lambda: Done(80), "i")
     for instance_id, size in zip("ijk", (90, 70, 150), strict=True):
-        once.answer(NUMBER_1, "x" * 10, lambda size=size: Done(size, True, instance_id), instance_id)
+        done = Done(size, True, instance_id)
+        once.answer(NUMBER_1, "x" * 10, lambda done=done: done, instance_id)
     once.forget()
     act = Counter()
     # The largest of the last ones had to go as well: it is not done again all the same.
