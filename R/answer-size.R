@@ -5,29 +5,35 @@
 default_answer_bytes <- 2^29
 json_share <- 1 / 16
 
-max_answer_bytes <- function(call = rlang::caller_env()) {
-  bytes <- getOption("gym.max_answer_bytes", default_answer_bytes)
+answer_bytes_option <- function() getOption("gym.max_answer_bytes", default_answer_bytes)
+
+max_answer_bytes <- function(call = NULL) {
+  bytes <- answer_bytes_option()
   check_number(bytes, min = 1, arg = "options(gym.max_answer_bytes)", call = call)
   bytes
 }
+
+# Which is taken whatever the option says: each call pays for looking at it.
+small_answer <- 2^16
 
 #' Have a handle stop an answer that is too large
 #'
 #' Nothing is unpacked: how much a few bytes become cannot be known beforehand, and libcurl
 #' unpacks all that has come before it looks at the clock. libcurl tells how much has come about
 #' ten times in a call.
-#' @param state The client's; it has the limit, and hears in `overlong` why a call was ended.
+#' @param state The client's, which hears in `overlong` why a call was ended.
 #' @noRd
 bound_answers <- function(handle, state) {
-  state$most_bytes <- max_answer_bytes()
   curl::handle_setopt(
     handle,
     accept_encoding = NULL,
     noprogress = FALSE,
     xferinfofunction = function(down, up) {
-      down[[2L]] <= state$most_bytes || {
-        state$overlong <- TRUE
-        FALSE
+      down[[2L]] <= small_answer || {
+        # Where the option is no number that is said when the call has ended.
+        most <- answer_bytes_option()
+        state$overlong <- !is_number(most) || down[[2L]] > most
+        !state$overlong
       }
     }
   )
@@ -35,13 +41,13 @@ bound_answers <- function(handle, state) {
 
 # Before it is parsed.
 check_json_size <- function(content) {
-  most <- max_answer_bytes() * json_share
-  if (length(content) > most) {
-    abort_overlong(most, "It is JSON, which may take a sixteenth of that: R makes much of it.")
+  if (length(content) > small_answer && length(content) > max_answer_bytes() * json_share) {
+    abort_overlong(json_share, "It is JSON, of which R makes much: that may have a sixteenth.")
   }
 }
 
-abort_overlong <- function(most, reason = NULL, base = NULL, call = NULL) {
+abort_overlong <- function(share = 1, reason = NULL, base = NULL, call = NULL) {
+  most <- max_answer_bytes(call) * share
   gym_abort(
     c(
       paste0("The answer of the server", if (!is.null(base)) paste0(" at ", base),

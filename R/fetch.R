@@ -7,7 +7,6 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
   attempt <- 1L
   reached <- FALSE
   state <- client$state
-  state$most_bytes <- max_answer_bytes(call)
   repeat {
     response <- exchange(client, line, handle, url, request)
     if (!inherits(response, "error")) {
@@ -16,7 +15,7 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
     reason <- conditionMessage(response)
     if (state$overlong) {
       state$overlong <- FALSE
-      abort_overlong(state$most_bytes, base = client$remote_base, call = call)
+      abort_overlong(base = client$remote_base, call = call)
     }
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()

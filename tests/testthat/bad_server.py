@@ -1,7 +1,8 @@
 """A server that means ill, for tests of what the client bears.
 
-    python bad_server.py flood HOW    answers each request without an end; HOW is "gzip" (8 GB of
-                                      zeros, packed), "chunks", "length" or "headers"
+    python bad_server.py flood HOW    answers each request without an end; HOW is "chunks",
+                                      "length" or "headers"
+    python bad_server.py packed       answers with 256 MB, packed, although nobody asked for that
     python bad_server.py canned FILE  answers what FILE says at that moment: a JSON object of the
                                       answers by path, {"status", "type", "text" or "hex"} each
 
@@ -9,22 +10,14 @@ Prints its port, ends when its standard input closes. A flood ends by itself aft
 """
 
 import contextlib
+import gzip
 import http.server
 import json
 import sys
 import threading
 import time
-import zlib
 
-MEGABYTE = bytes(2**20)
-
-
-def packed():
-    """Yield a gzip file of zeros, piece by piece."""
-    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
-    for _ in range(8192):
-        yield packer.compress(MEGABYTE)
-    yield packer.flush()
+BLANKS = b" " * 2**20
 
 
 class Bad(http.server.BaseHTTPRequestHandler):
@@ -38,6 +31,8 @@ class Bad(http.server.BaseHTTPRequestHandler):
         with contextlib.suppress(OSError):
             if sys.argv[1] == "flood":
                 self.flood(sys.argv[2])
+            elif sys.argv[1] == "packed":
+                self.packed()
             else:
                 self.answer(body)
 
@@ -54,22 +49,24 @@ class Bad(http.server.BaseHTTPRequestHandler):
                 self.send_header("X-More", "x" * 1000)
                 self.flush_headers()
             return
-        if how == "gzip":
-            self.send_header("Content-Encoding", "gzip")
         if how == "length":
             self.send_header("Content-Length", str(2**50))
         else:
             self.send_header("Transfer-Encoding", "chunked")
         self.end_headers()
-        pieces = packed() if how == "gzip" else iter(lambda: b" " * 2**20, None)
-        for piece in pieces:
-            if time.monotonic() > end:
-                return
-            if how == "length":
-                self.wfile.write(piece)
-            elif piece:
-                self.wfile.write(b"%x\r\n%b\r\n" % (len(piece), piece))
-        self.wfile.write(b"0\r\n\r\n")
+        piece = BLANKS if how == "length" else b"%x\r\n%b\r\n" % (len(BLANKS), BLANKS)
+        while time.monotonic() < end:
+            self.wfile.write(piece)
+
+    def packed(self):
+        """Send what is small and becomes large."""
+        content = gzip.compress(b'{"all_envs":{}' + 256 * BLANKS + b"}")
+        self.send_response(200)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Encoding", "gzip")
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
 
     def answer(self, body):
         """Send what the file says."""
