@@ -25,6 +25,7 @@ parsed_body <- function(response, layouts = NULL, request = NULL) {
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
   } else {
+    check_json_size(response$content)
     answer <- from_json(rawToChar(response$content))
     if (is.list(answer)) answer
   }
@@ -37,16 +38,21 @@ check_echo <- function(response, answer, call) {
     return()
   }
   echo <- if (response$status_code == 204L) echo_in_header(response) else answer$request
-  if (!is.null(echo) && !(echo$number == sent$number && identical(echo$key, sent$key))) {
+  if (!is.null(echo) && !is_same_request(echo, sent)) {
     abort_connection(response$url, "The answer that came belongs to another call.", call)
   }
+}
+
+is_same_request <- function(echo, sent) {
+  is.list(echo) && identical(echo$key, sent$key) && is_number(echo$number) &&
+    echo$number == sent$number
 }
 
 echo_in_header <- function(response) {
   echo <- curl::parse_headers_list(response$headers)[["gym-request"]]
   if (!is.null(echo)) {
     parts <- strsplit(echo, " ", fixed = TRUE)[[1L]]
-    list(key = parts[[1L]], number = as.numeric(parts[[2L]]))
+    list(key = parts[[1L]], number = suppressWarnings(as.numeric(parts[2L])))
   }
 }
 

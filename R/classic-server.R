@@ -27,8 +27,9 @@ classic_description <- function(x, instance_id, missing, call) {
 
 # Newer than the protocol, and by some names for what it has under one.
 classic_flags <- function(answer) {
-  answer$truncated <- answer$done && isTRUE(answer$info[["TimeLimit.truncated"]])
-  answer$terminated <- answer$done && !answer$truncated
+  done <- isTRUE(answer$done)
+  answer$truncated <- done && isTRUE(answer$info[["TimeLimit.truncated"]])
+  answer$terminated <- done && !answer$truncated
   answer
 }
 

@@ -2,7 +2,8 @@
 
 gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), parent = NULL) {
   rlang::abort(
-    message,
+    # A server's words are among them.
+    shown_text(message),
     class = c(class, "gym_error"),
     ...,
     call = without_tokens(rlang::error_call(call)),
@@ -13,7 +14,10 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
 
 abort_http <- function(response, method, call) {
   status <- response$status_code
-  problem <- response$answer
+  problem <- lapply(
+    list(message = "message", code = "code", hint = "hint", extra = "extra"),
+    function(name) shown_text(string_or_null(response$answer[[name]]))
+  )
   request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
   hint <- extra_hint(problem$extra, request) %||% token_hint(problem$code) %||%

@@ -14,6 +14,7 @@ connection <- function(client) {
       state$creations <- new_numbers()
       state$to_close <- character()
       state$layouts <- new.env(parent = emptyenv())
+      state$overlong <- FALSE
       state$pid <- Sys.getpid()
       state$session <- the_session
     })
@@ -131,6 +132,7 @@ open_handle <- function(client, sends, takes) {
     curl::handle_setopt(handle, noproxy = "*")
   }
   curl::handle_setopt(handle, .list = client$config$options)
+  bound_answers(handle, client$state)
   # An empty Expect keeps curl from asking for leave before it sends a body.
   headers <- c(
     "Content-Type" = sends, "Accept" = takes, "Expect" = "",

@@ -21,21 +21,14 @@ env_list <- function(x = gym_client()) {
   check_client(x)
   close_abandoned(x)
   instances <- get_answer(x, "/v1/instances/")$instances
-  column <- function(name, missing) {
-    vapply(instances, function(instance) instance[[name]] %||% missing, missing)
-  }
-  # JSON writes a whole number without a point, as an integer.
-  number <- function(name) {
-    vapply(instances, function(instance) number_from_json(instance[[name]]), 0)
-  }
   data.frame(
-    instance_id = column("instance_id", ""),
-    name = column("name", NA_character_),
-    env_id = column("env_id", ""),
-    num_envs = column("num_envs", NA_integer_),
-    age = number("age_seconds"),
-    idle = number("idle_seconds"),
-    steps = number("steps"),
-    watched = column("watched", NA)
+    instance_id = listed_texts(instances, "instance_id", ""),
+    name = listed_texts(instances, "name"),
+    env_id = listed_texts(instances, "env_id", ""),
+    num_envs = listed_counts(instances, "num_envs"),
+    age = listed_numbers(instances, "age_seconds"),
+    idle = listed_numbers(instances, "idle_seconds"),
+    steps = listed_numbers(instances, "steps"),
+    watched = listed_flags(instances, "watched")
   )
 }

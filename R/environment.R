@@ -100,7 +100,11 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
 env_list_all <- function(x) {
   check_client(x)
   close_abandoned(x)
-  get_answer(x, "/v1/envs/")$all_envs
+  all_envs <- get_answer(x, "/v1/envs/")$all_envs
+  if (!is_object(all_envs) || !all(vapply(all_envs, rlang::is_string, NA))) {
+    refuse_field(all_envs, "all_envs", "an object of strings")
+  }
+  lapply(all_envs, shown_line)
 }
 
 #' Start a new episode
@@ -272,7 +276,7 @@ env_observation_space_info <- function(x, instance_id) {
 env_action_space_sample <- function(x, instance_id) {
   instance <- known_instance(x, instance_id)
   answer <- get_answer(x, paste0(instance$route, "action_space/sample"))
-  decode_sample(instance, answer$action)
+  read_values(decode_sample(instance, answer$action), "Its `action`")
 }
 
 #' Ask whether a value belongs to a space
@@ -313,7 +317,11 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   }
   json <- if (is.null(lanes)) write_value(space, value) else write_lanes(single, value, lanes)
   fields <- c(value = json)
-  post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)$member
+  answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
+  if (!is_flag(answer$member)) {
+    refuse_field(answer$member, "member", "true or false")
+  }
+  answer$member
 }
 
 #' Close an environment

@@ -6,12 +6,17 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
   started <- proc.time()[["elapsed"]]
   attempt <- 1L
   reached <- FALSE
+  state <- client$state
   repeat {
     response <- exchange(client, line, handle, url, request)
     if (!inherits(response, "error")) {
       return(response)
     }
     reason <- conditionMessage(response)
+    if (state$overlong) {
+      state$overlong <- FALSE
+      abort_overlong(base = client$remote_base, call = call)
+    }
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }

@@ -26,7 +26,7 @@ env_render <- function(x, instance_id, lane = 1) {
   query <- if (lane != 1) paste0("?lane=", whole_text(lane - 1))
   route <- paste0(instance_route(instance_id), "render/", query)
   answer <- get_answer(x, route, take_tensors = TRUE)
-  new_frame(answer$tensors$frame)
+  new_frame(check_frame(answer$tensors$frame))
 }
 
 new_frame <- function(values) structure(values, class = "gym_frame")

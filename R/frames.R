@@ -66,7 +66,7 @@ check_draws <- function(env, call) {
 #' @return A raw vector.
 #' @noRd
 png_frame <- function(client, instance_id, call = rlang::caller_env()) {
-  get_answer(client, paste0(instance_route(instance_id), "render/"), call = call)$png
+  check_png(get_answer(client, paste0(instance_route(instance_id), "render/"), call = call)$png)
 }
 
 #' Unpack a frame

@@ -14,7 +14,7 @@
 #' | `gym_error_argument` | an argument is not what the function takes; nothing was sent |
 #' | `gym_error_space` | an action or observation does not fit its space |
 #' | `gym_error_http` | the server refused |
-#' | `gym_error_connection` | no answer: no server there, connection lost, time over |
+#' | `gym_error_connection` | no server there, connection lost, time over; an answer that is none |
 #' | `gym_error_server_start` | a server could not be started |
 #' | `gym_error_install` | what the server needs could not be installed |
 #' | `gym_error_checkpoint` | a search cannot go on from its file, or not keep one |
@@ -31,6 +31,15 @@
 #'   gym_error_connection = function(cnd) "no server"
 #' )
 #' ```
+#'
+#' @section Options:
+#' `gym.max_answer_bytes`: how many bytes an answer of a server may have, a number; the default is
+#' 2^29, half a gigabyte. Of JSON, of which R makes much more, it may be a sixteenth. A larger
+#' answer ends with a `gym_error_connection` as soon as so much has come. Answers that a server
+#' packs are not unpacked. `gym.viewer` is told of at [env_watch()].
+#'
+#' Whatever a server says in an error or by a name is shown without control characters, and cut
+#' where it is long.
 #'
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)

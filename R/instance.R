@@ -84,6 +84,7 @@ ask_instance <- function(x, instance_id, call) {
     get_answer(x, route, call = call),
     gym_error_http_404 = function(cnd) classic_description(x, instance_id, cnd, call)
   )
+  check_about(answer)
   instance <- new.env(parent = emptyenv())
   instance$classic <- isTRUE(answer$classic)
   space_of <- if (instance$classic) new_classic_space else new_space
@@ -92,20 +93,25 @@ ask_instance <- function(x, instance_id, call) {
   instance$reset_route <- paste0(route, "reset/")
   instance$step_route <- paste0(route, "step/")
   instance$num_envs <- answer$num_envs
-  instance$vectorization_mode <- answer$vectorization_mode
-  instance$autoreset_mode <- answer$autoreset_mode
-  instance$single_action_space <- space_of(answer$action_space)
-  instance$single_observation_space <- space_of(answer$observation_space)
+  instance$vectorization_mode <- shown_line(answer$vectorization_mode)
+  instance$autoreset_mode <- shown_line(answer$autoreset_mode)
+  instance$single_action_space <- read_values(space_of(answer$action_space), "Its `action_space`")
+  instance$single_observation_space <- read_values(
+    space_of(answer$observation_space), "Its `observation_space`"
+  )
   instance$actions <- lanes_space(instance$single_action_space, answer$num_envs)
   instance$observations <- lanes_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
   instance$takes_tensors <- as_tensors(instance$single_observation_space)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
   instance$spec <- list(
-    id = answer$env_id,
-    reward_threshold = answer$reward_threshold,
+    id = shown_line(answer$env_id),
+    reward_threshold = if (!is.null(answer$reward_threshold)) {
+      number_from(answer$reward_threshold, "reward_threshold")
+    },
     max_episode_steps = answer$max_episode_steps,
-    render_fps = answer$render_fps
+    # An environment's own word, which may be anything.
+    render_fps = if (is_number(answer$render_fps)) answer$render_fps
   )
   instance$draws <- !is.null(answer$render_mode)
   instance$done <- FALSE
@@ -140,6 +146,7 @@ reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask
     x, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
   )
   instance$done <- FALSE
+  check_info(answer)
   observation <- decode_observation(instance$observations, answer)
   if (return_info) {
     list(observation = observation, info = info_from(instance, answer))
@@ -149,11 +156,14 @@ reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask
 }
 
 decode_observation <- function(space, answer, name = "observation") {
-  if (is.null(answer$tensors)) {
-    decode_value(space, answer[[name]])
-  } else {
-    from_tensors(space, name, answer)
-  }
+  read_values(
+    if (is.null(answer$tensors)) {
+      decode_value(space, answer[[name]])
+    } else {
+      from_tensors(space, name, answer)
+    },
+    paste0("Its `", name, "`")
+  )
 }
 
 info_from <- function(instance, answer) {
@@ -178,10 +188,13 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
   if (!is.null(answer$tensors)) {
     answer[c("reward", "terminated", "truncated")] <-
       answer$tensors[c("reward", "terminated", "truncated")]
+    check_results(answer, 1L)
     answer$done <- answer$terminated || answer$truncated
   } else if (instance$classic) {
     answer <- classic_flags(answer)
   }
+  check_flags(answer)
+  check_info(answer)
   if (isTRUE(instance$done)) {
     warn_step_after_done(instance, call)
   } else if (isFALSE(instance$done)) {
@@ -189,7 +202,7 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
   }
   list(
     observation = decode_observation(instance$observations, answer),
-    reward = number_from_json(answer$reward),
+    reward = number_from(answer$reward, "reward"),
     done = answer$done,
     info = info_from_json(answer$info),
     terminated = answer$terminated,

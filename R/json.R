@@ -145,10 +145,19 @@ numbers_from_json <- function(elements) {
 
 number_from_json <- function(x) {
   if (is.character(x)) {
+    if (!is_json_number(x)) {
+      abort_answer(paste(describe_value(x), "is no number"))
+    }
     switch(x, "NaN" = NaN, "Infinity" = Inf, "-Infinity" = -Inf, as.numeric(x))
   } else {
     as.numeric(x)
   }
+}
+
+# Integers beyond 2^53 are text, and so is what is not finite.
+is_json_number <- function(x) {
+  length(x) == 1L &&
+    (is.numeric(x) || is.character(x) && grepl("^(-?[0-9]+|NaN|-?Infinity)$", x))
 }
 
 # Infos --------------------------------------------------------------------------

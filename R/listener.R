@@ -65,7 +65,7 @@ server_name <- function(response) {
   if (is.raw(headers)) {
     headers <- curl::parse_headers_list(headers)
   }
-  headers[["server"]]
+  shown_line(headers[["server"]])
 }
 
 # By which a proxy says that the server behind it gave it no answer.

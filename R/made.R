@@ -22,6 +22,7 @@ make_instance <- function(x, fields, call) {
     gym_error_http = function(cnd) outcome <<- "refused",
     gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
   )
+  check_instance_id(answer$instance_id)
   suspendInterrupts({
     note_protocol(state, answer)
     keep_made(made_place(x, answer$instance_id), x, answer$instance_id)
@@ -132,7 +133,9 @@ close_aside <- function(places, seconds) {
   ask_for_id <- function(place) {
     entry <- the_session$made[[place]]
     post(entry, "/v1/envs/", entry$body, function(response) {
-      instance_id <- tryCatch(parsed_body(response)$instance_id, error = function(cnd) NULL)
+      instance_id <- tryCatch(
+        string_or_null(parsed_body(response)$instance_id), error = function(cnd) NULL
+      )
       forget_made(place)
       if (!is.null(instance_id)) {
         made <- made_place(entry$client, instance_id)

@@ -25,23 +25,13 @@ env_registry <- function(x = gym_client(), search = NULL) {
   check_string(search, allow_null = TRUE)
   route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
   environments <- get_answer(x, route)$environments
-  column <- function(name, missing) {
-    vapply(environments, function(environment) environment[[name]] %||% missing, missing)
-  }
   data.frame(
-    id = column("id", ""),
-    max_episode_steps = column("max_episode_steps", NA_integer_),
-    reward_threshold = registry_thresholds(environments),
-    vectorised = column("vectorised", NA),
-    extra = column("extra", NA_character_),
-    available = column("available", NA),
-    reason = column("reason", NA_character_)
+    id = listed_texts(environments, "id", ""),
+    max_episode_steps = listed_counts(environments, "max_episode_steps"),
+    reward_threshold = listed_numbers(environments, "reward_threshold"),
+    vectorised = listed_flags(environments, "vectorised"),
+    extra = listed_texts(environments, "extra"),
+    available = listed_flags(environments, "available"),
+    reason = listed_texts(environments, "reason")
   )
-}
-
-# JSON writes a whole threshold without a point, as an integer.
-registry_thresholds <- function(environments) {
-  vapply(environments, function(environment) {
-    number_from_json(environment$reward_threshold %||% NA_real_)
-  }, 0)
 }

@@ -78,7 +78,7 @@ print.gym_sitrep <- function(x, ...) {
 
 sitrep_lines <- function(rows) {
   mend <- ifelse(is.na(rows$mend), "", paste0(" ", cli::symbol$arrow_right, " ", rows$mend))
-  text <- home_as_tilde(paste0(rows$what, ": ", rows$finding, mend))
+  text <- home_as_tilde(shown_text(paste0(rows$what, ": ", rows$finding, mend)))
   paste(vapply(rows$state, sitrep_mark, ""), gsub("[[:space:]]*\n[[:space:]]*", " ", text))
 }
 

@@ -9,6 +9,10 @@ init_space.gym_space_box <- function(space) {
   space$dtype <- space$dtype %||% "float64"
   space$low <- bound_from_json(space$low)
   space$high <- bound_from_json(space$high)
+  n <- prod(space$shape)
+  if (!length(space$low) %in% c(1, n) || !length(space$high) %in% c(1, n)) {
+    abort_answer(paste("A Box of", count_of(n, "number"), "has bounds of another length"))
+  }
   class(space) <- append(class(space), "gym_space_array", 1L)
   space
 }
@@ -29,7 +33,13 @@ init_space.gym_space_multibinary <- function(space) {
   space
 }
 
-shape_from_json <- function(shape) as.integer(unlist(shape))
+shape_from_json <- function(json) {
+  shape <- naturals_from_json(json)
+  if (is.null(shape) || any(shape > .Machine$integer.max)) {
+    refuse_field(json, "shape", "a list of whole numbers")
+  }
+  as.integer(shape)
+}
 
 # Infinite bounds travel as +-1e100, which classic clients expect.
 bound_from_json <- function(bound) {
@@ -82,7 +92,8 @@ space_bounds.gym_space_multibinary <- function(space) {
 
 #' @exportS3Method
 decode_value.gym_space_array <- function(space, json) {
-  shape_values(decode_numbers(space$dtype, json), space$shape)
+  values <- check_numbers(decode_numbers(space$dtype, json), space$dtype, space$shape)
+  shape_values(values, space$shape)
 }
 
 # Numbers, nested however they are, as a vector of the type that stands for the

@@ -7,7 +7,8 @@ is_stackable <- function(space) {
 
 decode_stack <- function(space, json) {
   if (is_stackable(space)) {
-    shape_values(decode_numbers(space$dtype, json), c(length(json), space$shape))
+    shape <- c(length(json), space$shape)
+    shape_values(check_numbers(decode_numbers(space$dtype, json), space$dtype, shape), shape)
   } else {
     lapply(json, decode_value, space = space)
   }
@@ -81,6 +82,7 @@ space_text.gym_space_sequence <- function(space) {
 
 #' @exportS3Method
 decode_value.gym_space_sequence <- function(space, json) {
+  check_list(json, length(json), "Sequence")
   if (space$stack) {
     decode_stack(space$space, json)
   } else {
@@ -128,6 +130,7 @@ space_text.gym_space_graph <- function(space) {
 
 #' @exportS3Method
 decode_value.gym_space_graph <- function(space, json) {
+  check_list(json, length(json), "Graph")
   list(
     nodes = decode_stack(space$node_space, json$nodes),
     edges = if (!is.null(json$edges)) decode_stack(space$edge_space, json$edges),

@@ -36,7 +36,10 @@ space_text.gym_space_oneof <- space_text.gym_space_tuple
 # Tuple -----------------------------------------------------------------------------
 
 #' @exportS3Method
-decode_value.gym_space_tuple <- function(space, json) Map(decode_value, space$spaces, json)
+decode_value.gym_space_tuple <- function(space, json) {
+  check_list(json, length(space$spaces), "Tuple")
+  Map(decode_value, space$spaces, json)
+}
 
 #' @exportS3Method
 check_value.gym_space_tuple <- function(space, value, path, call, bounds = FALSE) {
@@ -61,6 +64,7 @@ space_sample.gym_space_tuple <- function(space) lapply(space$spaces, space_sampl
 
 #' @exportS3Method
 decode_value.gym_space_dict <- function(space, json) {
+  check_list(json, length(space$spaces), "Dict")
   values <- Map(decode_value, unname(space$spaces), json[match(names(space$spaces), names(json))])
   names(values) <- names(space$spaces)
   values
@@ -115,7 +119,11 @@ space_sample.gym_space_dict <- function(space) lapply(space$spaces, space_sample
 
 #' @exportS3Method
 decode_value.gym_space_oneof <- function(space, json) {
+  check_list(json, 2L, "OneOf")
   index <- json[[1L]]
+  if (!is_number(index) || !are_whole(index, 0, length(space$spaces) - 1)) {
+    refuse_field(index, "index", "that of a space")
+  }
   list(index, decode_value(space$spaces[[index + 1L]], json[[2L]]))
 }
 

@@ -21,7 +21,13 @@ space_bounds.gym_space_discrete <- function(space) {
 }
 
 #' @exportS3Method
-decode_value.gym_space_discrete <- function(space, json) whole_from_json(json)
+decode_value.gym_space_discrete <- function(space, json) {
+  value <- whole_from_json(json)
+  if (!is_whole(space, value)) {
+    abort_answer(paste("A value of Discrete is", describe_value(value)))
+  }
+  value
+}
 
 #' @exportS3Method
 check_value.gym_space_discrete <- function(space, value, path, call, bounds = FALSE) {

@@ -120,7 +120,10 @@ to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") 
 # Several texts -----------------------------------------------------------------------
 
 #' @exportS3Method
-decode_value.gym_space_texts <- function(space, json) as.character(unlist(json))
+decode_value.gym_space_texts <- function(space, json) {
+  check_list(json, length(space$spaces), "Text in all lanes")
+  vapply(json, check_text, "", USE.NAMES = FALSE)
+}
 
 #' @exportS3Method
 check_value.gym_space_texts <- function(space, value, path, call, bounds = FALSE) {
@@ -135,7 +138,8 @@ space_sample.gym_space_texts <- function(space) {
 
 #' @exportS3Method
 from_tensors.gym_space_texts <- function(space, name, answer) {
-  as.character(unlist(answer$texts[part_names(space, name)]))
+  vapply(part_names(space, name), function(part) check_text(answer$texts[[part]]), "",
+         USE.NAMES = FALSE)
 }
 
 #' @exportS3Method

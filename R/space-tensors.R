@@ -76,11 +76,11 @@ from_tensors.default <- function(space, name, answer) {
   if (is.null(value)) {
     abort_tensors(paste0("there is none with the name \"", name, "\""))
   }
-  value
+  check_tensor(value, space, name)
 }
 
 #' @exportS3Method
-from_tensors.gym_space_text <- function(space, name, answer) answer$texts[[name]]
+from_tensors.gym_space_text <- function(space, name, answer) check_text(answer$texts[[name]])
 
 #' @exportS3Method
 from_tensors.gym_space_tuple <- function(space, name, answer) {

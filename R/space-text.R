@@ -9,7 +9,7 @@ space_text.gym_space_text <- function(space) {
 }
 
 #' @exportS3Method
-decode_value.gym_space_text <- function(space, json) json
+decode_value.gym_space_text <- function(space, json) check_text(json)
 
 #' @exportS3Method
 check_value.gym_space_text <- function(space, value, path, call, bounds = FALSE) {

@@ -5,6 +5,9 @@
 #' Make a space from the server's description
 #' @noRd
 new_space <- function(description) {
+  if (!is.list(description) || !rlang::is_string(description$name)) {
+    refuse_field(description, "space", "a description with a name")
+  }
   space <- structure(
     description,
     class = c(paste0("gym_space_", tolower(description$name)), "gym_space")
@@ -29,7 +32,7 @@ space_text <- function(space) UseMethod("space_text")
 
 #' @export
 format.gym_space <- function(x, ..., width = 100L) {
-  text <- space_text(x)
+  text <- shown_line(space_text(x), .Machine$integer.max)
   if (nchar(text) > width) {
     text <- paste0(substr(text, 1L, width - 3L), "...")
   }

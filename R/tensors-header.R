@@ -111,6 +111,7 @@ abort_tensors <- function(problem) {
   gym_abort(
     paste0("The tensors that came cannot be read: ", problem, "."),
     class = "gym_error_connection",
+    problem = problem,
     call = NULL
   )
 }

@@ -37,8 +37,10 @@ step_lanes <- function(x, instance, action, fields, lanes, call) {
   answer <- send_action(
     x, instance, actions, action, write_lanes(single, action, n), fields, call
   )
-  result <- numbers_by_lane(answer)
-  info <- info_by_lane(answer$info, n)
+  result <- read_values(numbers_by_lane(answer), "Its `reward`")
+  check_results(result, n)
+  check_info(answer)
+  info <- read_values(info_by_lane(answer$info, n), "Its `info`")
   if (length(answer$final_lanes)) {
     info$final_obs <- final_observations(instance, answer, n)
   }
@@ -62,7 +64,9 @@ numbers_by_lane <- function(answer) {
 
 # A list: the last observation of each lane that ended, NULL for the others.
 final_observations <- function(instance, answer, n) {
-  ended <- unlist(answer$final_lanes) + 1L
+  ended <- unlist(answer$final_lanes)
+  check_final_lanes(ended, n)
+  ended <- ended + 1L
   space <- instance$single_observation_space
   values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
   final <- vector("list", n)
@@ -76,6 +80,7 @@ decode_sample <- function(instance, json) {
   if (is.null(instance$num_envs)) {
     decode_value(single, json)
   } else {
+    check_list(json, instance$num_envs, "all lanes")
     lanes_from(single, lapply(json, decode_value, space = single))
   }
 }

@@ -84,6 +84,9 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
 # A browser has no token: where the server asks for one, the link holds a key in its place.
 watch_key <- function(x, instance, call) {
   key <- post_answer(x, paste0(instance$route, "watch/key/"), call = call)$key
+  if (!is.null(key) && !(rlang::is_string(key) && grepl("^[A-Za-z0-9_-]{1,200}$", key))) {
+    refuse_field(key, "key", "a string of letters and digits")
+  }
   if (!is.null(key)) paste0("?key=", key)
 }
 

@@ -8,6 +8,9 @@ integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint3
 whole_from_json <- function(json) {
   numbers <- unlist(json, use.names = FALSE)
   if (is.character(numbers)) {
+    if (!all(grepl("^-?[0-9]+$", numbers))) {
+      abort_answer(paste(describe_value(numbers), "is no whole number"))
+    }
     return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
   }
   if (is.double(numbers)) {

@@ -45,9 +45,7 @@ class Part(NamedTuple):
 def python(name: str, *arguments: object) -> Part:
     """Return a part that is a script in Python."""
     script = SOAK / f"{name}.py"
-    return Part(
-        [sys.executable, str(script), *map(str, arguments)], is_here=script.exists()
-    )
+    return Part([sys.executable, str(script), *map(str, arguments)], is_here=script.exists())
 
 
 def r(name: str, *arguments: object) -> Part:
@@ -105,6 +103,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "memory": python("guests", "memory", 2 if quick else 20),
         "loops": python("guests", "loops", 1 if quick else 4),
         "processes": python("guests", "processes", 1 if quick else 5),
+        "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }
@@ -147,17 +146,13 @@ def main() -> int:
     known = parts(asked.quick, asked.seconds)
     unknown = set(asked.parts) - set(known)
     if unknown:
-        options.error(
-            f"no such parts: {', '.join(unknown)}; there are {', '.join(known)}"
-        )
+        options.error(f"no such parts: {', '.join(unknown)}; there are {', '.join(known)}")
     rows = []
     for name in asked.parts or known:
         print(f"\n######## {name}", flush=True)
         began = time.monotonic()
         outcome, figures = run(name, known[name])
-        rows.append(
-            (name, outcome, f"{time.monotonic() - began:.0f} s", "; ".join(figures))
-        )
+        rows.append((name, outcome, f"{time.monotonic() - began:.0f} s", "; ".join(figures)))
     print("\n| part | outcome | took | figures |\n|---|---|---:|---|")
     for row in rows:
         print(f"| {' | '.join(row)} |")

@@ -69,6 +69,35 @@ local_stalling <- function(how, frame = parent.frame()) {
   paste0("http://127.0.0.1:", port)
 }
 
+# The address of a server that means ill; see bad_server.py.
+local_bad_server <- function(..., frame = parent.frame()) {
+  python <- working_python()
+  process <- processx::process$new(
+    python, c(test_path("bad_server.py"), ...), stdin = "|", stdout = "|", stderr = NULL
+  )
+  withr::defer(process$kill(), envir = frame)
+  port <- character()
+  while (!length(port) && process$is_alive()) {
+    process$poll_io(1000)
+    port <- process$read_output_lines()
+  }
+  paste0("http://127.0.0.1:", port)
+}
+
+# A client of a server that answers what it is told, by path; `say()` on the client tells more.
+local_canned_server <- function(answers = list(), frame = parent.frame()) {
+  file <- withr::local_tempfile(.local_envir = frame)
+  writeLines(jsonlite::toJSON(answers, auto_unbox = TRUE), file)
+  client <- create_GymClient(local_bad_server("canned", file, frame = frame), timeout = 10)
+  client$file <- file
+  client
+}
+
+say <- function(client, ...) {
+  answers <- utils::modifyList(jsonlite::read_json(client$file), list(...))
+  writeLines(jsonlite::toJSON(answers, auto_unbox = TRUE), client$file)
+}
+
 # A client whose connections to `server` are cut; see cutting_proxy.py.
 local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
   proxy <- processx::process$new(

@@ -85,7 +85,5 @@ def versions() -> dict:
 
 for line in sys.stdin:
     command, *arguments = line.split()
-    answer = {"versions": versions, "single": single, "lanes": lanes}[command](
-        *arguments
-    )
+    answer = {"versions": versions, "single": single, "lanes": lanes}[command](*arguments)
     print(json.dumps(answer), flush=True)

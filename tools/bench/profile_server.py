@@ -116,9 +116,7 @@ def echo(pause: str) -> float:
         "c.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)\n"
         f"while c.recv(65536): c.sendall(b'x' * {len(answer)})"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     other = _connect(f"http://127.0.0.1:{process.stdout.readline().strip()}")
 
     def exchange(_: int) -> None:
@@ -144,9 +142,7 @@ def application(pause: str) -> dict[str, float]:
 
     return {
         "whole": timed(
-            lambda action: _post("step/", requests(action)),
-            sleep,
-            lambda: _post("reset/"),
+            lambda action: _post("step/", requests(action)), sleep, lambda: _post("reset/")
         ),
         "loads": timed(lambda _: wire.loads(body), sleep),
         "answer": timed(lambda _: wire.answer(answer, None), sleep),

@@ -63,9 +63,7 @@ def beside(what: str, times: int) -> bool:
     time.sleep(5)
     before = server.usage()
     print(f"{what} before: {bystander.figures()[0]}; {before}", flush=True)
-    attack = subprocess.Popen(
-        [sys.executable, __file__, what, str(server.port), str(times)]
-    )
+    attack = subprocess.Popen([sys.executable, __file__, what, str(server.port), str(times)])
     most = before
     while attack.poll() is None:
         most = max(most, server.usage(), key=lambda usage: usage["MB"])
@@ -77,9 +75,7 @@ def beside(what: str, times: int) -> bool:
     print(f"{what} after: {bystander.figures()[0]}; {after}", flush=True)
     bystander.stop()
     server.stop()
-    print(
-        f"bodies: {what}: {said}, {before['MB']} MB, {most['MB']} MB, {after['MB']} MB"
-    )
+    print(f"bodies: {what}: {said}, {before['MB']} MB, {most['MB']} MB, {after['MB']} MB")
     return failed == 0 and slowest < 5 and after["MB"] < before["MB"] + 50
 
 

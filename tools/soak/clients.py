@@ -44,20 +44,13 @@ def plan(number: int, steps: int, folder: Path) -> dict:
     rng = np.random.default_rng(number)
     env = gymnasium.make(kind["env_id"])
     box = isinstance(env.action_space, gymnasium.spaces.Box)
-    actions = (
-        rng.uniform(-2, 2, (steps, lanes))
-        if box
-        else rng.integers(0, 2, (steps, lanes))
-    )
+    actions = rng.uniform(-2, 2, (steps, lanes)) if box else rng.integers(0, 2, (steps, lanes))
     # As the server has them, which rounds to the action space's dtype.
     actions = actions.astype(np.float32 if box else np.int64).astype(np.float64)
     env.close()
     actions.tofile(folder / f"{number}.actions")
     told = {**kind, "lanes": lanes, "box": box, "seed": 1000 + number, "steps": steps}
-    told |= {
-        "actions": str(folder / f"{number}.actions"),
-        "seen": str(folder / f"{number}.seen"),
-    }
+    told |= {"actions": str(folder / f"{number}.actions"), "seen": str(folder / f"{number}.seen")}
     (folder / f"{number}.json").write_text(json.dumps(told))
     return told
 
@@ -70,9 +63,7 @@ def play_here(told: dict) -> np.ndarray:
         # As the server chooses: the environment's own class where it has one.
         own = gymnasium.spec(told["env_id"]).vector_entry_point is not None
         mode = "vector_entry_point" if own else "sync"
-        env = gymnasium.make_vec(
-            told["env_id"], num_envs=lanes, vectorization_mode=mode
-        )
+        env = gymnasium.make_vec(told["env_id"], num_envs=lanes, vectorization_mode=mode)
     else:
         env = gymnasium.make(told["env_id"])
     seen = []
@@ -101,17 +92,13 @@ def play_there(port: int, told: dict) -> None:
     if "num_envs" in told:
         client.post(f"{url}/reset/", seed=told["seed"])
         for row in np.fromfile(told["actions"]).reshape(-1, lanes):
-            action = (
-                [[number] for number in row] if box else [int(number) for number in row]
-            )
+            action = [[number] for number in row] if box else [int(number) for number in row]
             answer = client.post_for_tensors(f"{url}/step/", action=action)
             seen += [_numbers(*answer[name]) for name in SEEN]
     else:
         client.post(f"{url}/reset/", seed=told["seed"])
         for (number,) in np.fromfile(told["actions"]).reshape(-1, 1):
-            answer = client.post(
-                f"{url}/step/", action=[number] if box else int(number)
-            )
+            answer = client.post(f"{url}/step/", action=[number] if box else int(number))
             seen += [answer[name] for name in SEEN]
             if answer["done"]:
                 seen.append(client.post(f"{url}/reset/")["observation"])
@@ -133,13 +120,7 @@ def start(number: int, port: int, folder: Path) -> subprocess.Popen:
     if number % 2:
         command = [sys.executable, __file__, "play", str(port), str(told)]
     else:
-        command = [
-            "Rscript",
-            "--no-init-file",
-            str(HERE / "clients.R"),
-            str(port),
-            str(told),
-        ]
+        command = ["Rscript", "--no-init-file", str(HERE / "clients.R"), str(port), str(told)]
     return subprocess.Popen(command)
 
 
@@ -147,9 +128,7 @@ def main(clients: int, steps: int) -> int:
     """Play and compare; return the exit status."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        plans = [
-            plan(number, -(-steps // clients), folder) for number in range(clients)
-        ]
+        plans = [plan(number, -(-steps // clients), folder) for number in range(clients)]
         server = ServerProcess()
         began = time.monotonic()
         players = [start(number, server.port, folder) for number in range(clients)]

@@ -25,8 +25,7 @@ MOST_PROCESSES = 128
 MOST_MB = 4096
 
 STACKS = [
-    {"name": "FrameStackObservation", "kwargs": {"stack_size": size}}
-    for size in (1000, 1000, 40)
+    {"name": "FrameStackObservation", "kwargs": {"stack_size": size}} for size in (1000, 1000, 40)
 ]
 REPEATS = [{"name": "RepeatAction", "kwargs": {"num_repeats": 10**15}}]
 ENDLESS = {"max_episode_steps": 10**15}
@@ -129,9 +128,7 @@ def main(name: str, rounds: int) -> int:
 
     def gone() -> bool:
         now = server.usage()
-        most.update(
-            {what: max(number, most.get(what, 0)) for what, number in now.items()}
-        )
+        most.update({what: max(number, most.get(what, 0)) for what, number in now.items()})
         return not any(guest.is_alive() for guest in guests)
 
     for guest in guests:
@@ -166,9 +163,7 @@ def told(seconds: list[float]) -> str:
     """Return the median and the worst of some seconds in words."""
     if not seconds:
         return "none"
-    return (
-        f"{1000 * statistics.median(seconds):.1f} (worst {1000 * max(seconds):.0f}) ms"
-    )
+    return f"{1000 * statistics.median(seconds):.1f} (worst {1000 * max(seconds):.0f}) ms"
 
 
 def problems(held: dict[str, dict[str, int]]) -> list[bool]:
@@ -177,8 +172,7 @@ def problems(held: dict[str, dict[str, int]]) -> list[bool]:
     return [
         # The server, its helpers, and what is granted; each process has memory of its own.
         most["processes"] > before["processes"] + MOST_PROCESSES + 4,
-        most["MB"]
-        > before["MB"] + MOST_MB + 40 * (most["processes"] - before["processes"]),
+        most["MB"] > before["MB"] + MOST_MB + 40 * (most["processes"] - before["processes"]),
         after["processes"] > before["processes"] + 2,
         after["threads"] > before["threads"] + 8,
         after["files"] > before["files"] + 32,

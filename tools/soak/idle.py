@@ -38,14 +38,8 @@ def main(number: int) -> int:
             one.close()
         _wait_until(lambda was=before["threads"]: server.usage()["threads"] <= was + 3)
         after = server.usage()
-        print(
-            f"{what} connections: before {before}, during {during}, after {after}",
-            flush=True,
-        )
-        if (
-            after["threads"] > before["threads"] + 3
-            or after["files"] > before["files"] + 3
-        ):
+        print(f"{what} connections: before {before}, during {during}, after {after}", flush=True)
+        if after["threads"] > before["threads"] + 3 or after["files"] > before["files"] + 3:
             slowest[what] = float("inf")
     server.stop()
     figures = ", ".join(

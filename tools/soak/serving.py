@@ -23,14 +23,7 @@ class ServerProcess:
         """Start it, with more environment variables, and wait until it takes connections."""
         self.process = subprocess.Popen(
             [
-                *(
-                    sys.executable,
-                    "-m",
-                    "gym_server",
-                    "--port",
-                    "0",
-                    "--stop-on-stdin-eof",
-                ),
+                *(sys.executable, "-m", "gym_server", "--port", "0", "--stop-on-stdin-eof"),
                 *("--allow-module", "faulty_envs", *arguments),
                 # For a soak of another kind: GYM_SOAK_SERVER="--isolate all".
                 *shlex.split(os.environ.get("GYM_SOAK_SERVER", "")),
@@ -113,13 +106,9 @@ class RefusedError(Exception):
 class Client:
     """One kept connection; calls that change something are numbered."""
 
-    def __init__(
-        self, port: int, timeout: float = 60, token: str | None = None
-    ) -> None:
+    def __init__(self, port: int, timeout: float = 60, token: str | None = None) -> None:
         """Connect at the first call."""
-        self._connection = http.client.HTTPConnection(
-            "127.0.0.1", port, timeout=timeout
-        )
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=timeout)
         self._token = {} if token is None else {"Authorization": f"Bearer {token}"}
         self._key, self._number = uuid.uuid4().hex, 0
 
@@ -144,9 +133,7 @@ class Client:
         accept = {"Accept": "application/x-safetensors"}
         return _tensors(self._call("POST", path, json.dumps(fields), accept))
 
-    def _call(
-        self, method: str, path: str, body: str | None, headers: dict
-    ) -> dict | bytes:
+    def _call(self, method: str, path: str, body: str | None, headers: dict) -> dict | bytes:
         self._connection.request(method, path, body, {**self._token, **headers})
         answer = self._connection.getresponse()
         data = answer.read()
@@ -157,9 +144,7 @@ class Client:
         if is_json and body is not None and "request" in content:
             expected = {"key": self._key, "number": self._number}
             if content["request"] != expected:
-                raise AssertionError(
-                    f"the answer to {content['request']} came to {expected}"
-                )
+                raise AssertionError(f"the answer to {content['request']} came to {expected}")
         return content
 
 

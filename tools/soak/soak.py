@@ -125,11 +125,7 @@ class Slot:
 
     def end(self) -> None:
         """Wait for the last one."""
-        if (
-            self.process is not None
-            and self.process.wait() != 0
-            and not self.is_to_be_killed
-        ):
+        if self.process is not None and self.process.wait() != 0 and not self.is_to_be_killed:
             self.failed += 1
 
 
@@ -140,17 +136,11 @@ def main(seconds: float) -> int:
     # What environments raise here, they raise on purpose.
     server = ServerProcess("--log-level", "error", *options)
     watcher = Client(server.port)
-    slots = [
-        Slot(server.port, number < 2, random.Random(number))
-        for number in range(AT_ONCE)
-    ]
+    slots = [Slot(server.port, number < 2, random.Random(number)) for number in range(AT_ONCE)]
     held = {}
 
     def note(when: str) -> None:
-        held[when] = {
-            **server.usage(),
-            "environments": watcher.get("/v1/health/")["instances"],
-        }
+        held[when] = {**server.usage(), "environments": watcher.get("/v1/health/")["instances"]}
         words = ", ".join(f"{what} {number}" for what, number in held[when].items())
         print(f"{when:>8}: {words}", flush=True)
 
@@ -175,8 +165,7 @@ def main(seconds: float) -> int:
     note("end")
     status = server.stop()
     lives, killed, failed = (
-        sum(getattr(slot, what) for slot in slots)
-        for what in ("lives", "killed", "failed")
+        sum(getattr(slot, what) for slot in slots) for what in ("lives", "killed", "failed")
     )
     start, end = held["start"], held["end"]
     warm = held[f"{seconds / 360:.1f} min"]

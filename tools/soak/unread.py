@@ -49,9 +49,7 @@ def crowd(port: int, source: str, what: str, number: int, seconds: float) -> Non
         for descriptor, _ in poll.poll(0):
             poll.unregister(descriptor)
             connections.pop(descriptor).close()
-        while len(connections) < number and opened < MOST_A_SECOND * (
-            time.monotonic() - began
-        ):
+        while len(connections) < number and opened < MOST_A_SECOND * (time.monotonic() - began):
             one = _ask(port, source, request)
             connections[one.fileno()] = one
             poll.register(one.fileno(), select.POLLHUP | select.POLLERR)
@@ -76,18 +74,14 @@ def _ask(port: int, source: str, request: bytes) -> socket.socket:
     return one
 
 
-def beside(
-    what: str, source: str, token: str | None, number: int, seconds: float
-) -> bool:
+def beside(what: str, source: str, token: str | None, number: int, seconds: float) -> bool:
     """Measure another client before, during and after; return whether it got its answers."""
     asked = "observations" if token is None else "files"
     server = ServerProcess(**({"GYM_SERVER_TOKEN": token} if token else {}))
     bystander = Bystander(server.port, token)
     time.sleep(5)
     said, _, _ = bystander.figures()
-    print(
-        f"{what} before: {said}; {server.usage()}, {_socket_megabytes()} MB in sockets"
-    )
+    print(f"{what} before: {said}; {server.usage()}, {_socket_megabytes()} MB in sockets")
     told = (server.port, source, asked, number, seconds)
     attack = subprocess.Popen([sys.executable, __file__, "crowd", *map(str, told)])
     time.sleep(seconds - 2)
@@ -99,9 +93,7 @@ def beside(
     bystander.figures()
     time.sleep(5)
     after, _, _ = bystander.figures()
-    print(
-        f"{what} after: {after}; {server.usage()}, {_socket_megabytes()} MB in sockets"
-    )
+    print(f"{what} after: {after}; {server.usage()}, {_socket_megabytes()} MB in sockets")
     bystander.stop()
     server.stop()
     print(f"unread: {what}: {said}, {usage['MB']} MB, {usage['threads']} threads")

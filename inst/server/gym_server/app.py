@@ -21,7 +21,7 @@ from gym_server import (
 )
 from gym_server.allowed_paths import AllowedPaths
 from gym_server.errors import GymServerError, answer_to, shutdown_disabled
-from gym_server.exactly_once import ExactlyOnce, RequestId
+from gym_server.exactly_once import Done, ExactlyOnce, RequestId
 from gym_server.frames import RenderThread
 from gym_server.guard import Access, Guard
 from gym_server.instances import Instances
@@ -106,7 +106,7 @@ class GymApp(Flask):
             Watchers(config.limits.max_watchers),
             watch_keys if config.access.token is not None else None,
         )
-        exactly_once: ExactlyOnce[Answer] = ExactlyOnce(size=_kept_bytes)
+        exactly_once: ExactlyOnce[Answer] = ExactlyOnce(self._instances.lives, _kept_bytes)
         self._exactly_once = exactly_once
         self._hot_handlers: dict[str, _Handler] = {}
         for route in ROUTES:
@@ -221,7 +221,9 @@ class _Handler:
         wants_tensors = route.tensors and _prefers_tensors(request.accept, route.content_type)
         request_id = wire.read(body, (wire.REQUEST,))["request"] if route.once else None
 
-        def perform() -> Answer:
+        instance_id = request.variables.get("instance_id")
+
+        def perform() -> Done:
             try:
                 fields = wire.read(body, route.fields)
                 call = Call(
@@ -233,16 +235,19 @@ class _Handler:
                     request.path,
                     request.accept,
                 )
-                return wire.answer(route.handler(call), request_id)
+                result = route.handler(call)
+                answer = wire.answer(result, request_id)
+                return Done(answer, True, instance_id or _made(result))
             except BaseException as error:
                 # What an environment raises must not pass by the answer that is stored.
-                return _failure(error, request_id)
+                did_nothing = isinstance(error, GymServerError) and error.did_nothing
+                return Done(_failure(error, request_id), not did_nothing, instance_id)
 
         if request_id is None:
-            return perform()
+            return perform().answer
         content = (request.path, _fingerprint(request.body), sends_tensors, wants_tensors)
         try:
-            return self._exactly_once.answer(request_id, content, perform)
+            return self._exactly_once.answer(request_id, instance_id, content, perform)
         except Exception as error:
             return _failure(error, request_id)
 
@@ -252,9 +257,14 @@ def _fingerprint(body: bytes) -> bytes:
     return body if len(body) <= _KEPT_BYTES else blake2b(body).digest()
 
 
-def _kept_bytes(content: tuple, answer: Answer) -> int:
+def _made(result: object) -> str | None:
+    """Return the instance that a route without one made."""
+    return result.get("instance_id") if isinstance(result, dict) else None
+
+
+def _kept_bytes(content: tuple | None, answer: Answer | None) -> int:
     """Tell how much is kept of a request, as ``_Handler`` describes it, and of its answer."""
-    return len(content[1]) + len(answer.body)
+    return 0 if content is None or answer is None else len(content[1]) + len(answer.body)
 
 
 def _prefers_tensors(accept: str, content_type: str) -> bool:

@@ -24,6 +24,7 @@ _STATUS = {
     "upload_closed": 410,
     "body_too_large": 413,
     "too_many_instances": 429,
+    "too_many_keys": 429,
     "too_many_lanes": 429,
     "too_many_processes": 429,
     "too_many_watchers": 429,
@@ -37,10 +38,13 @@ _STATUS = {
 }
 
 _HEADERS = {
-    "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
     "busy_receiving": (("Retry-After", "5"),),
+    "too_many_keys": (("Retry-After", "60"),),
+    "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
 }
 
+# Beside all of 500 and more, which say that something broke half-way.
+_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory"})
 
 # Where the routes are described for people.  The classic R client shows no message without it.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
@@ -72,6 +76,11 @@ class GymServerError(Exception):
     def status(self) -> int:
         """The HTTP status of the answer."""
         return _STATUS.get(self.code, 400)
+
+    @property
+    def did_nothing(self) -> bool:
+        """Whether it was raised before anything moved."""
+        return self.status < 500 and self.code not in _AFTER_SOMETHING_WAS_DONE
 
     def again(self) -> GymServerError:
         """Return a copy: one that is raised over and over keeps where each time."""

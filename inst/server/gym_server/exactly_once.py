@@ -3,6 +3,21 @@
 libcurl silently sends a POST again when a kept-alive connection broke before an answer came.
 A step must not be taken twice for that, so a client may put a key and a growing number into
 its requests; a repetition gets the stored answer.
+
+What is kept can be exhausted by nobody but the one who uses an instance, and nobody can make it
+be forgotten for another:
+
+- A key belongs to the instance that it moves, and numbers grow for each instance by itself. Who
+  sends a huge number under a key that he guessed has to send it to the instance of that key, and
+  he could as well close it. Creations have no order at all: each key and number is one of them.
+- A call that was refused before anything moved leaves nothing behind.
+- As long as an instance lives, so does what is known of the last call on it and of its creation.
+  Other keys of the same instance are known for a quarter of an hour, and a new one is refused
+  where there are very many of them.
+- What is known of an instance that is gone may be dropped at any time: a repetition could do
+  nothing any more.
+- Where the answers of all hold too much memory the largest ones go, those of last calls last.
+  What remains is that the call was done: its repetition is refused and does nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +25,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Hashable
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from gym_server.errors import GymServerError
 
@@ -24,79 +39,108 @@ class RequestId(NamedTuple):
     number: int
 
 
-class _Latest(Generic[AnswerT]):
-    """The newest request of one key, and its answer."""
+class Done(NamedTuple):
+    """What came of a request.
 
-    def __init__(self) -> None:
+    Attributes:
+        answer: what the client gets.
+        did_something: whether to do it again could make a difference.
+        instance_id: the instance that it moved or made; None where there is none.
+    """
+
+    answer: Any
+    did_something: bool = True
+    instance_id: str | None = None
+
+
+class _Latest(Generic[AnswerT]):
+    """The newest request of one key to one instance, or a creation, and its answer."""
+
+    def __init__(self, instance_id: str | None, name: Hashable) -> None:
         self.lock = threading.Lock()
+        # Where it is kept; a creation has no instance there.
+        self.place = instance_id, name
+        self.is_dropped = False
         # What the thread that has the lock is doing. Whoever takes the entry out, which only
         # one thread can, stores the answer and releases the lock.
         self.doing: dict[int, tuple[RequestId, Hashable]] = {}
+        self.instance_id = instance_id
         self.number = -1
         self.content: Hashable = None
+        # None also where it took too much memory.
         self.answer: AnswerT | None = None
-        self.used = time.monotonic()
+        self.stored = 0.0
 
 
 class ExactlyOnce(Generic[AnswerT]):
-    """The last answer of each key."""
+    """The last answer of each key to each instance."""
 
     def __init__(
         self,
-        forget_after: float = 15 * 60,
-        most: int = 10_000,
+        lives: Callable[[str], bool],
         size: Callable[[Hashable, AnswerT], int] = lambda content, answer: 0,
+        forget_after: float = 15 * 60,
+        most_keys: int = 64,
+        most_gone: int = 10_000,
         most_bytes: int = 2**29,
     ) -> None:
         """Start with no keys.
 
         Args:
-            forget_after: seconds of idleness after which a key is dropped by ``forget()``, and
-                when another comes.
-            most: how many keys are kept; the one that was used last goes last.
+            lives: tells whether there is an instance of this id.
             size: tells how many bytes are kept of a request and its answer.
-            most_bytes: to how many ``forget()`` brings them down.
+            forget_after: after how many seconds ``forget()`` drops what may be dropped.
+            most_keys: how many keys an instance takes in that time.
+            most_gone: to how many ``forget()`` brings down those of instances that are gone.
+            most_bytes: to how many it brings the answers of all down.
         """
-        self._forget_after = forget_after
-        self._most = most
+        self._lives = lives
         self._size = size
+        self._forget_after = forget_after
+        self._most_keys = most_keys
+        self._most_gone = most_gone
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
-        self._keys: dict[str, _Latest[AnswerT]] = {}
+        # By the instance; there by the key. Creations, which have none yet, by key and number.
+        self._calls: dict[str | None, dict[Hashable, _Latest[AnswerT]]] = {}
 
     def answer(
-        self, request_id: RequestId, content: Hashable, act: Callable[[], AnswerT]
+        self,
+        request_id: RequestId,
+        instance_id: str | None,
+        content: Hashable,
+        act: Callable[[], Done],
     ) -> AnswerT:
         """Do what a request asks, or return the answer that it got before.
 
         Args:
             request_id: the key and number that the client gave it.
+            instance_id: the instance that it is about; None for a creation.
             content: what the request asks; a repetition has the same.
-            act: does it; called at most once per number, must not raise.
+            act: does it; called at most once per number unless nothing came of it, must not
+                raise.
 
         Raises:
-            GymServerError: ``request_conflict`` when the number was used for something else
-                or lies before the newest.
+            GymServerError: ``request_conflict`` when the number was used for something else,
+                lies before the newest, or its answer is not kept any more; ``too_many_keys``.
         """
-        latest = self._latest(request_id.key)
         # Held while the environment moves: a repetition that arrives meanwhile waits for the
         # answer of the first.
-        latest.lock.acquire()
+        latest = self._acquire(request_id, instance_id)
         thread = threading.get_ident()
         latest.doing[thread] = request_id, content
         try:
-            if request_id.number < latest.number:
-                raise _conflict(request_id, f"came after number {latest.number}")
-            if request_id.number == latest.number:
-                if content != latest.content:
-                    raise _conflict(request_id, "was already used for another request")
-                return latest.answer  # type: ignore[return-value]
-            answer = act()
-            if latest.doing.pop(thread, None) is not None:
-                self._store(latest, request_id, content, answer)
-            return answer
+            if request_id.number <= latest.number:
+                return _repeat(latest, request_id, content)
+            done = act()
+            if done.did_something and latest.doing.pop(thread, None) is not None:
+                latest.instance_id = done.instance_id
+                self._store(latest, request_id, content, done.answer)
+            return done.answer
         finally:
             if latest.doing.pop(thread, None) is not None:
+                if latest.number < 0:
+                    self._drop(latest)
                 latest.lock.release()
 
     def give_up(self, thread: int, refuse: Callable[[RequestId], AnswerT]) -> AnswerT | None:
@@ -109,9 +153,7 @@ class ExactlyOnce(Generic[AnswerT]):
         Returns:
             The answer; None when the thread does nothing that is numbered.
         """
-        with self._lock:
-            keys = list(self._keys.values())
-        for latest in keys:
+        for latest in self._all():
             doing = latest.doing.pop(thread, None)
             if doing is not None:
                 request_id, content = doing
@@ -120,61 +162,124 @@ class ExactlyOnce(Generic[AnswerT]):
                 return answer
         return None
 
+    def _acquire(self, request_id: RequestId, instance_id: str | None) -> _Latest[AnswerT]:
+        """Return what is known of a key, with its lock."""
+        name = request_id if instance_id is None else request_id.key
+        while True:
+            with self._lock:
+                calls = self._calls.get(instance_id)
+                if calls is None:
+                    calls = self._calls[instance_id] = {}
+                latest = calls.get(name)
+                if latest is None:
+                    if instance_id is not None and len(calls) >= self._most_keys:
+                        raise _too_many_keys(instance_id, self._most_keys, self._forget_after)
+                    latest = calls[name] = _Latest(instance_id, name)
+            latest.lock.acquire()
+            if not latest.is_dropped:
+                return latest
+            # Meanwhile another thread found that nothing had come of it.
+            latest.lock.release()
+
     def _store(
         self, latest: _Latest[AnswerT], request_id: RequestId, content: Hashable, answer: AnswerT
     ) -> None:
         latest.answer = answer
         latest.number = request_id.number
         latest.content = content
-        latest.used = time.monotonic()
+        latest.stored = time.monotonic()
         latest.lock.release()
 
-    def _latest(self, key: str) -> _Latest[AnswerT]:
-        now = time.monotonic()
+    def _drop(self, latest: _Latest[AnswerT]) -> None:
+        """Know nothing any more; whoever calls it has the lock."""
+        latest.is_dropped = True
+        instance_id, name = latest.place
         with self._lock:
-            latest = self._keys.get(key)
-            if latest is None:
-                self._forget_before(now - self._forget_after)
-                if len(self._keys) >= self._most:
-                    self._forget_oldest()
-                latest = self._keys[key] = _Latest()
-            latest.used = now
-            return latest
+            calls = self._calls[instance_id]
+            del calls[name]
+            if not calls:
+                del self._calls[instance_id]
+
+    def _all(self) -> list[_Latest[AnswerT]]:
+        with self._lock:
+            return [latest for calls in self._calls.values() for latest in calls.values()]
 
     def forget(self) -> None:
-        """Drop the keys that have been idle for so long that nothing is repeated any more.
-
-        And more, the one that was used last goes last, where all together hold too much.
-        """
-        with self._lock:
-            self._forget_before(time.monotonic() - self._forget_after)
-            idle = self._idle()
-            sizes = [self._size(latest.content, latest.answer) for _, latest in idle]
-            excess = sum(sizes) - self._most_bytes
-            for (key, _), size in zip(idle, sizes, strict=True):
-                if excess <= 0:
-                    break
-                del self._keys[key]
-                excess -= size
-
-    def _forget_before(self, oldest: float) -> None:
-        for key, latest in list(self._keys.items()):
-            if latest.used < oldest and not latest.lock.locked():
-                del self._keys[key]
-
-    def _forget_oldest(self) -> None:
-        # A tenth at once: a look at all of them for each new one would take too long.
-        for key, _ in self._idle()[: max(1, self._most // 10)]:
-            del self._keys[key]
-
-    def _idle(self) -> list[tuple[str, _Latest[AnswerT]]]:
-        """Return the keys that have an answer, the one that was used last at the end."""
-        idle = [
-            item
-            for item in self._keys.items()
-            if not item[1].lock.locked() and item[1].answer is not None
+        """Drop what need not be known any more, and answers where they hold too much."""
+        known = [
+            _Known(latest, latest.stored, self._size(latest.content, latest.answer))
+            for latest in self._all()
+            if latest.stored
         ]
-        return sorted(idle, key=lambda item: item[1].used)
+        known.sort(key=lambda one: one.stored)
+        gone = [one for one in known if not self._is_of_living(one.latest)]
+        is_gone = set(map(id, gone))
+        # Of each instance the one that was stored last.
+        last = {one.latest.place[0]: one for one in known}
+        needed = {
+            id(one)
+            for one in known
+            if id(one) not in is_gone
+            and (one.latest.place[0] is None or last[one.latest.place[0]] is one)
+        }
+        before = time.monotonic() - self._forget_after
+        surplus = gone[: max(0, len(gone) - self._most_gone)]
+        old = [one for one in known if one.stored < before and id(one) not in needed]
+        dropped = {id(one): one for one in (*surplus, *old)}
+        for one in dropped.values():
+            one.change_unless_used(self._drop)
+        kept = [one for one in known if id(one) not in dropped]
+        excess = sum(one.size for one in kept) - self._most_bytes
+        if excess > 0:
+            kept.sort(key=lambda one: (id(one) in needed, -one.size))
+            _lighten(kept, excess)
+
+    def _is_of_living(self, latest: _Latest[AnswerT]) -> bool:
+        return latest.instance_id is not None and self._lives(latest.instance_id)
+
+
+class _Known(NamedTuple):
+    """What ``forget()`` saw of a key: when its answer was stored, and how many bytes it holds."""
+
+    latest: _Latest
+    stored: float
+    size: int
+
+    def change_unless_used(self, change: Callable[[_Latest], None]) -> None:
+        """Change it, unless it is in use at this moment or was used since."""
+        if self.latest.lock.acquire(blocking=False):
+            if self.latest.stored == self.stored:
+                change(self.latest)
+            self.latest.lock.release()
+
+
+def _lighten(kept: list[_Known], excess: int) -> None:
+    """Give up so many bytes of answers, the first ones."""
+    for one in kept:
+        if excess <= 0:
+            return
+        one.change_unless_used(_lose_answer)
+        excess -= one.size
+
+
+def _lose_answer(latest: _Latest) -> None:
+    latest.answer = latest.content = None
+
+
+def _repeat(latest: _Latest[AnswerT], request_id: RequestId, content: Hashable) -> AnswerT:
+    """Return the stored answer."""
+    if request_id.number < latest.number:
+        raise _conflict(request_id, f"came after number {latest.number}")
+    if latest.answer is None:
+        raise GymServerError(
+            "request_conflict",
+            f"Request number {request_id.number} of key '{request_id.key}' was done before, but "
+            "its answer was too large to be kept; nothing was done again",
+            "reset the environment, or ask for less at once",
+        )
+    if content != latest.content:
+        raise _conflict(request_id, "was already used for another request")
+    return latest.answer
 
 
 def _conflict(request_id: RequestId, reason: str) -> GymServerError:
@@ -182,4 +287,13 @@ def _conflict(request_id: RequestId, reason: str) -> GymServerError:
         "request_conflict",
         f"Request number {request_id.number} of key '{request_id.key}' {reason}; nothing was done",
         "number the requests of a key upwards, and give each copy of a client its own key",
+    )
+
+
+def _too_many_keys(instance_id: str, most: int, seconds: float) -> GymServerError:
+    return GymServerError(
+        "too_many_keys",
+        f"{most} keys have moved instance {instance_id} in the last {seconds / 60:g} minutes, and "
+        "it takes no more; nothing was done",
+        "use one key for all requests of a client, and number them upwards",
     )

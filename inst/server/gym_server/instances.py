@@ -208,6 +208,10 @@ class Instances:
         except KeyError:
             raise self._departed.why(instance_id) from None
 
+    def lives(self, instance_id: str) -> bool:
+        """Tell whether there is an instance of this id."""
+        return instance_id in self._instances
+
     def env_ids(self) -> dict[str, str]:
         """Return every instance's env_id by its instance_id."""
         with self._lock:

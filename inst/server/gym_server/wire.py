@@ -305,8 +305,8 @@ REQUEST_ID = Kind(
 REQUEST = Field(
     "request",
     REQUEST_ID,
-    "Names this request, so that it is done once however often it arrives: a key of the "
-    "client's own and a number that grows.",
+    "Names this request, so that it is done once however often it arrives: a key of the client's "
+    "own, a number that grows. An instance takes 64 keys in a quarter of an hour (429).",
 )
 
 

@@ -190,6 +190,12 @@ class RaisesInStep(Counting):
         return super().step(action)
 
 
+class ImportsInStep(Counting):
+    def step(self, action):
+        super().step(action)
+        raise ImportError("the pole is not installed")
+
+
 class ExitsInStep(Counting):
     def step(self, action):
         sys.exit("good bye")
@@ -515,6 +521,7 @@ for _kind in (
     RaisesInConstructor,
     RaisesInReset,
     RaisesInStep,
+    ImportsInStep,
     Rogue,
     Shifted,
     Spins,

@@ -1,3 +1,4 @@
+import io
 import json
 import re
 
@@ -105,6 +106,66 @@ def test_errors_are_stored_and_echoed_too(client, faulty):
     assert answers[0].data == answers[1].data
     assert answers[0].status_code == answers[1].status_code == 500
     assert answers[0].json["request"] == {"key": "a", "number": 1}
+
+
+def test_no_flood_of_keys_makes_a_step_be_taken_twice(app, client, faulty):
+    url = faulty("Counting")
+    client.post(f"{url}/reset/", json=once("victim", 1))
+    first = client.post(f"{url}/step/", json=once("victim", 2, action=0))
+    for number in range(10_001):
+        flood(app, "/v1/envs/0/step/", once(f"flood{number}", 1, action=0))
+        # Nor one of calls that the instance refuses.
+        flood(app, f"{url}/step/", once(f"refused{number}", 1, action=9))
+    app._exactly_once.forget()
+    assert client.post(f"{url}/step/", json=once("victim", 2, action=0)).data == first.data
+    assert client.get(url).json["steps"] == 1
+
+
+def flood(app, path, fields):
+    """Send a request without a client's detours, which would take ten times as long."""
+    body = json.dumps(fields).encode()
+    environ = {
+        "REQUEST_METHOD": "POST",
+        "PATH_INFO": path,
+        "HTTP_HOST": "127.0.0.1",
+        "CONTENT_LENGTH": str(len(body)),
+        "wsgi.input": io.BytesIO(body),
+    }
+    app.wsgi_app(environ, lambda status, headers: None)
+
+
+def test_a_guessed_key_with_a_huge_number_blocks_nobody(client, faulty):
+    url, other = faulty("Counting"), faulty("Counting")
+    client.post(f"{url}/reset/", json=once("guessed", 1))
+    client.post(f"{other}/reset/", json=once("guessed", 2**62))
+    client.post("/v1/envs/", json=once("guessed", 2**62, **CREATE))
+    client.post(f"{url}/step/", json=once("guessed", 2**62, action=9))
+    assert client.post(f"{url}/step/", json=once("guessed", 2, action=0)).status_code == 200
+    assert client.post("/v1/envs/", json=once("guessed", 3, **CREATE)).status_code == 200
+
+
+def test_new_keys_are_refused_before_known_ones_go(client, faulty):
+    url = faulty("Counting")
+    client.post(f"{url}/reset/", json=once("victim", 1))
+    first = client.post(f"{url}/step/", json=once("victim", 2, action=0))
+    for number in range(63):
+        answer = client.post(f"{url}/reset/", json=once(str(number), 1))
+        assert answer.status_code == 200
+    refusal = client.post(f"{url}/reset/", json=once("more", 1))
+    assert (refusal.status_code, refusal.json["code"]) == (429, "too_many_keys")
+    assert refusal.headers["Retry-After"] == "60"
+    assert client.post(f"{url}/step/", json=once("victim", 2, action=0)).data == first.data
+    assert client.get(url).json["steps"] == 1
+
+
+@pytest.mark.parametrize("name", ["RaisesInStep", "ImportsInStep"])
+def test_what_raised_inside_the_environment_is_not_done_again(client, faulty, name):
+    url = faulty(name)
+    client.post(f"{url}/reset/")
+    answers = [client.post(f"{url}/step/", json=once("a", 1, action=1)) for _ in range(2)]
+    assert answers[0].data == answers[1].data
+    # The number is known: with another action it is a conflict.
+    assert client.post(f"{url}/step/", json=once("a", 1, action=0)).status_code == 409
 
 
 @pytest.mark.parametrize(

@@ -3,59 +3,79 @@ import threading
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.exactly_once import ExactlyOnce, RequestId
+from gym_server.exactly_once import Done, ExactlyOnce, RequestId
 
 
 class Counter:
-    def __init__(self):
+    """Counts how often it was done, on an instance or making one."""
+
+    def __init__(self, did_something=True, instance_id=None):
         self.calls = 0
+        self.did_something, self.instance_id = did_something, instance_id
 
     def __call__(self):
         self.calls += 1
-        return self.calls
+        return Done(self.calls, self.did_something, self.instance_id)
+
+
+class Once(ExactlyOnce):
+    """One whose calls move the instance "i", if they do not say another."""
+
+    def __init__(self, living=("i",), **limits):
+        self.living = set(living)
+        super().__init__(self.living.__contains__, **limits)
+
+    def answer(self, request_id, content, act, instance_id="i"):
+        if isinstance(act, Counter) and act.instance_id is None:
+            act.instance_id = instance_id
+        return super().answer(request_id, instance_id, content, act)
 
 
 def conflict(*arguments):
+    return refused(*arguments) == "request_conflict"
+
+
+def refused(*arguments):
     with pytest.raises(GymServerError) as refusal:
-        ExactlyOnce.answer(*arguments)
-    return refusal.value.code == "request_conflict"
+        Once.answer(*arguments)
+    return refusal.value.code
 
 
 def test_a_repetition_gets_the_stored_answer():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     assert [once.answer(RequestId("a", 1), "step", act) for _ in range(3)] == [1, 1, 1]
     assert act.calls == 1
 
 
 def test_the_next_number_is_done_and_gaps_are_fine():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     assert once.answer(RequestId("a", 0), "step", act) == 1
     assert once.answer(RequestId("a", 1), "step", act) == 2
     assert once.answer(RequestId("a", 10), "step", act) == 3
 
 
 def test_another_request_under_a_used_number_is_a_conflict():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     once.answer(RequestId("a", 1), "step", act)
     assert conflict(once, RequestId("a", 1), "reset", act)
     assert act.calls == 1
 
 
 def test_a_lower_number_is_a_conflict():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     once.answer(RequestId("a", 2), "step", act)
     assert conflict(once, RequestId("a", 1), "step", act)
     assert act.calls == 1
 
 
 def test_keys_count_for_themselves():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     once.answer(RequestId("a", 5), "step", act)
     assert once.answer(RequestId("b", 1), "step", act) == 2
 
 
 def test_a_repetition_waits_for_the_first_that_still_runs():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     began, may_end = threading.Event(), threading.Event()
 
     def slow():
@@ -81,11 +101,11 @@ def test_a_repetition_waits_for_the_first_that_still_runs():
 
 
 def test_a_key_does_not_wait_for_another():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     began, may_end = threading.Event(), threading.Event()
     slow = threading.Thread(
         target=once.answer,
-        args=(RequestId("a", 1), "step", lambda: (began.set(), may_end.wait(10))),
+        args=(RequestId("a", 1), "step", lambda: Done((began.set(), may_end.wait(10)))),
     )
     slow.start()
     assert began.wait(10)
@@ -94,49 +114,127 @@ def test_a_key_does_not_wait_for_another():
     slow.join(10)
 
 
-def test_idle_keys_are_forgotten_when_another_comes():
-    once, act = ExactlyOnce(forget_after=0), Counter()
-    once.answer(RequestId("a", 1), "step", act)
-    once.answer(RequestId("b", 1), "step", act)
-    assert once.answer(RequestId("a", 1), "step", act) == 3
+def test_what_was_refused_before_anything_moved_leaves_nothing():
+    once, refuse, act = Once(), Counter(did_something=False), Counter()
+    for number in range(3):
+        assert once.answer(RequestId("a", 2**62), "step", refuse) == number + 1
+    assert not once._calls
+    assert once.answer(RequestId("a", 1), "step", act) == 1
+    once.answer(RequestId("a", 2), "step", refuse)
+    # What the key did before is still known.
+    assert once.answer(RequestId("a", 1), "step", act) == 1
+    assert act.calls == 1
+
+
+def test_a_repetition_that_waits_for_what_is_refused_is_done():
+    once, act = Once(), Counter()
+    began, may_end = threading.Event(), threading.Event()
+
+    def refuse():
+        began.set()
+        assert may_end.wait(10)
+        return Done("refused", False)
+
+    answers = []
+    threads = [
+        threading.Thread(target=lambda do=do: answers.append(once.answer(NUMBER_1, "step", do)))
+        for do in (refuse, act, act)
+    ]
+    threads[0].start()
+    assert began.wait(10)
+    for thread in threads[1:]:
+        thread.start()
+    may_end.set()
+    for thread in threads:
+        thread.join(10)
+    assert (sorted(map(str, answers)), act.calls) == (["1", "1", "refused"], 1)
+
+
+NUMBER_1 = RequestId("a", 1)
+
+
+def test_numbers_grow_for_each_instance_by_itself():
+    once, act = Once(living=["i", "j"]), Counter()
+    # Who guessed a key blocks nobody's but his own instance.
+    once.answer(RequestId("a", 2**62), "step", Counter(), "j")
+    assert once.answer(NUMBER_1, "step", act) == 1
+    assert once.answer(NUMBER_1, "step", act) == 1
+    assert act.calls == 1
+
+
+def test_creations_have_no_order():
+    once = Once(living=["i", "j"])
+    once.answer(RequestId("a", 2**62), "create", Counter(instance_id="j"), None)
+    act = Counter(instance_id="i")
+    assert [once.answer(NUMBER_1, "create", act, None) for _ in range(2)] == [1, 1]
+    assert act.calls == 1
+
+
+def test_the_last_call_on_a_living_instance_and_its_creation_are_never_forgotten():
+    once, created, stepped = Once(forget_after=0, most_gone=0), Counter(instance_id="i"), Counter()
+    once.answer(NUMBER_1, "create", created, None)
+    once.answer(NUMBER_1, "step", Counter())
+    once.answer(RequestId("b", 1), "step", stepped)
+    once.forget()
+    assert once.answer(NUMBER_1, "create", created, None) == 1
+    assert once.answer(RequestId("b", 1), "step", stepped) == 1
+    assert (created.calls, stepped.calls) == (1, 1)
+    # Another key's call before it has been idle for so long that nothing is repeated any more.
+    assert set(once._calls["i"]) == {"b"}
+
+
+def test_of_instances_that_are_gone_only_so_many_keys_are_kept():
+    once, living = Once(living=["i", "mine"], most_gone=2), Counter()
+    once.answer(NUMBER_1, "step", living, "mine")
+    for key in "abcd":
+        once.answer(RequestId(key, 1), "close", Counter())
+    once.living.remove("i")
+    once.forget()
+    assert set(once._calls["i"]) == {"c", "d"}
+    assert once.answer(NUMBER_1, "step", living, "mine") == 1
+    assert living.calls == 1
+
+
+def test_idle_keys_of_an_instance_that_is_gone_are_forgotten():
+    once = Once(forget_after=0)
+    once.answer(NUMBER_1, "create", Counter(instance_id="i"), None)
+    once.answer(NUMBER_1, "close", Counter())
+    once.living.clear()
+    once.forget()
+    assert not once._calls
+
+
+def test_an_instance_takes_only_so_many_keys_and_goes_on_with_those():
+    once, act = Once(most_keys=3), Counter()
+    for key in "abc":
+        once.answer(RequestId(key, 1), "step", act)
+    late = Counter()
+    assert refused(once, RequestId("d", 1), "step", late) == "too_many_keys"
+    assert late.calls == 0
+    assert [once.answer(RequestId(key, 1), "step", late) for key in "abc"] == [1, 2, 3]
+    assert once.answer(RequestId("a", 2), "step", act) == 4
 
 
 def test_a_key_that_is_in_use_is_not_forgotten():
-    once, act = ExactlyOnce(forget_after=0), Counter()
+    once, act = Once(forget_after=0, most_gone=0), Counter()
 
     def meanwhile():
-        once.answer(RequestId("b", 1), "step", act)
-        return "slow"
+        once.forget()
+        return Done("slow", True, "i")
 
-    once.answer(RequestId("a", 1), "step", meanwhile)
-    assert once.answer(RequestId("a", 1), "step", act) == "slow"
-
-
-def test_a_key_is_forgotten_once_it_has_been_idle():
-    once, act = ExactlyOnce(forget_after=0), Counter()
-    once.answer(RequestId("a", 1), "step", act)
-    once.forget()
-    assert once.answer(RequestId("a", 1), "step", act) == 2
-
-
-def test_only_so_many_keys_are_kept():
-    once, act = ExactlyOnce(most=20), Counter()
-    for number in range(30):
-        once.answer(RequestId(str(number), 1), "step", act)
-    assert len(once._keys) <= 20
-    # The latest are among them.
-    assert once.answer(RequestId("29", 1), "step", act) == 30
-    assert once.answer(RequestId("0", 1), "step", act) == 31
+    once.living.clear()
+    once.answer(NUMBER_1, "step", meanwhile)
+    assert once.answer(NUMBER_1, "step", act) == "slow"
 
 
 def test_what_never_comes_back_is_answered_by_another_thread():
-    once, act = ExactlyOnce(), Counter()
+    once, act = Once(), Counter()
     began, may_end = threading.Event(), threading.Event()
 
     def stuck():
         began.set()
         assert may_end.wait(10)
-        return "too late"
+        return Done("too late")
 
     thread = threading.Thread(target=once.answer, args=(RequestId("a", 1), "step", stuck))
     thread.start()
@@ -160,11 +258,20 @@ def test_what_never_comes_back_is_answered_by_another_thread():
 
 
 def test_what_all_keep_together_is_bounded():
-    once = ExactlyOnce(size=lambda content, answer: len(content) + answer, most_bytes=250)
-    for number, key in enumerate("abc"):
-        once.answer(RequestId(key, 1), "x" * 10, lambda: 90)
-        assert number < 2 or once.answer(RequestId("a", 1), "x" * 10, Counter()) == 90
+    once = Once(
+        living="ijk",
+        size=lambda content, answer: 0 if answer is None else len(content) + answer,
+        most_bytes=250,
+    )
+    once.answer(RequestId("first", 1), "", lambda: Done(80), "i")
+    for instance_id, size in zip("ijk", (90, 70, 150), strict=True):
+        done = Done(size, True, instance_id)
+        once.answer(NUMBER_1, "x" * 10, lambda done=done: done, instance_id)
     once.forget()
-    # The one that was used longest ago is done anew.
     act = Counter()
-    assert [once.answer(RequestId(key, 1), "x" * 10, act) for key in "acb"] == [90, 90, 1]
+    # The largest of the last ones had to go as well: it is not done again all the same.
+    assert [once.answer(NUMBER_1, "x" * 10, act, one) for one in "ij"] == [90, 70]
+    assert conflict(once, RequestId("first", 1), "", act, "i")
+    assert conflict(once, NUMBER_1, "x" * 10, act, "k")
+    assert act.calls == 0
+    assert once.answer(RequestId("a", 2), "step", act, "k") == 1

@@ -1,0 +1,218 @@
+# What an answer must hold. Nothing is believed of a server that sends something else.
+
+abort_answer <- function(problem, call = NULL) {
+  gym_abort(
+    c("The server's answer cannot be right.", x = paste0(problem, ".")),
+    class = "gym_error_connection", problem = problem, call = call
+  )
+}
+
+refuse_field <- function(value, name, must) {
+  abort_answer(paste0("Its `", name, "` is ", describe_value(value), ", not ", must))
+}
+
+#' Read an answer's values
+#'
+#' R's own errors, by which the many ways of being wrong show, become one that says that it was
+#' the answer, and what in it.
+#' @noRd
+read_values <- function(expr, what) {
+  # One handler, as each step pays for it.
+  tryCatch(expr, error = function(cnd) {
+    if (inherits(cnd, "gym_error_connection")) {
+      abort_answer(paste0(what, ": ", cnd$problem))
+    } else if (inherits(cnd, "gym_error")) {
+      rlang::cnd_signal(cnd)
+    }
+    abort_answer(paste0(what, " cannot be read: ", conditionMessage(cnd)))
+  })
+}
+
+is_flag <- function(x) identical(x, FALSE) || identical(x, TRUE)
+
+is_object <- function(x) is.list(x) && (!length(x) || !is.null(names(x)))
+
+string_or_null <- function(x) if (rlang::is_string(x)) x
+
+# A field that may be missing.
+check_told <- function(answer, name, is_right, must) {
+  value <- answer[[name]]
+  if (!is.null(value) && !is_right(value)) {
+    refuse_field(value, name, must)
+  }
+}
+
+# Fields --------------------------------------------------------------------------
+
+number_from <- function(x, name) {
+  if (!is_json_number(x)) {
+    refuse_field(x, name, "one number")
+  }
+  number_from_json(x)
+}
+
+# Classic servers tell only whether the episode is done.
+check_flags <- function(answer) {
+  if (!is_flag(answer$done)) {
+    refuse_field(answer$done, "done", "true or false")
+  }
+  if (!is_flag(answer$terminated) || !is_flag(answer$truncated)) {
+    check_told(answer, "terminated", is_flag, "true or false")
+    check_told(answer, "truncated", is_flag, "true or false")
+  }
+}
+
+# Most infos are empty.
+check_info <- function(answer) {
+  if (!identical(answer$info, empty_object)) {
+    check_told(answer, "info", is_object, "an object")
+  }
+}
+
+#' @param result A list of `reward`, `terminated` and `truncated`, an element for each of `n`.
+#' @noRd
+check_results <- function(result, n) {
+  if (!is.numeric(result$reward) || length(result$reward) != n) {
+    refuse_field(result$reward, "reward", paste(n, "numbers"))
+  }
+  for (name in c("terminated", "truncated")) {
+    flags <- result[[name]]
+    if (!is.logical(flags) || length(flags) != n || anyNA(flags)) {
+      refuse_field(flags, name, paste(n, "times true or false"))
+    }
+  }
+}
+
+check_final_lanes <- function(lanes, n) {
+  if (!is.null(lanes) && !(are_whole(lanes, 0, n - 1) && !anyDuplicated(lanes))) {
+    refuse_field(lanes, "final_lanes", paste("numbers from 0 to", n - 1))
+  }
+}
+
+# Ids are part of an address.
+check_instance_id <- function(id) {
+  if (!rlang::is_string(id) || !grepl("^[!-~]{1,100}$", id)) {
+    refuse_field(id, "instance_id", "a string of visible characters")
+  }
+}
+
+#' Check what is told of an instance
+#'
+#' More lanes than these no answer could hold.
+#' @noRd
+check_about <- function(about) {
+  is_lanes <- function(x) is_number(x) && are_whole(x, 1, 2^24)
+  check_told(about, "num_envs", is_lanes, "a whole number")
+  check_told(about, "max_episode_steps", is_number, "a number")
+  for (name in c("env_id", "vectorization_mode", "autoreset_mode", "render_mode")) {
+    check_told(about, name, rlang::is_string, "a string")
+  }
+}
+
+#' Take a column out of the objects that an answer lists
+#' @param is_right,must Tells whether a value is right; what it must be, in words.
+#' @param missing What stands for a value that is not there.
+#' @noRd
+listed_column <- function(listed, name, missing, is_right, must) {
+  if (!is.list(listed) || !all(vapply(listed, is_object, NA))) {
+    abort_answer("It is no list of objects")
+  }
+  vapply(listed, function(one) {
+    value <- one[[name]] %||% return(missing)
+    if (!is_right(value)) {
+      refuse_field(value, name, must)
+    }
+    if (is.character(value)) shown_line(value) else value
+  }, missing, USE.NAMES = FALSE)
+}
+
+listed_texts <- function(listed, name, missing = NA_character_) {
+  listed_column(listed, name, missing, rlang::is_string, "a string")
+}
+
+listed_flags <- function(listed, name) {
+  listed_column(listed, name, NA, is_flag, "true or false")
+}
+
+# JSON writes a whole number without a point, as an integer.
+listed_numbers <- function(listed, name) {
+  as_numbers <- lapply(listed, function(one) {
+    if (is.list(one) && is.numeric(one[[name]])) one[[name]] <- as.numeric(one[[name]])
+    if (is.list(one) && is_number_word(one[[name]])) one[[name]] <- number_from_json(one[[name]])
+    one
+  })
+  listed_column(as_numbers, name, NA_real_, function(x) is.double(x) && length(x) == 1L, "a number")
+}
+
+listed_counts <- function(listed, name) {
+  listed_column(
+    listed, name, NA_integer_, function(x) is.integer(x) && length(x) == 1L, "a whole number"
+  )
+}
+
+# Values of spaces ----------------------------------------------------------------
+
+#' Check the numbers that were read for a space
+#' @param shape Its shape, or that of several values of it.
+#' @noRd
+check_numbers <- function(values, dtype, shape) {
+  n <- prod(shape)
+  if (length(values) != n) {
+    abort_answer(paste0(
+      "A value of shape ", shape_text(shape), " has ", count_of(length(values), "number")
+    ))
+  }
+  # NaN is a number; bit64 has bits for it that mean another one.
+  missing <- !is.object(values) && anyNA(values) && any(is.na(values) & !is.nan(values))
+  if (!is.numeric(values) && !is.logical(values) || missing) {
+    abort_answer(paste("A value has something that is no", dtype %||% "number"))
+  }
+  values
+}
+
+check_tensor <- function(value, space, name) {
+  shape <- space$shape
+  if (length(value) != prod(shape) || !identical(dim(value), if (length(shape) > 1L) shape)) {
+    abort_answer(paste0(
+      "Its tensor \"", name, "\" has the shape ", shape_text(dim(value) %||% length(value)),
+      ", not ", shape_text(shape %||% integer())
+    ))
+  }
+  value
+}
+
+check_text <- function(value) {
+  if (!rlang::is_string(value)) {
+    refuse_field(value, "text", "a string")
+  }
+  value
+}
+
+check_list <- function(value, n, what) {
+  if (!is.list(value) || length(value) != n) {
+    abort_answer(paste("A value of", what, "is no list of", n))
+  }
+}
+
+# Pictures ------------------------------------------------------------------------
+
+check_frame <- function(values) {
+  shape <- dim(values)
+  if (!is.integer(values) || length(shape) != 3L || !shape[[3L]] %in% c(1L, 3L, 4L)) {
+    refuse_field(values, "frame", "a picture of height x width x 1, 3 or 4")
+  }
+  values
+}
+
+# What is unpacked later may become much larger.
+check_png <- function(file) {
+  signature <- as.raw(c(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a))
+  if (!is.raw(file) || length(file) < 24L || !identical(file[1:8], signature)) {
+    abort_answer("It is no PNG file")
+  }
+  size <- png_size(file)
+  if (anyNA(size) || any(size < 1L) || 4 * prod(size) > max_answer_bytes()) {
+    abort_answer(paste("It is a picture of", paste(size, collapse = " x "), "pixels"))
+  }
+  file
+}

@@ -1,0 +1,31 @@
+# A client of a server with one environment, two numbers to observe and two actions, whose
+# answers are what a test says: `about` are fields of what is told of it.
+local_bad_environment <- function(..., frame = parent.frame()) {
+  about <- list(
+    env_id = "Bad-v0",
+    observation_space = list(
+      name = "Box", shape = list(2L), dtype = "float64", low = list(-1, -1), high = list(1, 1)
+    ),
+    action_space = list(name = "Discrete", n = 2L)
+  )
+  given <- list(...)
+  about[names(given)] <- given
+  local_canned_server(list(
+    "/v1/envs/" = list(text = '{"instance_id":"0a1b2c3d"}'),
+    "/v1/envs/0a1b2c3d/" = list(text = jsonlite::toJSON(about, auto_unbox = TRUE)),
+    "/v1/envs/0a1b2c3d/reset/" = list(text = '{"observation":[0,1],"info":{}}'),
+    "/v1/envs/0a1b2c3d/step/" = list(text = good_step()),
+    "/v1/envs/0a1b2c3d/close/" = list(status = 200, text = "{}")
+  ), frame = frame)
+}
+
+# A step's answer; what is given replaces a field, as JSON.
+good_step <- function(...) {
+  fields <- c(
+    observation = "[0,1]", reward = "1.5", done = "false", terminated = "false",
+    truncated = "false", info = "{}"
+  )
+  given <- c(...)
+  fields[names(given)] <- given
+  json_object(fields)
+}
