@@ -14,7 +14,6 @@ connection <- function(client) {
       state$creations <- new_numbers()
       state$to_close <- character()
       state$layouts <- new.env(parent = emptyenv())
-      state$overlong <- FALSE
       state$pid <- Sys.getpid()
       state$session <- the_session
     })

@@ -7,6 +7,7 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
   attempt <- 1L
   reached <- FALSE
   state <- client$state
+  state$overlong <- FALSE
   repeat {
     response <- exchange(client, line, handle, url, request)
     if (!inherits(response, "error")) {
@@ -14,7 +15,6 @@ fetch <- function(client, line, channel, route, request, repeatable, call) {
     }
     reason <- conditionMessage(response)
     if (state$overlong) {
-      state$overlong <- FALSE
       abort_overlong(base = client$remote_base, call = call)
     }
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {

@@ -192,6 +192,8 @@ class ExactlyOnce(Generic[AnswerT]):
 
     def _drop(self, latest: _Latest[AnswerT]) -> None:
         """Know nothing any more; whoever calls it has the lock."""
+        if latest.is_dropped:
+            return
         latest.is_dropped = True
         instance_id, name = latest.place
         with self._lock:
