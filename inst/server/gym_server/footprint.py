@@ -47,8 +47,8 @@ _PART_BYTES = 512
 _COPIES = 3
 
 # A number as it is sent as JSON: an object in a list (small integers are there already), its digits
-# in a text, and again as bytes.
-_SHORT_NUMBER_BYTES, _NUMBER_BYTES = 20, 80
+# in a text, and again as bytes. And its two bounds as such objects in the space's description.
+_SHORT_NUMBER_BYTES, _NUMBER_BYTES = 44 + 16, 80 + 64
 
 
 class Budget:
