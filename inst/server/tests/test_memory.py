@@ -1,18 +1,13 @@
 """Memory goes back to the system."""
 
 import gc
-import os
 import subprocess
 import sys
-import threading
 import weakref
 
 import pytest
 
 from gym_server import memory, watchdog
-
-SIZE = 64 * 2**20
-PIECE = 2**14
 
 
 class Circle:
@@ -31,39 +26,33 @@ def test_what_refers_to_itself_is_collected():
         gc.enable()
 
 
-def resident():
-    with open("/proc/self/statm") as statm:
-        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-@pytest.mark.skipif(memory._malloc_trim is None, reason="glibc keeps what is free, others do not")
-def test_what_a_thread_has_freed_is_free_for_all():
-    kept = []
-
-    def use():
-        pieces = [bytes(PIECE) for _ in range(SIZE // PIECE)]
-        # It lies behind all that is freed.
-        kept.append(pieces[-1])
-
-    before = resident()
-    thread = threading.Thread(target=use)
-    thread.start()
-    thread.join()
-    held = resident() - before
-    memory.give_back()
-    assert held > SIZE / 2
-    assert resident() - before < SIZE / 4
-
-
-# In a process of its own, as it changes how that keeps memory.
-LARGE_BODIES = """
+# In processes of their own, where nothing was freed before.
+RESIDENT = """
 import os, threading
 from gym_server import memory
 
 def resident():
     with open("/proc/self/statm") as statm:
         return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+"""
 
+SMALL_PIECES = """
+kept = []
+
+def use():
+    pieces = [bytes(2**14) for _ in range(2**12)]
+    # It lies behind all that is freed.
+    kept.append(pieces[-1])
+
+before = resident()
+thread = threading.Thread(target=use)
+thread.start()
+thread.join()
+memory.give_back()
+print((resident() - before) // 2**20)
+"""
+
+LARGE_BODIES = """
 def receive():
     body = bytearray()
     for _ in range(2**8):
@@ -82,10 +71,11 @@ print((resident() - before) // 2**20)
 """
 
 
-@pytest.mark.skipif(memory._mallopt is None, reason="glibc keeps what is free, others do not")
-def test_what_large_bodies_have_left_does_not_stay():
+@pytest.mark.skipif(memory._malloc_trim is None, reason="glibc keeps what is free, others do not")
+@pytest.mark.parametrize("script", [SMALL_PIECES, LARGE_BODIES], ids=["small", "large"])
+def test_what_threads_have_freed_does_not_stay(script):
     told = subprocess.run(
-        [sys.executable, "-c", LARGE_BODIES], stdout=subprocess.PIPE, text=True, check=True
+        [sys.executable, "-c", RESIDENT + script], stdout=subprocess.PIPE, text=True, check=True
     )
     assert int(told.stdout) < 8
 
