@@ -212,30 +212,6 @@ step_instance <- function(x, instance, action, render, lanes = NULL, call = rlan
 
 # `json` is the action as JSON, written only if it travels so.
 send_action <- function(x, instance, space, action, json, fields, call) {
-  withCallingHandlers(
-    send_checked_action(x, instance, space, action, json, fields, call),
-    gym_error_space = function(cnd) {
-      cnd$body <- c(i = actions_text(instance$single_action_space), cnd$body)
-      rlang::cnd_signal(cnd)
-    }
-  )
-}
-
-# For those who count from 1, as R does.
-actions_text <- function(space) {
-  if (!inherits(space, "gym_space_discrete")) {
-    return(NULL)
-  }
-  bounds <- lapply(space_bounds(space), whole_text)
-  if (space$n == 1) {
-    return(paste0("The only action is ", bounds$low, "."))
-  }
-  between <- if (space$n == 2) " and " else " to "
-  counted <- if (space$start == 0) ", counted from 0"
-  paste0("Actions are ", bounds$low, between, bounds$high, counted, ".")
-}
-
-send_checked_action <- function(x, instance, space, action, json, fields, call) {
   route <- instance$step_route
   if (!instance$sends_tensors) {
     fields <- c(action = json, fields)

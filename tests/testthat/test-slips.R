@@ -11,10 +11,6 @@ test_that("an action that is none is told which there are", {
   lanes$reset()
   expect_error(lanes$step(c(0, 2, 1)), "Actions are 0 and 1, counted from 0.", fixed = TRUE,
                class = "gym_error_space")
-  expect_identical(actions_text(discrete_space(6L)), "Actions are 0 to 5, counted from 0.")
-  expect_identical(actions_text(discrete_space(2L, 3L)), "Actions are 3 and 4.")
-  expect_identical(actions_text(discrete_space(1L)), "The only action is 0.")
-  expect_null(actions_text(box_space(-1, 1)))
 })
 
 test_that("an argument of gym_make() that nearly is one is named", {

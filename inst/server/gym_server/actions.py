@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gymnasium.spaces import Space
+from gymnasium.spaces import Discrete, Space
 
 from gym_server import spaces
 from gym_server.errors import GymServerError
@@ -44,7 +44,9 @@ class ActionReader:
         try:
             return self._decode(self._taken, action, rows)
         except spaces.NotInSpace as refusal:
-            raise GymServerError("action_not_in_space", f"The action {refusal}") from None
+            raise GymServerError(
+                "action_not_in_space", f"The action {refusal}", _which_there_are(self._space)
+            ) from None
 
     def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
         """Give an environment's own failure a hint, where the action was outside of a Box."""
@@ -67,3 +69,14 @@ class ActionReader:
         if is_parts:
             return spaces.decode_lanes_tensors(space, "action", action, rows, whose)
         return spaces.decode_lanes(space, action, rows, whose)
+
+
+def _which_there_are(space: Space) -> str | None:
+    """Return the actions of a Discrete space in words, for those who count from 1."""
+    if not isinstance(space, Discrete):
+        return None
+    first, last = int(space.start), int(space.start) + int(space.n) - 1
+    if first == last:
+        return f"the only action is {first}"
+    counted = ", counted from 0" if first == 0 else ""
+    return f"actions are {first} {'and' if space.n == 2 else 'to'} {last}{counted}"

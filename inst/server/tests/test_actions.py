@@ -7,6 +7,8 @@ from faulty_envs import SPACES
 from gymnasium.spaces import Box, Dict, Discrete, Graph, MultiBinary, OneOf, Sequence, Tuple
 
 from gym_server import spaces, tensors
+from gym_server.actions import ActionReader
+from gym_server.errors import GymServerError
 from gym_server.tensors import TENSORS, Tensor
 
 # What an unclipped Gaussian policy sends, and the float32 next to a bound.
@@ -200,3 +202,20 @@ def test_the_wrapper_of_the_hint_helps(client, create):
     client.post(f"{url}/reset/", json={"seed": 1})
     observation = in_process([2.0])[0][0]
     assert step(client, url, action=[2.5]).json["observation"] == observation.tolist()
+
+
+@pytest.mark.parametrize(
+    ("space", "hint"),
+    [
+        (Discrete(2), "actions are 0 and 1, counted from 0"),
+        (Discrete(6), "actions are 0 to 5, counted from 0"),
+        (Discrete(2, start=3), "actions are 3 and 4"),
+        (Discrete(1), "the only action is 0"),
+        (Box(-1, 1), None),
+    ],
+    ids=str,
+)
+def test_a_refusal_says_which_actions_there_are(space, hint):
+    with pytest.raises(GymServerError) as caught:
+        ActionReader(space, 1).read("nonsense")
+    assert (caught.value.code, caught.value.hint) == ("action_not_in_space", hint)
