@@ -54,11 +54,10 @@ make_odd <- function(name, server) {
   gym_make(paste0("odd_environments:", name, "-v0"), client = server)
 }
 
-# The address of a server that gets stuck; see stalling_server.py.
-local_stalling <- function(how, frame = parent.frame()) {
-  python <- working_python()
+# The address of what a script of these tests serves on a free port, which it prints.
+local_python_server <- function(script, ..., frame = parent.frame()) {
   process <- processx::process$new(
-    python, c(test_path("stalling_server.py"), how), stdin = "|", stdout = "|", stderr = NULL
+    working_python(), c(test_path(script), ...), stdin = "|", stdout = "|", stderr = NULL
   )
   withr::defer(process$kill(), envir = frame)
   port <- character()
@@ -69,19 +68,14 @@ local_stalling <- function(how, frame = parent.frame()) {
   paste0("http://127.0.0.1:", port)
 }
 
+# The address of a server that gets stuck; see stalling_server.py.
+local_stalling <- function(how, frame = parent.frame()) {
+  local_python_server("stalling_server.py", how, frame = frame)
+}
+
 # The address of a server that means ill; see bad_server.py.
 local_bad_server <- function(..., frame = parent.frame()) {
-  python <- working_python()
-  process <- processx::process$new(
-    python, c(test_path("bad_server.py"), ...), stdin = "|", stdout = "|", stderr = NULL
-  )
-  withr::defer(process$kill(), envir = frame)
-  port <- character()
-  while (!length(port) && process$is_alive()) {
-    process$poll_io(1000)
-    port <- process$read_output_lines()
-  }
-  paste0("http://127.0.0.1:", port)
+  local_python_server("bad_server.py", ..., frame = frame)
 }
 
 # A client of a server that answers what it is told, by path; `say()` on the client tells more.
@@ -100,18 +94,9 @@ say <- function(client, ...) {
 
 # A client whose connections to `server` are cut; see cutting_proxy.py.
 local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
-  proxy <- processx::process$new(
-    working_python(),
-    c(test_path("cutting_proxy.py"), sub(".*:", "", server$remote_base), when, pattern, times),
-    stdin = "|", stdout = "|", stderr = NULL
-  )
-  withr::defer(proxy$kill(), envir = frame)
-  port <- character()
-  while (!length(port) && proxy$is_alive()) {
-    proxy$poll_io(1000)
-    port <- proxy$read_output_lines()
-  }
-  create_GymClient(paste0("http://127.0.0.1:", port), timeout = 10)
+  port <- sub(".*:", "", server$remote_base)
+  proxy <- local_python_server("cutting_proxy.py", port, when, pattern, times, frame = frame)
+  create_GymClient(proxy, timeout = 10)
 }
 
 # A port on which nobody listens.

@@ -1,16 +1,7 @@
 # A client of a server that has the protocol of gym-http-api and nothing more, see
 # classic_server.py.
 local_classic_client <- function(frame = parent.frame()) {
-  process <- processx::process$new(
-    working_python(), test_path("classic_server.py"), stdin = "|", stdout = "|", stderr = NULL
-  )
-  withr::defer(process$kill(), envir = frame)
-  port <- character()
-  while (!length(port) && process$is_alive()) {
-    process$poll_io(1000)
-    port <- process$read_output_lines()
-  }
-  create_GymClient(paste0("http://127.0.0.1:", port), timeout = 20)
+  create_GymClient(local_python_server("classic_server.py", frame = frame), timeout = 20)
 }
 
 test_that("the classic calls work with a server that has no others", {
