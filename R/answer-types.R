@@ -51,7 +51,7 @@ number_from <- function(x, name) {
 }
 
 # Classic servers tell only whether the episode is done.
-check_flags <- function(answer) {
+check_answer_flags <- function(answer) {
   if (!is_flag(answer$done)) {
     refuse_field(answer$done, "done", "true or false")
   }
@@ -62,7 +62,7 @@ check_flags <- function(answer) {
 }
 
 # Most infos are empty.
-check_info <- function(answer) {
+check_answer_info <- function(answer) {
   if (!identical(answer$info, empty_object)) {
     check_told(answer, "info", is_object, "an object")
   }
@@ -70,7 +70,7 @@ check_info <- function(answer) {
 
 #' @param result A list of `reward`, `terminated` and `truncated`, an element for each of `n`.
 #' @noRd
-check_results <- function(result, n) {
+check_answer_results <- function(result, n) {
   if (!is.numeric(result$reward) || length(result$reward) != n) {
     refuse_field(result$reward, "reward", paste(n, "numbers"))
   }

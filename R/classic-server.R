@@ -1,7 +1,7 @@
 # Servers that know the protocol of gym-http-api alone, as the original one does. They tell less of
 # an environment, ignore fields that they do not know, and do a repeated request a second time.
 
-# Told by the answer to a creation: a newer server echoes the request's number.
+# A newer server echoes the request's number in its answer, here that to a creation.
 note_protocol <- function(state, answer) state$classic <- is.null(answer$request)
 
 #' Describe an instance by what the classic protocol tells of it
@@ -25,7 +25,8 @@ classic_description <- function(x, instance_id, missing, call) {
   description
 }
 
-# Newer than the protocol, and by some names for what it has under one.
+# The protocol tells only that an episode is done; environments of its time say in the info where
+# a limit of steps was the reason.
 classic_flags <- function(answer) {
   done <- isTRUE(answer$done)
   answer$truncated <- done && isTRUE(answer$info[["TimeLimit.truncated"]])

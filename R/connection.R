@@ -28,7 +28,7 @@ free_line <- function(client) {
   line <- connection(client)$line
   while (line$busy) {
     if (is.null(line$inner)) {
-      line$inner <- open_line(client, fetch_aside)
+      line$inner <- open_line(client, new_numbers(), fetch_aside)
     }
     line <- line$inner
   }
@@ -37,14 +37,22 @@ free_line <- function(client) {
 
 # The key and number of the last call that must not be done twice, the body under way,
 # and the channels that were opened so far.
-open_line <- function(client, fetch = curl::curl_fetch_memory) {
-  line <- new_numbers()
+open_line <- function(client, numbers = process_numbers(client), fetch = curl::curl_fetch_memory) {
+  line <- new.env(parent = emptyenv())
+  line$numbers <- numbers
   line$fetch <- fetch
   line$busy <- FALSE
   line$body <- raw()
   line$sent <- 0L
   line$channels <- new.env(parent = emptyenv())
   line
+}
+
+# All clients of one server in one process share a key: an instance takes a limited number of
+# keys, and a script may make a client for each call.
+process_numbers <- function(client) {
+  place <- paste(client$remote_base, Sys.getpid())
+  the_session$numbers[[place]] %||% (the_session$numbers[[place]] <- new_numbers())
 }
 
 # A key, and the last number used under it.

@@ -53,8 +53,9 @@
 #'   `vectorization_mode` that cannot do what else is asked for (code `not_supported`;
 #'   the hint says what can), and when a part of the server is not installed (code
 #'   `missing_dependency`; the hint says how); `gym_error_http_429` for more lanes than
-#'   the server allows (code `too_many_lanes`) or when it has as many environments as
-#'   it allows (code `too_many_instances`); `gym_error_http_504` when making it takes
+#'   the server allows (code `too_many_lanes`), when it has as many environments or
+#'   processes as it allows (codes `too_many_instances`, `too_many_processes`), or where the
+#'   environment would take more memory than is left (code `too_much_memory`); `gym_error_http_504` when making it takes
 #'   longer than the server allows a call to take (code `call_too_long`);
 #'   `gym_error_argument`; `gym_error_connection`.
 #'

@@ -117,7 +117,8 @@ explain_unknown_argument <- function(cnd, given, call) {
   gym_abort(
     c(
       paste0("Neither `gym_make()` nor the environment has an argument `", name, "`."),
-      i = if (length(near)) paste0("Did you mean `", near, "`?")
+      i = if (length(near)) paste0("Did you mean `", near, "`?"),
+      i = if (!length(near)) "The environment's own documentation lists those that it has."
     ),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
     status = cnd$status, code = cnd$code, argument = name, call = call
@@ -129,7 +130,6 @@ gym_env <- R6Class(
   cloneable = FALSE,
   lock_class = TRUE,
   public = list(
-    client = NULL,
     instance_id = NULL,
     single_action_space = NULL,
     single_observation_space = NULL,
@@ -140,7 +140,7 @@ gym_env <- R6Class(
     initialize = function(client, instance_id) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
-      private$connected <- self$client <- client
+      private$connected <- client
       self$instance_id <- instance_id
       for (name in c("single_action_space", "single_observation_space", "num_envs",
                      "vectorization_mode", "autoreset_mode")) {
@@ -185,13 +185,14 @@ gym_env <- R6Class(
     }
   ),
   active = list(
+    client = function() private$connected,
     action_space = function() instance_space(private$instance, "action_space"),
     observation_space = function() instance_space(private$instance, "observation_space"),
     is_open = function() !private$closed
   ),
   private = list(
     instance = NULL,
-    # The client again, as `self$` costs more than `private$`.
+    # The client; each step asks for it, and `private$` costs less than `self$`.
     connected = NULL,
     pid = NULL,
     closed = FALSE,
@@ -230,6 +231,7 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
   )
 }
 
+# R6's own asks for `x$format`, which there is not.
 #' @export
 format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
 

@@ -87,6 +87,9 @@ has_own_lanes <- function(env_id, client) {
   identical(lane$vectorization_mode, "vector_entry_point")
 }
 
+# By which the server says that fewer lanes, or none, may do.
+fewer_lanes_codes <- c("not_supported", "too_many_lanes", "too_much_memory", "unsupported_space")
+
 # NULL where the server cannot make such lanes, or not that many.
 make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, client) {
   tryCatch(
@@ -95,7 +98,7 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
       autoreset_mode = autoreset_mode, client = client
     ),
     gym_error_http = function(cnd) {
-      if (!isTRUE(cnd$code %in% c("not_supported", "too_many_lanes", "unsupported_space"))) {
+      if (!isTRUE(cnd$code %in% fewer_lanes_codes)) {
         rlang::cnd_signal(cnd)
       }
     }
@@ -207,8 +210,8 @@ warn_of_own_limit <- function(max_steps, lanes, call) {
     rlang::warn(
       c(paste0("`max_steps = ", wanted, "` makes no episode longer: ", id,
                " has a limit of its own, ", count_of(own, "step"), "."),
-        i = paste0("`gym_make(\"", id, "\", max_episode_steps = ", wanted,
-                   ")` makes one with another limit.")),
+        i = paste0("`max_episode_steps = ", wanted, "` as a further argument of `gym_make()` ",
+                   "sets another limit; a TimeLimit wrapper can only lower it.")),
       class = "gym_warning_max_steps", call = call
     )
   }

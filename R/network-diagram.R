@@ -10,6 +10,7 @@
 #'   `label_y`), `layers` (data frame `x`, `label`).
 #' @noRd
 network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
+  check_weights(policy$weights, policy$sizes, "policy$weights", call)
   check_count(most, min = 3, arg = "neurons", call = call)
   check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
   layers <- length(policy$sizes)

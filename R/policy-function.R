@@ -17,7 +17,7 @@ check_takes_observations <- function(policy, arg, call) {
 #' Ask a function about one observation before the first step
 #'
 #' One that fails when a single episode is left would otherwise do so when most has been played.
-#' A single episode asks it so anyway.
+#' Where a single episode is played, the first step asks this anyway.
 #' @param observation What is observed first, one row for each of the lanes `playing`.
 #' @noRd
 ask_beforehand <- function(policy, observation, playing, lanes) {
@@ -32,8 +32,12 @@ ask_beforehand <- function(policy, observation, playing, lanes) {
       gym_abort(
         c("The policy failed when it was asked about one observation, before the first step.",
           i = asked_text(lanes$observation_space),
-          i = "There may be only one, as when all episodes but one have ended."),
-        class = "gym_error_argument", argument = "policy", value = policy, call = lanes$call,
+          i = paste("There may be only one, as when all episodes but one have ended;",
+                    "`drop = FALSE` keeps one row of a matrix a matrix.")),
+        # Those of the policy's own error stay, for whoever catches it.
+        class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
+                  "gym_error_argument"),
+        argument = "policy", value = policy, call = lanes$call,
         parent = cnd
       )
     }

@@ -94,12 +94,27 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
     )
   }
   if (!inherits(x, "gym_policy") && !is.function(x) && !has_act_method(x)) {
-    abort_argument(x, "a policy or a function of observations", arg, call)
+    abort_no_policy(x, arg, call)
   }
-  if (is.function(x)) {
+  if (is.function(x) && !has_act_method(x)) {
     check_takes_observations(x, arg, call)
   }
   invisible(x)
+}
+
+abort_no_policy <- function(x, arg, call) {
+  own <- if (is.object(x)) class(x)[[1L]]
+  gym_abort(
+    c(
+      paste0("`", arg, "` must be a policy or a function of observations, not ",
+             describe_argument(x), "."),
+      i = if (!is.null(own)) {
+        paste0("`.S3method(\"act\", \"", own, "\", f)` makes `f` the method by which objects of ",
+               "its class act.")
+      }
+    ),
+    class = "gym_error_argument", argument = arg, value = x, call = call
+  )
 }
 
 # Is there a method of `act()` for the object's own class?

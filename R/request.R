@@ -25,7 +25,7 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
   on.exit(line$busy <- FALSE)
   channel <- find_channel(client, line, channel_kind(fields, tensors, take_tensors))
   if (once && is.null(request)) {
-    request <- next_request(line)
+    request <- next_request(line$numbers)
   }
   if (!is.null(fields)) {
     load_body(line, channel, request_body(fields, request, tensors))

@@ -81,8 +81,8 @@ is_running <- function(base) {
 #'   `allow_module = c("a", "b")` names Python modules whose environments may be
 #'   made. Limits for all clients together are `max_instances` (environments, 1,000),
 #'   `max_num_envs` (lanes of one, 16,384), `max_total_lanes` (four times as many),
-#'   `max_processes` (of all, 128), `max_memory_mb` (that all may be reckoned to take, 4,096),
-#'   `max_watchers` (100), `max_body_mb` (of a request, 16), `max_call_seconds` (that a
+#'   `max_processes` (of their own that environments have, 128), `max_memory_mb` (of all
+#'   environments, estimated before they are made, 4,096), `max_watchers` (100), `max_body_mb` (of a request, 16), `max_call_seconds` (that a
 #'   call may take before its environment is given up, 300, 0 for ever) and
 #'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
 #'   0 for never). `token_file = "token"` names a file with a token of 16

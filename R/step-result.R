@@ -20,7 +20,7 @@ check_step_result <- function(out, n, call) {
   }
   absent <- setdiff(c("observation", "reward", flags), names(out))
   if (length(absent)) {
-    has <- if (length(out)) paste0("; it has `", paste(names(out), collapse = "`, `"), "`")
+    has <- if (length(names(out))) paste0("; it has `", paste(names(out), collapse = "`, `"), "`")
     problem <- paste0("What `step()` of this environment returns lacks `", absent[[1L]], "`", has)
     abort_step_result(problem, out, call)
   }

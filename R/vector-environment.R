@@ -38,8 +38,8 @@ step_lanes <- function(x, instance, action, fields, lanes, call) {
     x, instance, actions, action, write_lanes(single, action, n), fields, call
   )
   result <- read_values(numbers_by_lane(answer), "Its `reward`")
-  check_results(result, n)
-  check_info(answer)
+  check_answer_results(result, n)
+  check_answer_info(answer)
   info <- read_values(info_by_lane(answer$info, n), "Its `info`")
   if (length(answer$final_lanes)) {
     info$final_obs <- final_observations(instance, answer, n)

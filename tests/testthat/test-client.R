@@ -155,14 +155,27 @@ test_that("a client survives saveRDS() and makes calls of its own", {
   expect_length(env_reset(copies[[1]], id), 4)
   expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
   expect_equal(env_step(client, id, 0)$reward, 1)
-  keys <- vapply(c(list(client), copies), function(copy) copy$state$line$key, "")
-  expect_length(unique(keys), 3)
+  # Of one process all have one key, and no number of it twice.
+  numbers <- lapply(c(list(client), copies), function(copy) copy$state$line$numbers)
+  expect_identical(numbers[[2]], numbers[[1]])
+  expect_identical(numbers[[3]], numbers[[1]])
+})
+
+test_that("a script may make a client for each call", {
+  base <- test_client()$remote_base
+  id <- env_create(create_GymClient(base), "CartPole-v1", seed = 3)
+  for (i in 1:300) env_reset(create_GymClient(base), id)
+  expect_equal(env_step(create_GymClient(base), id, 1)$reward, 1)
+  expect_silent(env_close(create_GymClient(base), id))
 })
 
 test_that("a client works in forked workers", {
   skip_on_os("windows")
   client <- test_client()
   env_list_all(client)
+  key <- function(...) connection(client)$line$numbers$key
+  keys <- c(key(), unlist(parallel::mclapply(1:2, key, mc.cores = 2)))
+  expect_length(unique(keys), 3)
   answers <- parallel::mclapply(1:4, function(seed) {
     env <- gym_make("CartPole-v1", seed = seed, client = client)
     on.exit(env$close())

@@ -125,6 +125,8 @@ test_that("a function that cannot be asked about one observation fails before th
   cnd <- expect_error(rollout(env, drops, 3, seed = 1), class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "asked about one observation, before the first step")
   expect_match(conditionMessage(cnd$parent), "number of dimensions")
+  own <- function(observation) rlang::abort("no", class = "my_stop")
+  expect_error(rollout(env, own, 3), class = "my_stop")
   expect_identical(env$lane_steps, 0L)
   all_same <- function(observation) rep(1L, max(nrow(observation), 2L))
   expect_error(rollout(env, all_same, 3), "for the one observation, not 2 actions",

@@ -217,7 +217,8 @@ test_that("weights that were given another shape by hand are named", {
   policy <- policy_network()
   policy$weights[[1]] <- matrix(0, 4, 2)
   refusal <- "`policy$weights[[1]]` must be a matrix of 2 x 4 for these sizes, not of 4 x 2."
-  for (call in list(function() act(policy, 1:4), function() rollout(fake_environment(), policy))) {
+  for (call in list(function() act(policy, 1:4), function() rollout(fake_environment(), policy),
+                    function() plot(policy))) {
     cnd <- expect_error(call(), refusal, fixed = TRUE, class = "gym_error_argument")
     expect_match(conditionMessage(cnd), "`t()` turns it", fixed = TRUE)
   }

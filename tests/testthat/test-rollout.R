@@ -78,10 +78,8 @@ test_that("max_steps beyond the environment's own limit is warned of, with what 
     expect_silent(play(200))
     warning <- expect_warning(play(1000), class = "gym_warning_max_steps")
     expect_match(conditionMessage(warning), "a limit of its own, 200 steps.", fixed = TRUE)
-    expect_match(
-      conditionMessage(warning), "`gym_make(\"MountainCar-v0\", max_episode_steps = 1000)`",
-      fixed = TRUE
-    )
+    expect_match(conditionMessage(warning),
+                 "`max_episode_steps = 1000` as a further argument of `gym_make()`", fixed = TRUE)
   }
 })
 

@@ -178,6 +178,6 @@ test_that("the server's answer to a step of lanes is what is expected", {
   answer <- NULL
   line$fetch <- function(url, handle) answer <<- fetch(url, handle)
   env$step(c(0, 1))
-  sent <- list(key = line$key, number = line$number)
+  sent <- list(key = line$numbers$key, number = line$numbers$number)
   expect_null(read_tensors(answer$content, expected = bare_metadata(sent))$metadata)
 })

@@ -21,14 +21,23 @@ from gym_server import (
 )
 from gym_server.allowed_paths import AllowedPaths
 from gym_server.errors import GymServerError, answer_to, shutdown_disabled
-from gym_server.exactly_once import Done, ExactlyOnce, RequestId
+from gym_server.exactly_once import ExactlyOnce, Outcome, RequestId
 from gym_server.frames import RenderThread
 from gym_server.guard import Access, Guard
 from gym_server.instances import Instances
 from gym_server.isolation import Isolation
 from gym_server.limits import Limits, Watchers
 from gym_server.monitor_directory import MonitorRoot
-from gym_server.routes import ROUTES, Call, Route, Services, env_reset, env_step
+from gym_server.routes import (
+    ROUTES,
+    Call,
+    Route,
+    Services,
+    env_close,
+    env_delete,
+    env_reset,
+    env_step,
+)
 from gym_server.tensors import TENSORS
 from gym_server.watch_keys import WatchKeys
 from gym_server.watchdog import Watchdog
@@ -124,7 +133,7 @@ class GymApp(Flask):
         self.register_error_handler(Exception, lambda error: _response(_failure(error, None)))
         self.answer_for = lambda *_: None
         self._watchdog = Watchdog(
-            self._instances, config.limits, self._give_up, exactly_once.forget
+            self._instances, config.limits, self._give_up, exactly_once.forget_in_time
         )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
@@ -222,8 +231,11 @@ class _Handler:
         request_id = wire.read(body, (wire.REQUEST,))["request"] if route.once else None
 
         instance_id = request.variables.get("instance_id")
+        # What ends an instance is known as what makes one is, by key and number: it is never one
+        # key too many.
+        moved_id = None if route.handler in (env_close, env_delete) else instance_id
 
-        def perform() -> Done:
+        def perform() -> Outcome:
             try:
                 fields = wire.read(body, route.fields)
                 call = Call(
@@ -237,17 +249,17 @@ class _Handler:
                 )
                 result = route.handler(call)
                 answer = wire.answer(result, request_id)
-                return Done(answer, True, instance_id or _made(result))
+                return Outcome(answer, True, instance_id or _made(result))
             except BaseException as error:
                 # What an environment raises must not pass by the answer that is stored.
                 did_nothing = isinstance(error, GymServerError) and error.did_nothing
-                return Done(_failure(error, request_id), not did_nothing, instance_id)
+                return Outcome(_failure(error, request_id), not did_nothing, instance_id)
 
         if request_id is None:
             return perform().answer
         content = (request.path, _fingerprint(request.body), sends_tensors, wants_tensors)
         try:
-            return self._exactly_once.answer(request_id, instance_id, content, perform)
+            return self._exactly_once.answer(request_id, moved_id, content, perform)
         except Exception as error:
             return _failure(error, request_id)
 

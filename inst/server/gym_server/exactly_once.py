@@ -31,6 +31,11 @@ from gym_server.errors import GymServerError
 
 AnswerT = TypeVar("AnswerT")
 
+# When what is kept is looked through: after so many seconds, or when this share of the memory that
+# it may hold was stored anew.
+_LOOK_SECONDS = 30.0
+_LOOK_SHARE = 1 / 8
+
 
 class RequestId(NamedTuple):
     """What a client calls one of its requests: its own key (1 to 64 characters), a number."""
@@ -39,7 +44,7 @@ class RequestId(NamedTuple):
     number: int
 
 
-class Done(NamedTuple):
+class Outcome(NamedTuple):
     """What came of a request.
 
     Attributes:
@@ -58,7 +63,7 @@ class _Latest(Generic[AnswerT]):
 
     def __init__(self, instance_id: str | None, name: Hashable) -> None:
         self.lock = threading.Lock()
-        # Where it is kept; a creation has no instance there.
+        # Where it is kept; what makes or ends an instance has none there.
         self.place = instance_id, name
         self.is_dropped = False
         # What the thread that has the lock is doing. Whoever takes the entry out, which only
@@ -80,7 +85,7 @@ class ExactlyOnce(Generic[AnswerT]):
         lives: Callable[[str], bool],
         size: Callable[[Hashable, AnswerT], int] = lambda content, answer: 0,
         forget_after: float = 15 * 60,
-        most_keys: int = 64,
+        most_keys: int = 256,
         most_gone: int = 10_000,
         most_bytes: int = 2**29,
     ) -> None:
@@ -101,7 +106,10 @@ class ExactlyOnce(Generic[AnswerT]):
         self._most_gone = most_gone
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
-        # By the instance; there by the key. Creations, which have none yet, by key and number.
+        self._looked = time.monotonic()
+        self._bytes_since_look = 0
+        # By the instance that is moved; there by the key. What makes or ends an instance, under
+        # None, by key and number.
         self._calls: dict[str | None, dict[Hashable, _Latest[AnswerT]]] = {}
 
     def answer(
@@ -109,13 +117,13 @@ class ExactlyOnce(Generic[AnswerT]):
         request_id: RequestId,
         instance_id: str | None,
         content: Hashable,
-        act: Callable[[], Done],
+        act: Callable[[], Outcome],
     ) -> AnswerT:
         """Do what a request asks, or return the answer that it got before.
 
         Args:
             request_id: the key and number that the client gave it.
-            instance_id: the instance that it is about; None for a creation.
+            instance_id: the instance that it moves; None for what makes or ends one.
             content: what the request asks; a repetition has the same.
             act: does it; called at most once per number unless nothing came of it, must not
                 raise.
@@ -189,6 +197,8 @@ class ExactlyOnce(Generic[AnswerT]):
         latest.content = content
         latest.stored = time.monotonic()
         latest.lock.release()
+        # Not exact where several threads are here at once, and need not be.
+        self._bytes_since_look += self._size(content, answer)
 
     def _drop(self, latest: _Latest[AnswerT]) -> None:
         """Know nothing any more; whoever calls it has the lock."""
@@ -205,6 +215,17 @@ class ExactlyOnce(Generic[AnswerT]):
     def _all(self) -> list[_Latest[AnswerT]]:
         with self._lock:
             return [latest for calls in self._calls.values() for latest in calls.values()]
+
+    def forget_in_time(self) -> None:
+        """``forget()``, when some time has gone by or much was stored since the last time.
+
+        With very many keys a look at all of them takes some tenths of a second.
+        """
+        is_due = time.monotonic() > self._looked + _LOOK_SECONDS
+        if is_due or self._bytes_since_look > self._most_bytes * _LOOK_SHARE:
+            self._looked = time.monotonic()
+            self._bytes_since_look = 0
+            self.forget()
 
     def forget(self) -> None:
         """Drop what need not be known any more, and answers where they hold too much."""
@@ -297,5 +318,6 @@ def _too_many_keys(instance_id: str, most: int, seconds: float) -> GymServerErro
         "too_many_keys",
         f"{most} keys have moved instance {instance_id} in the last {seconds / 60:g} minutes, and "
         "it takes no more; nothing was done",
-        "use one key for all requests of a client, and number them upwards",
+        "use one key for all requests of a process, and number them upwards; in R each session and "
+        "each forked process has one",
     )

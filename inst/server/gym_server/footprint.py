@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import threading
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Dict, Graph, OneOf, Sequence, Text, Tuple
 
+from gym_server.budget import Budget
 from gym_server.errors import GymServerError
 
 _KB, _MB = 2**10, 2**20
@@ -49,38 +49,6 @@ _COPIES = 3
 # A number as it is sent as JSON: an object in a list (small integers are there already), its digits
 # in a text, and again as bytes. And its two bounds as such objects in the space's description.
 _SHORT_NUMBER_BYTES, _NUMBER_BYTES = 44 + 16, 80 + 64
-
-
-class Budget:
-    """The memory that all environments together may be reckoned to take."""
-
-    def __init__(self, most: float = math.inf) -> None:
-        """Have all of it left.
-
-        Args:
-            most: how many bytes that is.
-        """
-        self.most = most
-        self._taken = 0.0
-        self._lock = threading.Lock()
-
-    @property
-    def left(self) -> float:
-        """How many bytes are left."""
-        return max(0.0, self.most - self._taken)
-
-    def take(self, size: float) -> bool:
-        """Take so many bytes of it, if they are left."""
-        with self._lock:
-            if not math.isfinite(size) or self._taken + size > self.most:
-                return False
-            self._taken += size
-            return True
-
-    def give_back(self, size: float) -> None:
-        """Give back what was taken."""
-        with self._lock:
-            self._taken -= size
 
 
 class Account:

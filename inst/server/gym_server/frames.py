@@ -162,8 +162,9 @@ class RenderThread:
             except InvalidStateError:
                 return False
             self._running = None
-            self._start()
+            # Before anything that waits, in which it could end and another get its identity.
             interrupt(hanging.ident)
+            self._start()
             return True
 
     def give_up_what_began_before(self, moment: float, why: Exception) -> bool:

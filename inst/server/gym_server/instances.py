@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 from gym_server import registry, vectorization, wrappers
 from gym_server.allowed_paths import AllowedPaths
+from gym_server.budget import Budget
 from gym_server.choices import Choices
 from gym_server.departed import Departed
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
-from gym_server.footprint import Account, Budget
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.hold import SETTLED_SECONDS
 from gym_server.instance import Instance
@@ -88,6 +89,8 @@ class Instances:
         self._renderer = renderer
         self._lock = threading.Lock()
         self._instances: dict[str, Instance | IsolatedInstance] = {}
+        # Whether environments are gone since somebody, who then changes it, looked for garbage.
+        self.left_garbage = False
         self._budget = Budget(self._limits.max_memory_mb * 2**20)
         # By the thread that makes it until it comes back, then by instance_id until it is closed.
         self._shares: dict[int | str, _Share] = {}
@@ -164,6 +167,7 @@ class Instances:
         share = self._shares.pop(whose, None)
         if share is not None:
             share.account.give_back()
+            self.left_garbage = True
 
     def _make(self, choices: Choices, making: _Making, undo: contextlib.ExitStack) -> Instance:
         return make(
@@ -269,14 +273,17 @@ class Instances:
         before = time.monotonic() - seconds
         for thread, making in list(self._creating.items()):
             began = self._renderer.began(thread) or making.began
-            if began < before and self._creating.pop(thread, None) is not None:
+            if began < before and self._is_taken_off(thread, making):
                 why = making.too_long(seconds)
                 log.warning("%s", why.message)
                 if making.condemn is not None:
                     making.condemn(why)
                 elif not self._renderer.give_up(thread, why):
                     answer_for(thread, why)
-                    interrupt(thread)
+                    # Broken off while it asks for a process, it would break the fork server, and
+                    # that all processes of others.
+                    if not making.share.room.processes:
+                        interrupt(thread)
                 making.settled.set()
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
@@ -290,10 +297,19 @@ class Instances:
                     # Until this is settled it does not go on to other things.
                     interrupt(stuck)
                 instance.hold.settle()
-        # What nobody waits for who is looked after: closing what was given up may hang, too.
+        # The closing of what was given up may hang, too, and no instance stands for it any more.
         nobodys = call_too_long("Closing an environment", seconds, "the server leaves it alone")
         if self._renderer.give_up_what_began_before(before - seconds, nobodys):
             log.warning("%s", nobodys.message)
+
+    def _is_taken_off(self, thread: int, making: _Making) -> bool:
+        """Take a creation off the list; tell whether it was still there."""
+        with self._lock:
+            # The thread may be at its next one by now.
+            if self._creating.get(thread) is not making:
+                return False
+            del self._creating[thread]
+            return True
 
     def _dismiss(self, instance: Instance, seconds: float) -> GymServerError:
         """Take an instance off the list on which a call takes too long; return what to say."""

@@ -39,14 +39,18 @@ def prepare() -> None:
         _mallopt(_M_TRIM_THRESHOLD, _FREE_BYTES)
 
 
-def give_back() -> None:
+def give_back(garbage: bool = True) -> None:
     """Collect the garbage, and return what is free.
+
+    Args:
+        garbage: whether there may be some; to look for it takes the longer the more there is.
 
     Environments refer to themselves in circles, so that those that were closed wait for Python's
     collection, which comes by the number of new objects and not by their size. And glibc keeps
     what threads have freed, in a pool for each few of them, for as long as anything that lies
     behind it is in use.
     """
-    gc.collect()
+    if garbage:
+        gc.collect()
     if _malloc_trim is not None:
         _malloc_trim(0)

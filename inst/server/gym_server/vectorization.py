@@ -197,7 +197,11 @@ def _make_entry_point(asked: _Asked) -> VectorEnv:
         env.close()
         raise _CannotDo(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
     env.spec = _with_time_limit(asked)
-    asked.account.charge(answer_bytes(env.single_observation_space), "What is observed")
+    try:
+        asked.account.charge(answer_bytes(env.single_observation_space), "What is observed")
+    except GymServerError:
+        env.close()
+        raise
     return env
 
 

@@ -22,7 +22,8 @@ log = logging.getLogger(__name__)
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
 
-# Between two times that memory is given back; it costs milliseconds.
+# Between two times that memory is given back; it costs some milliseconds, and where there are many
+# thousands of sub-environments some tenths of a second.
 _GIVE_BACK_SECONDS = 30.0
 
 
@@ -73,5 +74,6 @@ class Watchdog:
             self._instances.close_idle(self._limits.idle_minutes)
         self._forget()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
-            memory.give_back()
+            garbage, self._instances.left_garbage = self._instances.left_garbage, False
+            memory.give_back(garbage)
             self._gave_back = time.monotonic()

@@ -306,7 +306,7 @@ REQUEST = Field(
     "request",
     REQUEST_ID,
     "Names this request, so that it is done once however often it arrives: a key of the client's "
-    "own, a number that grows. An instance takes 64 keys in a quarter of an hour (429).",
+    "own, a number that grows. An instance takes 256 keys in a quarter of an hour (429).",
 )
 
 

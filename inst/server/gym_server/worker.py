@@ -22,9 +22,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from gym_server import processes, registry, wire, worker_messages
+from gym_server.budget import Budget
 from gym_server.choices import Choices
 from gym_server.errors import answer_to
-from gym_server.footprint import Account, Budget
+from gym_server.footprint import Account
 from gym_server.frames import RenderThread
 from gym_server.instance import Instance
 from gym_server.making import make

@@ -148,7 +148,7 @@ def test_new_keys_are_refused_before_known_ones_go(client, faulty):
     url = faulty("Counting")
     client.post(f"{url}/reset/", json=once("victim", 1))
     first = client.post(f"{url}/step/", json=once("victim", 2, action=0))
-    for number in range(63):
+    for number in range(255):
         answer = client.post(f"{url}/reset/", json=once(str(number), 1))
         assert answer.status_code == 200
     refusal = client.post(f"{url}/reset/", json=once("more", 1))
@@ -156,6 +156,8 @@ def test_new_keys_are_refused_before_known_ones_go(client, faulty):
     assert refusal.headers["Retry-After"] == "60"
     assert client.post(f"{url}/step/", json=once("victim", 2, action=0)).data == first.data
     assert client.get(url).json["steps"] == 1
+    for _ in range(2):
+        assert client.post(f"{url}/close/", json=once("last", 1)).status_code == 204
 
 
 @pytest.mark.parametrize("name", ["RaisesInStep", "ImportsInStep"])

@@ -3,7 +3,7 @@ import threading
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.exactly_once import Done, ExactlyOnce, RequestId
+from gym_server.exactly_once import ExactlyOnce, Outcome, RequestId
 
 
 class Counter:
@@ -15,7 +15,7 @@ class Counter:
 
     def __call__(self):
         self.calls += 1
-        return Done(self.calls, self.did_something, self.instance_id)
+        return Outcome(self.calls, self.did_something, self.instance_id)
 
 
 class Once(ExactlyOnce):
@@ -105,7 +105,7 @@ def test_a_key_does_not_wait_for_another():
     began, may_end = threading.Event(), threading.Event()
     slow = threading.Thread(
         target=once.answer,
-        args=(RequestId("a", 1), "step", lambda: Done((began.set(), may_end.wait(10)))),
+        args=(RequestId("a", 1), "step", lambda: Outcome((began.set(), may_end.wait(10)))),
     )
     slow.start()
     assert began.wait(10)
@@ -133,7 +133,7 @@ def test_a_repetition_that_waits_for_what_is_refused_is_done():
     def refuse():
         began.set()
         assert may_end.wait(10)
-        return Done("refused", False)
+        return Outcome("refused", False)
 
     answers = []
     threads = [
@@ -220,7 +220,7 @@ def test_a_key_that_is_in_use_is_not_forgotten():
 
     def meanwhile():
         once.forget()
-        return Done("slow", True, "i")
+        return Outcome("slow", True, "i")
 
     once.living.clear()
     once.answer(NUMBER_1, "step", meanwhile)
@@ -234,7 +234,7 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     def stuck():
         began.set()
         assert may_end.wait(10)
-        return Done("too late")
+        return Outcome("too late")
 
     thread = threading.Thread(target=once.answer, args=(RequestId("a", 1), "step", stuck))
     thread.start()
@@ -263,9 +263,9 @@ def test_what_all_keep_together_is_bounded():
         size=lambda content, answer: 0 if answer is None else len(content) + answer,
         most_bytes=250,
     )
-    once.answer(RequestId("first", 1), "", lambda: Done(80), "i")
+    once.answer(RequestId("first", 1), "", lambda: Outcome(80), "i")
     for instance_id, size in zip("ijk", (90, 70, 150), strict=True):
-        done = Done(size, True, instance_id)
+        done = Outcome(size, True, instance_id)
         once.answer(NUMBER_1, "x" * 10, lambda done=done: done, instance_id)
     once.forget()
     act = Counter()
@@ -275,3 +275,16 @@ def test_what_all_keep_together_is_bounded():
     assert conflict(once, NUMBER_1, "x" * 10, act, "k")
     assert act.calls == 0
     assert once.answer(RequestId("a", 2), "step", act, "k") == 1
+
+
+def test_what_is_kept_is_looked_through_from_time_to_time_and_when_much_came(monkeypatch):
+    looks = []
+    once = Once(size=lambda content, answer: 100, most_bytes=8 * 250)
+    monkeypatch.setattr(once, "forget", lambda: looks.append(1))
+    for number in range(1, 6):
+        once.answer(RequestId("a", number), "step", Counter())
+        once.forget_in_time()
+    assert len(looks) == 1
+    monkeypatch.setattr("gym_server.exactly_once._LOOK_SECONDS", 0.0)
+    once.forget_in_time()
+    assert len(looks) == 2

@@ -4,11 +4,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
 
-from gym_server import creation
+from gym_server import creation, vectorization
 from gym_server.app import Config, create_app
+from gym_server.budget import Budget
 from gym_server.errors import GymServerError
-from gym_server.footprint import Account, Budget, observation_bytes
+from gym_server.footprint import Account, observation_bytes
 from gym_server.frames import RenderThread
 from gym_server.limits import Limits
 from gym_server.wrappers import Wrapper, wrap
@@ -217,3 +219,12 @@ def test_every_space_can_be_reckoned(kind):
 
     kwargs = {"depth": 50} if kind == "Deep-v0" else {}
     assert observation_bytes(gymnasium.make(kind, **kwargs).observation_space) > 0
+
+
+def test_a_vector_environment_that_is_refused_is_closed(limited, monkeypatch):
+    closed = []
+    monkeypatch.setattr(CartPoleVectorEnv, "close", lambda env, **_: closed.append(env))
+    monkeypatch.setattr(vectorization, "answer_bytes", lambda space: np.inf)
+    answer = make(limited(), num_envs=2)
+    assert (answer.status_code, answer.json["code"]) == (429, "too_much_memory")
+    assert len(closed) == 1

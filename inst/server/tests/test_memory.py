@@ -80,8 +80,12 @@ def test_what_threads_have_freed_does_not_stay(script):
     assert int(told.stdout) < 8
 
 
-def test_the_watchdog_sees_to_it(monkeypatch, client, eventually):
+def test_the_watchdog_sees_to_it(monkeypatch, client, create, eventually):
     given_back = []
     monkeypatch.setattr(watchdog, "_GIVE_BACK_SECONDS", 0.0)
-    monkeypatch.setattr(memory, "give_back", lambda: given_back.append(1))
+    monkeypatch.setattr(memory, "give_back", given_back.append)
     eventually(lambda: len(given_back) > 1)
+    assert not any(given_back)
+    client.post(f"{create()}/close/")
+    eventually(lambda: any(given_back))
+    eventually(lambda: not given_back[-1])
