@@ -55,8 +55,9 @@
 #'   `missing_dependency`; the hint says how); `gym_error_http_429` for more lanes than
 #'   the server allows (code `too_many_lanes`), when it has as many environments or
 #'   processes as it allows (codes `too_many_instances`, `too_many_processes`), or where the
-#'   environment would take more memory than is left (code `too_much_memory`); `gym_error_http_504` when making it takes
-#'   longer than the server allows a call to take (code `call_too_long`);
+#'   environment would take more memory than is left (code `too_much_memory`);
+#'   `gym_error_http_504` when making it takes longer than the server allows a call to take
+#'   (code `call_too_long`);
 #'   `gym_error_argument`; `gym_error_connection`.
 #'
 #'   The server gives an environment up on which a call takes too long, and closes one

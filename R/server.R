@@ -82,8 +82,9 @@ is_running <- function(base) {
 #'   made. Limits for all clients together are `max_instances` (environments, 1,000),
 #'   `max_num_envs` (lanes of one, 16,384), `max_total_lanes` (four times as many),
 #'   `max_processes` (of their own that environments have, 128), `max_memory_mb` (of all
-#'   environments, estimated before they are made, 4,096), `max_watchers` (100), `max_body_mb` (of a request, 16), `max_call_seconds` (that a
-#'   call may take before its environment is given up, 300, 0 for ever) and
+#'   environments, estimated before they are made, 4,096), `max_watchers` (100),
+#'   `max_body_mb` (of a request, 16), `max_call_seconds` (that a call may take before its
+#'   environment is given up, 300, 0 for ever) and
 #'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
 #'   0 for never). `token_file = "token"` names a file with a token of 16
 #'   characters or more, which every call must then carry; the client that is returned does.

@@ -10,8 +10,16 @@ def is_running(pid):
     except ProcessLookupError:
         return False
     # A process that has ended and that nobody has waited for is still listed.
-    with open(f"/proc/{pid}/stat") as stat:
-        return stat.read().rpartition(")")[2].split()[0] != "Z"
+    return _state(Path(f"/proc/{pid}")) != "Z"
+
+
+def is_stopped(pid):
+    """Tell whether a signal has stopped all threads of a process; the last one stops later."""
+    return all(_state(task) == "T" for task in Path(f"/proc/{pid}/task").iterdir())
+
+
+def _state(directory):
+    return (directory / "stat").read_text().rpartition(")")[2].split()[0]
 
 
 def descendants(pid):

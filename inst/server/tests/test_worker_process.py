@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from conftest import ServerProcess
-from running import descendants, is_running
+from running import descendants, is_running, is_stopped
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
 
@@ -204,6 +204,7 @@ def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
     assert server.post(f"{other}/step/", {"action": 0})[0] == 200
     # Also one that is asked while nothing moves.
     os.kill(stopped, signal.SIGSTOP)
+    eventually(lambda: is_stopped(stopped))
     status, answer = server.get(f"{other}/action_space/")
     assert (status, answer["code"]) == (504, "call_too_long")
     eventually(lambda: not is_running(stopped))
