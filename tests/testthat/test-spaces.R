@@ -50,7 +50,8 @@ test_that("the error for an action shows the value", {
 
 test_that("TRUE and FALSE are 1 and 0 in a MultiDiscrete, as in a Discrete", {
   space <- new_space(list(
-    name = "MultiDiscrete", dtype = "int64", shape = 2L, nvec = c(2L, 2L), start = c(0L, 0L)
+    name = "MultiDiscrete", dtype = "int64", shape = list(2L), nvec = list(2L, 2L),
+    start = list(0L, 0L)
   ))
   expect_equal(encode_value(space, c(TRUE, FALSE), NULL), "[1,0]")
   expect_identical(
