@@ -37,6 +37,7 @@ def test_the_end_of_standard_input_stops_it_when_asked(serve):
     assert server.stop(how=None)[0] == 0
 
 
+@pytest.mark.slow
 @needs_signals
 @pytest.mark.parametrize("isolate", ["all", "none"])
 def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
