@@ -46,7 +46,11 @@ exchange <- function(client, line, handle, url, request) {
   response <- NULL
   problem <- tryCatch(
     {
-      fetched <- line$fetch(url, handle)
+      fetched <- withCallingHandlers(
+        line$fetch(url, handle),
+        # So newer versions of curl tell that an answer was stopped for its size.
+        interrupt = function(cnd) if (client$state$overlong) stop("Too large")
+      )
       if (ends_in_header(fetched)) {
         stop("Connection died within the header of the answer")
       }
