@@ -19,6 +19,7 @@ from gymnasium.spaces import Dict, Graph, OneOf, Sequence, Text, Tuple
 
 from gym_server.budget import Budget
 from gym_server.errors import GymServerError
+from gym_server.registry import module_of
 
 _KB, _MB = 2**10, 2**20
 
@@ -129,14 +130,6 @@ def vector_bytes(spec: EnvSpec, kwargs: dict) -> float:
     sides = [_number(kwargs.get(f"img_{side}", 84)) for side in ("height", "width")]
     frames = _number(kwargs.get("stack_num", 4)) * (1 if kwargs.get("grayscale", True) else 3)
     return environment_bytes(spec, kwargs) + _COPIES * frames * math.prod(sides)
-
-
-def module_of(spec: EnvSpec) -> str:
-    """Return the module that makes an environment, or ""."""
-    entry_point = spec.entry_point
-    if isinstance(entry_point, str):
-        return entry_point.partition(":")[0]
-    return getattr(entry_point, "__module__", None) or ""
 
 
 def answer_bytes(space: gymnasium.Space) -> float:

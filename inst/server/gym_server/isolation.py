@@ -43,9 +43,6 @@ log = logging.getLogger(__name__)
 
 MODES = ("none", "foreign", "all")
 
-# Packages whose environments are well known; those of all others are foreign.
-_OWN = ("gymnasium", "ale_py")
-
 
 class Isolation:
     """Says what runs where, and what processes are told.
@@ -159,11 +156,8 @@ def _home(name: str, allowed_modules: Collection[str]) -> str:
         return _UNKNOWN if allowed_modules else ""
     except (error.Error, GymServerError):
         return ""
-    entry_point = spec.entry_point
-    if isinstance(entry_point, str):
-        return entry_point.partition(":")[0]
-    return getattr(entry_point, "__module__", None) or _UNKNOWN
+    return registry.module_of(spec) or _UNKNOWN
 
 
 def _is_foreign(module: str) -> bool:
-    return module != "" and module.partition(".")[0] not in _OWN
+    return module != "" and module.partition(".")[0] not in registry.KNOWN_PACKAGES

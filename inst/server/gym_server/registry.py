@@ -20,6 +20,9 @@ from gym_server.extras import extra_of, is_available, missing_extra, why_unavail
 
 log = logging.getLogger(__name__)
 
+# Packages whose environments are known here: what they are like, and what their arguments mean.
+KNOWN_PACKAGES = ("gymnasium", "ale_py")
+
 # Python lets go of its import locks where modules import each other in a circle, as Gymnasium's
 # do; two threads would see them half made.
 importing = threading.RLock()
@@ -146,3 +149,11 @@ def _entry(spec: EnvSpec) -> dict:
         "available": reason is None,
         "reason": reason,
     }
+
+
+def module_of(spec: EnvSpec) -> str:
+    """Return the module that makes an environment, or ""."""
+    entry_point = spec.entry_point
+    if isinstance(entry_point, str):
+        return entry_point.partition(":")[0]
+    return getattr(entry_point, "__module__", None) or ""

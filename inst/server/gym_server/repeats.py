@@ -17,8 +17,8 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import VectorEnv
 
 from gym_server.errors import GymServerError
-from gym_server.footprint import module_of
 from gym_server.plain import brief, from_words
+from gym_server.registry import KNOWN_PACKAGES, module_of
 
 if TYPE_CHECKING:
     from gym_server.wrappers import Wrapper
@@ -59,9 +59,6 @@ _LONGEST_ARGUMENTS = 65_536
 # It turns an angle back by one round after the other, as often as it takes.
 _TURNING = "gymnasium.envs.classic_control.acrobot"
 _LARGEST_ANGLE = 100_000
-
-# A known environment's module begins so.
-_KNOWN = ("gymnasium", "ale_py")
 
 
 def check(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: int = 1) -> None:
@@ -134,7 +131,7 @@ def _check_steps(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_e
 
 def _is_known(spec: EnvSpec) -> bool:
     # What another one's arguments mean is not known; by default it has a process of its own.
-    return module_of(spec).partition(".")[0] in _KNOWN
+    return module_of(spec).partition(".")[0] in KNOWN_PACKAGES
 
 
 def _largest(value: object) -> float:
