@@ -124,7 +124,7 @@ try_environment <- function(python, extras) {
   modules <- modules[names(modules) %in% extras]
   script <- c(
     "import importlib.util",
-    "import gym_server.cli, gymnasium.envs.classic_control, pygame",
+    "import gym_server.cli.main, gymnasium.envs.classic_control, pygame",
     sprintf("if not importlib.util.find_spec('%s'): raise SystemExit('%s is missing')",
             modules, modules),
     sprintf("print('%s')", it_runs)

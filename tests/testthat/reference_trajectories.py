@@ -16,7 +16,7 @@ os.environ.setdefault("SDL_AUDIODRIVER", "dummy")
 
 import gymnasium as gym
 import numpy as np
-from gym_server import mujoco_setup
+from gym_server.envs import mujoco
 
 try:
     import ale_py
@@ -69,7 +69,7 @@ def make(env_id):
 
 
 def main(directory):
-    mujoco_setup.choose_gl()
+    mujoco.choose_gl()
     for line in sys.stdin:
         name, env_id, steps = line.split()
         path = os.path.join(directory, name)

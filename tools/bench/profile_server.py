@@ -27,8 +27,8 @@ from urllib.parse import urlsplit
 from wsgiref.util import setup_testing_defaults
 
 import gymnasium
-from gym_server import wire
-from gym_server.app import create_app
+from gym_server.api.app import create_app
+from gym_server.protocol import wire
 
 _STEPS = 8  # With alternating actions no episode of CartPole ends earlier.
 _EPISODES = 100

@@ -41,7 +41,7 @@ start_reticulate <- function(numpy, python) {
 # client had to talk to.
 start_development_server <- function(python) {
   script <- c(
-    "from gym_server.app import create_app",
+    "from gym_server.api.app import create_app",
     "create_app().run(host='127.0.0.1', port=0, threaded=True)"
   )
   server <- start_worker(

@@ -23,10 +23,10 @@ def main():
     if sys.version_info < (3, 10):
         refuse("Python 3.10 or newer is needed")
     try:
-        from gym_server import cli
+        from gym_server.cli.main import main as serve
     except ImportError as error:
         refuse(error)
-    sys.exit(cli.main())
+    sys.exit(serve())
 
 
 if __name__ == "__main__":

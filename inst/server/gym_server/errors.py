@@ -7,7 +7,7 @@ import traceback
 
 from werkzeug.exceptions import HTTPException
 
-from gym_server.plain import brief
+from gym_server.json_values import brief
 
 log = logging.getLogger(__name__)
 

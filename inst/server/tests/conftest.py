@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gym_server.app import Config, create_app
+from gym_server.api.app import Config, create_app
 
 TESTS = Path(__file__).parent
 SERVER = TESTS.parent

@@ -9,7 +9,7 @@ import importlib
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
-from gym_server.extras import is_available
+from gym_server.envs.extras import is_available
 
 with contextlib.suppress(ImportError):
     importlib.import_module("ale_py")

@@ -2,6 +2,7 @@
 
 import pytest
 
+from gym_server.errors import GymServerError
 from gym_server.spaces import NotInSpace, decode
 
 
@@ -10,3 +11,10 @@ def refused(space, value):
     with pytest.raises(NotInSpace) as refusal:
         decode(space, value)
     return str(refusal.value)
+
+
+def code_of(call, *arguments):
+    """Return the code of the error that a call raises; fail when it raises none."""
+    with pytest.raises(GymServerError) as refusal:
+        call(*arguments)
+    return refusal.value.code

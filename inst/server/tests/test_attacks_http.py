@@ -11,10 +11,10 @@ from contextlib import closing, suppress
 import pytest
 from conftest import TOKEN
 
-from gym_server import connection as connection_module
-from gym_server.app import Config, create_app
+from gym_server.api.app import Config, create_app
 from gym_server.budget import Budget
-from gym_server.connection import Connection
+from gym_server.http_server import connection as connection_module
+from gym_server.http_server.connection import Connection
 
 # Heads ---------------------------------------------------------------------------------------
 

@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from gym_server import connection as connection_module
-from gym_server import connections as connections_module
-from gym_server import serve
-from gym_server.app import create_app
+from gym_server.api.app import create_app
+from gym_server.http_server import connection as connection_module
+from gym_server.http_server import connections as connections_module
+from gym_server.http_server.server import Server, bind
 
 GET = b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 LARGE = b"GET /v1/openapi.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
@@ -25,7 +25,7 @@ def crowded(monkeypatch):
     monkeypatch.setattr(connections_module, "MAKES_ROOM", 2)
     monkeypatch.setattr(connection_module, "_STUCK_SECONDS", 0.3)
     app = create_app()
-    server = serve.Server(app, serve.bind("127.0.0.1", 0), 2**20, on_stop=app.end_watching)
+    server = Server(app, bind("127.0.0.1", 0), 2**20, on_stop=app.end_watching)
     running = threading.Thread(target=server.run, args=(5,))
     running.start()
     connections = []

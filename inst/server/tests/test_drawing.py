@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from conftest import SERVER
 
-from gym_server.extras import is_available
-from gym_server.registry import look_up
-from gym_server.tensors import TENSORS, read
+from gym_server.envs.extras import is_available
+from gym_server.envs.registry import look_up
+from gym_server.protocol.safetensors import TENSORS, read
 
 FAMILIES = [
     "CartPole-v1",
@@ -114,9 +114,9 @@ def test_car_racing_moves_on_the_render_thread(app, create, client, installed, m
     ],
 )
 def test_opengl_is_chosen_for_a_machine_without_a_display(variables, chosen):
-    from gym_server import mujoco_setup
+    from gym_server.envs import mujoco
 
-    if not mujoco_setup._has_egl():
+    if not mujoco._has_egl():
         pytest.skip("this machine has no EGL")
     clean = {
         name: value
@@ -124,7 +124,7 @@ def test_opengl_is_chosen_for_a_machine_without_a_display(variables, chosen):
         if name not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
     }
     code = (
-        "import os; from gym_server import mujoco_setup; mujoco_setup.choose_gl(); "
+        "import os; from gym_server.envs import mujoco; mujoco.choose_gl(); "
         "print(os.environ.get('MUJOCO_GL'))"
     )
     command = [sys.executable, "-c", code]

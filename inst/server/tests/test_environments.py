@@ -2,7 +2,7 @@ import environments
 import numpy as np
 import pytest
 
-from gym_server.tensors import TENSORS, read
+from gym_server.protocol.safetensors import TENSORS, read
 
 SAMPLED = environments.sampled()
 REST = [env_id for env_id in environments.runnable() if env_id not in SAMPLED]

@@ -24,8 +24,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
 
 from hypothesis import strategies as st  # noqa: E402
 
-from gym_server import tensors, wire  # noqa: E402
 from gym_server.errors import GymServerError  # noqa: E402
+from gym_server.protocol import safetensors, wire  # noqa: E402
 
 SECONDS = float(os.environ.get("GYM_TEST_FUZZ_SECONDS", "0"))
 
@@ -183,7 +183,7 @@ def texts(draw):
 def check_tensors(raw):
     file = body = None
     try:
-        file = tensors.read(raw)
+        file = safetensors.read(raw)
         body = wire.loads_tensors(raw)
     except GymServerError as refusal:
         assert refusal.code == "malformed_tensors"
@@ -195,7 +195,7 @@ def check_tensors(raw):
     arrays = {name: tensor.array() for name, tensor in file.tensors.items()}
     head = 8 + int.from_bytes(raw[:8], "little")
     assert sum(array.nbytes for array in arrays.values()) == len(raw) - head
-    again = tensors.read(tensors.write(file.tensors, file.metadata))
+    again = safetensors.read(safetensors.write(file.tensors, file.metadata))
     assert again.metadata == file.metadata
     for name, array in arrays.items():
         assert again.tensors[name].array().tobytes() == array.tobytes()
@@ -233,7 +233,7 @@ def test_files_of_all_kinds_are_tried():
 
     def count(raw):
         try:
-            tensors.read(raw)
+            safetensors.read(raw)
             outcomes[True] += 1
         except GymServerError:
             outcomes[False] += 1

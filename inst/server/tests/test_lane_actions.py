@@ -9,10 +9,11 @@ from vector_play import (
     twin,
 )
 
-from gym_server import spaces, tensors
-from gym_server.plain import plain
+from gym_server import spaces
+from gym_server.json_values import plain
+from gym_server.protocol import safetensors
+from gym_server.protocol.safetensors import TENSORS, Tensor
 from gym_server.spaces.stacking import stack
-from gym_server.tensors import TENSORS, Tensor
 
 
 @pytest.mark.parametrize(
@@ -59,7 +60,7 @@ def test_tensors_that_are_no_actions_are_named_with_their_lane(client, lanes, ki
     post(client, url, "reset", seed=1)
     answer = client.post(
         f"{url}/step/",
-        data=tensors.write({"action": Tensor.of(tensor)}, {}),
+        data=safetensors.write({"action": Tensor.of(tensor)}, {}),
         headers={"Content-Type": TENSORS},
     )
     assert (answer.status_code, answer.json["code"]) == (400, "action_not_in_space")

@@ -15,8 +15,8 @@ from vector_play import (
 )
 
 from gym_server import spaces
-from gym_server.plain import plain
-from gym_server.tensors import TENSORS
+from gym_server.json_values import plain
+from gym_server.protocol.safetensors import TENSORS
 
 
 def row(info, index):

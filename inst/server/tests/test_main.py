@@ -56,5 +56,5 @@ def test_what_an_old_python_reads_it_can_parse(name):
 
 
 def test_what_is_heavy_is_not_imported_at_the_start():
-    loaded = run("-c", "import sys, gym_server.cli; print(*sys.modules)").stdout.split()
+    loaded = run("-c", "import sys, gym_server.cli.main; print(*sys.modules)").stdout.split()
     assert not {"pygame", "moviepy", "PIL", "matplotlib", "cv2"} & set(loaded)

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.monitor_directory import MonitorRoot
+from gym_server.monitoring.monitor_directory import MonitorRoot
 
 ONE, TWO, THREE = "11111111", "22222222", "33333333"
 
@@ -132,7 +132,7 @@ def test_what_was_deleted_under_a_monitor_does_not_spoil_the_next_one(claim, mon
 HOLD = """
 import sys
 from pathlib import Path
-from gym_server.monitor_directory import MonitorRoot
+from gym_server.monitoring.monitor_directory import MonitorRoot
 files = MonitorRoot(Path(sys.argv[1]), False).claim("run", "99999999", False, False)
 files.begin(["episode"])
 files.table.write("0\\n")

@@ -6,7 +6,7 @@ import threading
 import time
 
 import pytest
-from test_serve import answered, read_answer, request
+from raw_http import answered, read_answer, request
 
 
 @pytest.fixture

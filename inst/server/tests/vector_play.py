@@ -8,10 +8,11 @@ import numpy as np
 from gymnasium.spaces import Dict, Discrete, Text, Tuple
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
-from gym_server import spaces, tensors
-from gym_server.plain import plain
+from gym_server import spaces
+from gym_server.json_values import plain
+from gym_server.protocol import safetensors
+from gym_server.protocol.safetensors import TENSORS
 from gym_server.spaces.stacking import stack
-from gym_server.tensors import TENSORS
 
 MODES = ["NextStep", "SameStep", "Disabled"]
 ACCEPT = {"Accept": TENSORS}
@@ -116,7 +117,7 @@ def check_tensors(space, name, file, batch):
 def read_tensors(answer):
     """Return the file in an answer."""
     assert (answer.status_code, answer.content_type) == (200, TENSORS), answer.data
-    return tensors.read(answer.data)
+    return safetensors.read(answer.data)
 
 
 def twin(space="Box", num_envs=3, autoreset_mode="NextStep", longest=4):
@@ -149,7 +150,7 @@ def action_file(env, batch, **metadata):
     if parts.texts:
         metadata["texts"] = parts.texts
     metadata = {name: json.dumps(value) for name, value in metadata.items()}
-    return tensors.write(parts.tensors, metadata)
+    return safetensors.write(parts.tensors, metadata)
 
 
 def check_that_no_lane_moved(client, url, kind, seed, mode="NextStep"):

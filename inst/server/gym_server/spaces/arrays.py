@@ -9,7 +9,7 @@ from functools import singledispatch
 import numpy as np
 from gymnasium.spaces import Space
 
-from gym_server.plain import NONFINITE
+from gym_server.json_values import NONFINITE
 from gym_server.spaces.kinds import NotInSpace
 
 

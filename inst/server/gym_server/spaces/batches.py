@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text, Tuple
 
+from gym_server.protocol.safetensors import Tensor
 from gym_server.spaces.arrays import (
     bounds_of,
     check_bounds,
@@ -33,7 +34,6 @@ from gym_server.spaces.tensor_parts import (
     refuse_leftovers,
     take_array,
 )
-from gym_server.tensors import Tensor
 
 _ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
 

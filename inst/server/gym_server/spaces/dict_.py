@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gymnasium.spaces import Dict
 
-from gym_server.plain import brief
+from gym_server.json_values import brief
 from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
 
 

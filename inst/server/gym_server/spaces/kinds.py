@@ -7,7 +7,7 @@ from functools import singledispatch
 
 from gymnasium.spaces import Space
 
-from gym_server.plain import brief
+from gym_server.json_values import brief
 
 
 class NotInSpace(Exception):  # noqa: N818 - it answers a question as often as it is an error

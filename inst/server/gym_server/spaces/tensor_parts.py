@@ -21,10 +21,10 @@ from gymnasium.spaces import (
     Tuple,
 )
 
+from gym_server.protocol.safetensors import Tensor, has_tensor, tensor_name
 from gym_server.spaces.arrays import bounds_of, check_bounds
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode
-from gym_server.tensors import Tensor, has_tensor, tensor_name
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import schemathesis
 from schemathesis import GenerationMode
 from schemathesis.core.parameters import ParameterLocation
 
-from gym_server import wire
-from gym_server.routes import ROUTES
+from gym_server.api.routes import ROUTES
+from gym_server.protocol import wire
 
 ENV_IDS = itertools.cycle(
     [

@@ -4,10 +4,10 @@ from gymnasium.spaces import Box, Discrete, MultiBinary
 from random_spaces import random_member, random_space, same
 
 from gym_server import spaces
-from gym_server.plain import plain
+from gym_server.json_values import plain
+from gym_server.protocol.safetensors import Tensor
 from gym_server.spaces import NotInSpace, Parts
 from gym_server.spaces.stacking import stack
-from gym_server.tensors import Tensor
 
 
 def are_readable(space, members):

@@ -7,7 +7,9 @@ import pytest
 import safetensors.numpy
 from random_spaces import random_member, random_space, same
 
-from gym_server import spaces, tensors, wire
+from gym_server import spaces
+from gym_server.protocol import wire
+from gym_server.protocol.safetensors import read, write
 from gym_server.spaces import Parts, arrays, tensor_parts
 
 SPACES, MEMBERS = 25, 5
@@ -42,8 +44,8 @@ def test_a_member_comes_back_through_tensors_as_it_was(seed):
     for space, member in pairs(seed, tensors=True):
         assert spaces.travels_as_tensors(space)
         parts = spaces.encode_tensors(space, "action", member)
-        raw = tensors.write(parts.tensors, {"texts": json.dumps(parts.texts)})
-        file = tensors.read(raw)
+        raw = write(parts.tensors, {"texts": json.dumps(parts.texts)})
+        file = read(raw)
         sent = Parts(file.tensors, json.loads(file.metadata["texts"]))
         back = spaces.decode_tensors(space, "action", sent)
         assert same(member, back), (space, member, back)

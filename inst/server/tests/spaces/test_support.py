@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, Graph, OneOf, Sequence, Space, Text, Tuple
 
-from gym_server import wire
 from gym_server.errors import GymServerError
+from gym_server.protocol import wire
 from gym_server.spaces import decode, describe, encode
 from gym_server.spaces.support import DEEPEST
 

@@ -1,0 +1,1 @@
+"""The routes of the protocol, who may call them, and that each call is done once."""

@@ -1,0 +1,237 @@
+"""Who may talk to this server: asked of every request before anything else is."""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import ipaddress
+import logging
+import re
+import socket
+from collections.abc import Collection
+from dataclasses import dataclass
+from urllib.parse import parse_qs
+
+from gym_server.api.watch_keys import WatchKeys
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+
+log = logging.getLogger(__name__)
+
+# A name or an address, and perhaps a port.
+_AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+?)\.?(?::([0-9]*))?")
+_ORIGIN = re.compile("(https?)://(.*)")
+_DEFAULT_PORTS = {"http": "80", "https": "443"}
+
+# What the key to a watch page opens, and what is no secret: the page's own files.
+_WATCH = re.compile("/v1/envs/([0-9a-f]+)/watch(?:/(?:state/?|presence/?)?)?")
+_WATCH_FILE = re.compile("/v1/envs/[0-9a-f]+/watch/[a-z]+[.](?:css|js)/?")
+
+_READS = ("GET", "HEAD")
+
+# Names that were looked into; a client that thinks up others is looked into each time.
+_MOST_KNOWN = 100
+
+
+@dataclass(frozen=True)
+class Access:
+    """Whom a server lets in.
+
+    Attributes:
+        token: what every request must carry; None for no such thing.
+        host: the address or name that the server listens on.
+        allowed_hosts: further names that clients may know it by, NAME or NAME:PORT.
+    """
+
+    token: str | None = None
+    host: str = "127.0.0.1"
+    allowed_hosts: Collection[str] = ()
+
+
+class Guard:
+    """Lets requests pass, or says why not."""
+
+    def __init__(self, access: Access, watch_keys: WatchKeys) -> None:
+        """Take the rules.
+
+        Args:
+            access: whom to let in.
+            watch_keys: the keys that open a watch page without a token.
+        """
+        self._expected = None if access.token is None else _header(access.token)
+        self._watch_keys = watch_keys
+        self._names = {"localhost", access.host.lower()}
+        self._origins = {split_host(name) for name in access.allowed_hosts}
+        self._names |= {name for name, _ in self._origins}
+        self._known_hosts: set[str] = set()
+        self._listens_on_loopback = is_loopback(access.host)
+        self._machine_names: set[str] | None = None
+
+    def check(self, environ: dict) -> None:
+        """Let a request pass.
+
+        Most pass by one look into a set, and with a token one comparison: 0.4 us.
+
+        Raises:
+            GymServerError: ``malformed_json`` (no Host, or several), ``foreign_host``,
+                ``foreign_origin``, ``unauthorized``.
+        """
+        if environ.get("HTTP_HOST") not in self._known_hosts:
+            self._check_host(environ)
+        if "HTTP_ORIGIN" in environ or "HTTP_SEC_FETCH_SITE" in environ:
+            self._check_page(environ)
+        if self._expected is not None and not self._has_token(environ):
+            self._check_watch_key(environ)
+
+    # A page from elsewhere can have its name resolve to this machine (DNS rebinding); then its
+    # browser names that page as the host. An address resolves to nothing else.
+    def _check_host(self, environ: dict) -> None:
+        host = environ.get("HTTP_HOST")
+        if host is None:
+            if environ.get("SERVER_PROTOCOL") == "HTTP/1.1":
+                raise GymServerError("malformed_json", "The request cannot be read: it has no Host")
+            return
+        if "," in host:
+            raise GymServerError("malformed_json", "The request cannot be read: it has two Hosts")
+        match = _AUTHORITY.fullmatch(host)
+        name = match[1].lower() if match else None
+        if name is None or not (_is_address(name) or self._is_ours(name)):
+            raise GymServerError(
+                "foreign_host",
+                f"This server does not answer to the name {brief(host)}",
+                "ask it by its address, or start it with --allow-host NAME",
+            )
+        if len(self._known_hosts) < _MOST_KNOWN:
+            self._known_hosts.add(host)
+
+    def _is_ours(self, name: str) -> bool:
+        if name in self._names:
+            return True
+        if self._machine_names is None:
+            # Only now, as it may have to ask the network.
+            self._machine_names = _machine_names(self._listens_on_loopback)
+        return name in self._machine_names
+
+    def _check_page(self, environ: dict) -> None:
+        origin = environ.get("HTTP_ORIGIN")
+        if origin is not None and not self._is_own_origin(origin, environ.get("HTTP_HOST", "")):
+            raise _foreign_origin(f"A page of {brief(origin)} may not ask this server")
+        # Browsers say so also where they name no Origin. One may follow a link from anywhere.
+        site = environ.get("HTTP_SEC_FETCH_SITE", "none")
+        navigates = (
+            environ.get("HTTP_SEC_FETCH_MODE") == "navigate" and environ["REQUEST_METHOD"] == "GET"
+        )
+        if site not in ("same-origin", "none") and not navigates:
+            raise _foreign_origin("A page from elsewhere may not ask this server")
+
+    def _is_own_origin(self, origin: str, host: str) -> bool:
+        parts = _ORIGIN.fullmatch(origin)
+        if parts is None:
+            return False
+        default = _DEFAULT_PORTS[parts[1]]
+        try:
+            name, port = split_host(parts[2], default)
+            # Another port of the same machine is another's page.
+            if (name, port) == split_host(host, default):
+                return True
+        except ValueError:
+            return False
+        return (name, port) in self._origins or (port == default and (name, "") in self._origins)
+
+    def _has_token(self, environ: dict) -> bool:
+        given = environ.get("HTTP_AUTHORIZATION", "").encode("latin-1", "replace")
+        if hmac.compare_digest(given, self._expected):
+            return True
+        # The scheme's name may be written in any way.
+        scheme, _, token = given.partition(b" ")
+        return scheme.lower() == b"bearer" and hmac.compare_digest(
+            b"Bearer " + token.strip(), self._expected
+        )
+
+    def knows(self, environ: dict) -> bool:
+        """Tell whether a request shows the token, or a key; where there is none, everybody does."""
+        if self._expected is None or self._has_token(environ):
+            return True
+        opens, _ = self._watch_key(environ)
+        return opens
+
+    def _watch_key(self, environ: dict) -> tuple[bool, str | None]:
+        """Return whether a request shows a key that opens what it asks for, and the key."""
+        match = _WATCH.fullmatch(environ["PATH_INFO"])
+        if match is None or environ["REQUEST_METHOD"] not in _READS:
+            return False, None
+        key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
+        return self._watch_keys.opens(key, match[1]), key
+
+    def _check_watch_key(self, environ: dict) -> None:
+        if environ["REQUEST_METHOD"] in _READS and _WATCH_FILE.fullmatch(environ["PATH_INFO"]):
+            return
+        opens, key = self._watch_key(environ)
+        if not opens:
+            log.info("Refused a request from %s without a token", environ.get("REMOTE_ADDR"))
+            raise _unauthorized(key, "HTTP_AUTHORIZATION" in environ)
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether an address or a name can be reached from this machine alone."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _header(token: str) -> bytes:
+    return f"Bearer {token}".encode("latin-1")
+
+
+def split_host(authority: str, default_port: str = "") -> tuple[str, str]:
+    """Return the name in NAME or NAME:PORT, in lower case, and the port; else raise ValueError."""
+    match = _AUTHORITY.fullmatch(authority)
+    if match is None:
+        raise ValueError(f"{authority!r} is no name of a host")
+    return match[1].lower(), match[2] or default_port
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+def _machine_names(listens_on_loopback: bool) -> set[str]:
+    names = {socket.gethostname().lower()}
+    if not listens_on_loopback:
+        with contextlib.suppress(OSError, UnicodeError):
+            names.add(socket.getfqdn().lower().rstrip("."))
+    return names
+
+
+def _foreign_origin(message: str) -> GymServerError:
+    return GymServerError(
+        "foreign_origin",
+        message,
+        "web pages cannot drive it; behind a proxy, start it with --allow-host NAME",
+    )
+
+
+def _unauthorized(key: str | None, has_header: bool) -> GymServerError:
+    if key:
+        return GymServerError(
+            "unauthorized",
+            "The key in this link is no longer good, or is that of another environment",
+            "R's env_watch() makes a new link",
+        )
+    if key is not None and not has_header:
+        return GymServerError(
+            "unauthorized",
+            "This page opens with a link that holds a key",
+            "R's env_watch() makes one",
+        )
+    message = (
+        "The token is not this server's" if has_header else "This server asks everybody for a token"
+    )
+    return GymServerError(
+        "unauthorized", message, "send the header 'Authorization: Bearer' with the server's token"
+    )

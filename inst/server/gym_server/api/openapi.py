@@ -1,0 +1,174 @@
+"""The protocol, for machines: an OpenAPI document made from the routes' own declarations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from gym_server import __version__
+from gym_server.api.schemas import ANSWERS
+from gym_server.protocol import wire
+from gym_server.protocol.safetensors import TENSORS
+
+if TYPE_CHECKING:
+    from gym_server.api.routes import Route
+    from gym_server.protocol.wire import Field
+
+_ERROR = {
+    "type": "object",
+    "required": ["message", "code", "documentation_url"],
+    "properties": {
+        "message": {"type": "string"},
+        "code": {"type": "string"},
+        "documentation_url": {"type": "string", "format": "uri"},
+        "hint": {"type": "string"},
+        "extra": {"type": "string", "description": "The extra of the server that is missing."},
+    },
+}
+
+
+# What classic clients send for a parameter that they do not set.
+_ABSENT = {"enum": [None, "", []], "description": "As if it were not there."}
+_ABSENT_REFERENCE = {"$ref": "#/components/schemas/Absent"}
+
+
+def document(routes: Iterable[Route]) -> dict:
+    """Return the OpenAPI 3.1 document of some routes."""
+    routes = list(routes)
+    paths: dict[str, dict] = {}
+    for route in routes:
+        path = re.sub(r"<(\w+)>", r"{\1}", route.path)
+        paths.setdefault(path, {})[route.method.lower()] = _operation(route)
+    _link_created(paths)
+    return {
+        "openapi": "3.1.0",
+        "info": {
+            "title": "gym_server",
+            "version": __version__,
+            "description": "Gymnasium environments over HTTP.",
+        },
+        "paths": paths,
+        "components": {"schemas": {"Error": _ERROR, "Absent": _ABSENT}},
+    }
+
+
+def _link_created(paths: dict[str, dict]) -> None:
+    """Say where the instance_id that creating answers is of use."""
+    created = paths.get("/v1/envs/", {}).get("post")
+    if created is None:
+        return
+    created["responses"]["200"]["links"] = {
+        operation["operationId"]: {
+            "operationId": operation["operationId"],
+            "parameters": {"instance_id": "$response.body#/instance_id"},
+        }
+        for path, operations in paths.items()
+        for operation in operations.values()
+        if "{instance_id}" in path
+    }
+
+
+def _operation(route: Route) -> dict:
+    doc = route.handler.__doc__ or ""
+    operation = {
+        "operationId": route.handler.__name__,
+        "summary": doc.split("\n")[0],
+        "responses": {
+            str(route.status): _answer(route),
+            "default": {
+                "description": "What went wrong.",
+                "content": {wire.JSON: {"schema": {"$ref": "#/components/schemas/Error"}}},
+            },
+        },
+    }
+    parameters = [
+        {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
+        for name in re.findall(r"<(\w+)>", route.path)
+    ]
+    if route.method == "GET":
+        parameters += map(_query, route.fields)
+    elif fields := (*route.fields, wire.REQUEST) if route.once else route.fields:
+        operation["requestBody"] = _request_body(route, fields)
+    if parameters:
+        operation["parameters"] = parameters
+    return operation
+
+
+def _answer(route: Route) -> dict:
+    if not route.answer:
+        answer: dict = {"description": "Done."}
+        if route.once:
+            answer["headers"] = {
+                "Gym-Request": {
+                    "description": "Key and number of the request, when it had them.",
+                    "schema": {"type": "string"},
+                }
+            }
+        return answer
+    is_json = route.content_type == wire.JSON
+    schema = ANSWERS.get(route.handler.__name__, {"type": "object"})
+    content: dict = {route.content_type: {"schema": schema} if is_json else {}}
+    if route.html:
+        content[wire.HTML] = {}
+    if route.tensors:
+        # Raw bytes have no schema.
+        content[TENSORS] = {}
+    return {"description": route.answer, "content": content}
+
+
+def _query(field: Field) -> dict:
+    schema = field.kind.schema
+    if field.kind.empty_is_absent and schema.get("type") != "string":
+        schema = {"anyOf": [schema, {"const": "", "description": _ABSENT["description"]}]}
+    return {
+        "name": field.name,
+        "in": "query",
+        "required": field.required,
+        "description": field.doc,
+        "schema": schema,
+    }
+
+
+def _request_body(route: Route, fields: Iterable[Field]) -> dict:
+    required = any(field.required for field in fields)
+    schema = _body(fields)
+    body = {
+        "required": required,
+        "content": {
+            wire.JSON: {"schema": schema if required else {"anyOf": [schema, _ABSENT_REFERENCE]}}
+        },
+    }
+    if route.tensor_body:
+        body["content"][TENSORS] = {}
+        body["description"] = (
+            "As tensors: one safetensors file of the tensors 'action' (parts of nested ones by "
+            "JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so "
+            "are 'texts', an object of those by name."
+        )
+    return body
+
+
+def _body(fields: Iterable[Field]) -> dict:
+    schema = {
+        "type": "object",
+        "properties": {field.name: _property(field) for field in fields},
+    }
+    required = [field.name for field in fields if field.required]
+    if required:
+        schema["required"] = required
+    return schema
+
+
+def _property(field: Field) -> dict:
+    """Return the schema of what is taken for a field, also of what is not meant to be there."""
+    schema = field.kind.schema
+    if field.required:
+        if field.kind.empty_is_absent and schema.get("type") == "string":
+            schema = {**schema, "minLength": 1}
+        if not schema:
+            schema = {"not": {"type": "null"}}
+    elif schema:
+        absent = _ABSENT_REFERENCE if field.kind.empty_is_absent else {"type": "null"}
+        schema = {"anyOf": [schema, absent]}
+    return {**schema, "description": field.doc}

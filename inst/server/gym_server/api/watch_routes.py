@@ -1,0 +1,124 @@
+"""The watch page's routes: the page itself, and what it shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gym_server import viewing
+from gym_server.api import fields
+from gym_server.api.routes import INSTANCE, Call, declare
+from gym_server.api.watch_keys import KEY_SECONDS
+from gym_server.errors import GymServerError
+from gym_server.protocol.wire import JSON, Content, Field
+
+_PAGE = Path(viewing.__file__).parent / "page"
+_WATCH = INSTANCE + "watch/"
+
+_HTML = "text/html; charset=utf-8"
+_CSS = "text/css; charset=utf-8"
+_JAVASCRIPT = "text/javascript; charset=utf-8"
+
+# What the page shows is of this moment, and it is made anew with the server.
+_NOT_KEPT = ("Cache-Control", "no-store")
+_PAGE_HEADERS = (
+    _NOT_KEPT,
+    # Nothing from elsewhere, and nothing that does not stand in the package's files.
+    (
+        "Content-Security-Policy",
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+        "img-src 'self' data:; base-uri 'none'; form-action 'none'",
+    ),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Referrer-Policy", "no-referrer"),
+)
+
+
+@declare("GET", _WATCH, answer="a page for a browser", content_type=_HTML)
+def env_watch(call: Call) -> Content:
+    """Show an environment live to people."""
+    try:
+        _ = call.instance
+        status = 200
+    except GymServerError as refusal:
+        # A browser gets the page all the same: it says so in words, and what else there is.
+        if "text/html" not in call.accept:
+            raise
+        status = refusal.status
+    return page(call.url, status)
+
+
+def page(url: str, status: int) -> Content:
+    """Return the watch page; what it has to tell it learns from what it asks for.
+
+    Args:
+        url: the path that it was asked for by.
+        status: the HTTP status.
+    """
+    # Also without the last slash the page finds what belongs to it, below any proxy's folder.
+    here = "" if url.endswith("/") else "watch/"
+    return Content(
+        _read("watch.html").replace(b"{here}", here.encode()), _HTML, status, _PAGE_HEADERS
+    )
+
+
+@declare(
+    "POST",
+    _WATCH + "key/",
+    answer="key: opens the page as watch/?key=KEY, without a token, and seconds: how long after "
+    "its last use it does; both null where no page needs one",
+)
+def env_watch_key(call: Call) -> dict:
+    """Make a key to an environment's page, for a browser that has no token."""
+    _ = call.instance
+    keys = call.services.watch_keys
+    if keys is None:
+        return {"key": None, "seconds": None}
+    return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
+
+
+@declare("GET", _WATCH + "watch.css/", answer="how the page looks", content_type=_CSS)
+def env_watch_style(call: Call) -> Content:
+    """Tell the watch page's browser how it looks."""
+    return Content(_read("watch.css"), _CSS, headers=_PAGE_HEADERS)
+
+
+@declare("GET", _WATCH + "<script>.js/", answer="what the page does", content_type=_JAVASCRIPT)
+def env_watch_script(call: Call) -> Content:
+    """Tell the watch page's browser what it does."""
+    name = call.path["script"]
+    if name not in _SCRIPTS:
+        raise GymServerError("not_found", f"The watch page has no script {name}.js")
+    return Content(_read(f"{name}.js"), _JAVASCRIPT, headers=_PAGE_HEADERS)
+
+
+@declare(
+    "GET",
+    _WATCH + "state/",
+    Field("lane", fields.LANE, "Which lane, from 0; absent for the first."),
+    Field("after", fields.LANE, "The number of what was seen last; absent for the present."),
+    answer="number, state (running, ended, not_reset, busy), env_id, lane, lanes, episode, step, "
+    "return, returns (of the last 100 episodes that ended, in any lane), steps, reward_threshold, "
+    "fps (null unless it is shown in real time), frame (a PNG in Base64, or null), and without "
+    "a frame why_no_picture, hint and observation (names, values, size)",
+)
+def env_watch_state(call: Call) -> Content:
+    """Wait for something new to see; drawing takes place only for those who wait here."""
+    lane = call.fields["lane"] or 0
+    call.instance.check_lane(lane)
+    with call.services.watchers.one_more():
+        body = call.instance.screen.see(lane, call.fields["after"])
+    return Content(body, JSON, headers=(_NOT_KEPT,))
+
+
+@declare("GET", _WATCH + "presence/", answer="watched: true")
+def env_watch_presence(call: Call) -> dict:
+    """Say that somebody goes on watching, without a picture for now."""
+    call.instance.screen.attend()
+    return {"watched": True}
+
+
+def _read(name: str) -> bytes:
+    return (_PAGE / name).read_bytes()
+
+
+_SCRIPTS = frozenset(path.stem for path in _PAGE.glob("*.js"))

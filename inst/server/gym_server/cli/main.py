@@ -1,0 +1,188 @@
+"""The command line."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import logging
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from gym_server.api.access import Access, is_loopback
+from gym_server.api.app import Config, GymApp, create_app
+from gym_server.cli.open_files import allow_many_open_files
+from gym_server.cli.options import parser
+from gym_server.cli.port_holder import port_holder
+from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
+from gym_server.http_server.server import Server, bind
+from gym_server.manager.limits import Limits
+from gym_server.processes import memory, start
+
+log = logging.getLogger("gym_server")
+
+# Windows knows a port that is bound exclusively by the second.
+_TAKEN = (errno.EADDRINUSE, 10013)
+
+# A step that never returns must not keep the server alive for ever.
+_GRACE_SECONDS = 10.0
+
+# After that, for the environments that can be closed.
+_LAST_SECONDS = 2.0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve until asked to stop.
+
+    Args:
+        argv: the arguments; None for the process's own.
+
+    Returns:
+        The exit status: 0 after a stop, 1 when the server cannot start.
+    """
+    options = parser().parse_args(argv)
+    _set_up_logging(options.log_level)
+    try:
+        token = _find_token(options)
+    except BadTokenError as fault:
+        return _fail(str(fault))
+    except OSError as error:
+        return _fail(f"the file {options.token_file} cannot be read: {error.strerror or error}")
+    is_private = is_loopback(options.host) and token is None
+    if not is_loopback(options.host) and token is None and not options.no_auth:
+        return _fail(
+            f"--host {options.host} lets anybody on the network run environments on this machine "
+            f"and write files; give --token-file FILE or the variable {VARIABLE}, or --no-auth if "
+            "that is meant"
+        )
+    allow_many_open_files()
+    stop = _Stop()
+    max_body_bytes = options.max_body_mb * 2**20
+    try:
+        monitor_dir = _prepare_monitor_dir(options.monitor_dir)
+        listener = bind(options.host, options.port)
+    except OSError as error:
+        return _fail(_why_not(error, options))
+    app = create_app(
+        Config(
+            monitor_dir=monitor_dir,
+            temporary_monitors=is_private,
+            allowed_modules=options.allow_module,
+            max_body_bytes=max_body_bytes,
+            limits=Limits(
+                options.max_instances,
+                options.max_num_envs,
+                options.max_total_lanes,
+                options.max_processes,
+                options.max_memory_mb,
+                options.max_watchers,
+                options.max_call_seconds,
+                options.idle_minutes,
+            ),
+            isolate=options.isolate,
+            max_worker_mb=options.max_worker_mb,
+            stop=stop,
+            access=Access(token, options.host, options.allow_host),
+            client_stop=not options.no_shutdown,
+            allowed_paths=None if is_private else options.allow_path,
+        )
+    )
+    server = Server(app, listener, max_body_bytes, app.end_watching, app.admit, app.knows)
+    stop.server = server
+    app.answer_for = server.answer_for
+    _stop_on_signals(stop)
+    if options.stop_on_stdin_eof:
+        threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
+    memory.prepare()
+    print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
+    # What environments print must not fill a pipe that nobody reads.
+    os.dup2(2, 1)
+    _serve(app, server)
+    return 0
+
+
+def _set_up_logging(level: str) -> None:
+    logging.basicConfig(
+        level=level.upper(),
+        stream=sys.stderr,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    logging.captureWarnings(True)
+    # RecordVideo says so of any folder that exists; what is in ours is the monitor's affair.
+    warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
+
+
+def _find_token(options: argparse.Namespace) -> str | None:
+    if options.no_auth and options.token_file is not None:
+        raise BadTokenError("--no-auth and --token-file exclude each other")
+    token = find_token(options.token_file, os.environ)
+    return None if options.no_auth else token
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _prepare_monitor_dir(directory: Path | None) -> Path | None:
+    if directory is None:
+        return None
+    directory.mkdir(parents=True, exist_ok=True)
+    return directory.resolve()
+
+
+def _why_not(error: OSError, options: argparse.Namespace) -> str:
+    if error.filename is not None:
+        return f"the directory {error.filename} cannot be used: {error.strerror}"
+    holder = port_holder(options.host, options.port) if error.errno in _TAKEN else None
+    reason = holder or error.strerror or error
+    return (
+        f"port {options.port} on {options.host} cannot be used: {reason}; --port 0 takes a free one"
+    )
+
+
+def _fail(reason: str) -> int:
+    print(f"gym_server: {reason}", file=sys.stderr, flush=True)
+    return 1
+
+
+class _Stop:
+    """Stops the server, which is made after the application that may want to stop it."""
+
+    server: Server | None = None
+
+    def __call__(self) -> None:
+        if self.server is not None:
+            self.server.stop()
+
+
+def _stop_on_signals(stop: Callable[[], None]) -> None:
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: stop())
+
+
+def _wait_for_eof(stop: Callable[[], None]) -> None:
+    # Not sys.stdin, whose lock this thread would still hold when the interpreter ends.
+    try:
+        while os.read(0, 4096):
+            pass
+    except OSError:
+        pass
+    stop()
+
+
+def _serve(app: GymApp, server: Server) -> None:
+    answered = server.run(_GRACE_SECONDS)
+    closer = threading.Thread(target=app.close, daemon=True)
+    closer.start()
+    closer.join(_GRACE_SECONDS if answered else _LAST_SECONDS)
+    if closer.is_alive() or not answered:
+        log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
+        logging.shutdown()
+        start.remove_temporary_folder()
+        # An ordinary exit would wait for its thread.
+        os._exit(0)

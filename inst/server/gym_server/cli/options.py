@@ -1,0 +1,215 @@
+"""What can be said on the command line."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from gym_server import __version__
+from gym_server.api.access import split_host
+from gym_server.cli.token_file import VARIABLE
+from gym_server.isolation.policy import MODES
+from gym_server.manager.limits import Limits
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    options = argparse.ArgumentParser(
+        prog="gym-http-server",
+        description="Gymnasium environments over HTTP.",
+        # --token would be taken for --token-file, and an error would show it.
+        allow_abbrev=False,
+    )
+    options.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
+    options.add_argument(
+        "--port",
+        type=_number(0, 65535),
+        default=5000,
+        help="port; 0 takes a free one (%(default)s)",
+    )
+    options.add_argument(
+        "--log-level",
+        default="warning",
+        choices=("debug", "info", "warning", "error"),
+        help="what goes to standard error (%(default)s)",
+    )
+    options.add_argument(
+        "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
+    )
+    options.add_argument(
+        "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
+    )
+    options.add_argument(
+        "--allow-module",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
+    )
+    _add_limits(options)
+    _add_isolation(options)
+    _add_access(options)
+    options.add_argument("--version", action="version", version=__version__)
+    return options
+
+
+def _add_limits(options: argparse.ArgumentParser) -> None:
+    limits = options.add_argument_group("limits, for all clients together")
+    limits.add_argument(
+        "--max-body-mb",
+        type=_number(1, 1024),
+        default=16,
+        help="size of the largest request (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-instances",
+        type=_number(1, 1_000_000),
+        default=Limits.max_instances,
+        help="environments at a time (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-num-envs",
+        type=_number(1, 1_000_000),
+        default=Limits.max_num_envs,
+        help="lanes of the largest vector environment (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-total-lanes",
+        type=_number(1, 100_000_000),
+        default=Limits.max_total_lanes,
+        help="lanes of all environments together (four times --max-num-envs)",
+    )
+    limits.add_argument(
+        "--max-processes",
+        type=_number(1, 100_000),
+        default=Limits.max_processes,
+        help="processes of all environments together: those of 'async' lanes, and of environments "
+        "that have one of their own (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-memory-mb",
+        type=_number(1, 2**24),
+        default=Limits.max_memory_mb,
+        help="memory that all environments together may be reckoned to take at their most "
+        "(%(default)s)",
+    )
+    limits.add_argument(
+        "--max-watchers",
+        type=_number(1, 1_000_000),
+        default=Limits.max_watchers,
+        help="watch pages at a time (%(default)s)",
+    )
+    limits.add_argument(
+        "--max-call-seconds",
+        type=_duration,
+        default=Limits.max_call_seconds,
+        metavar="SECONDS",
+        help="that a call may take before its environment is given up; 0 for ever (%(default)g)",
+    )
+    limits.add_argument(
+        "--idle-minutes",
+        type=_duration,
+        default=Limits.idle_minutes,
+        metavar="MINUTES",
+        help="after which an environment that nobody uses or watches is closed; 0 for never "
+        "(%(default)g, a day)",
+    )
+
+
+def _duration(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0 <= float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 0")
+
+
+def _add_isolation(options: argparse.ArgumentParser) -> None:
+    options.add_argument(
+        "--isolate",
+        default="foreign",
+        choices=MODES,
+        help="which environments get a process of their own, so that one that crashes takes no "
+        "other along: those of other modules than Gymnasium's (foreign), none or all (%(default)s)",
+    )
+    options.add_argument(
+        "--max-worker-mb",
+        type=_worker_mb,
+        default=0,
+        help="memory that such a process may have, on Linux; 0 for as much as there is "
+        "(%(default)s)",
+    )
+
+
+def _worker_mb(text: str) -> int:
+    size = _number(0, 2**24)(text)
+    if size and sys.platform != "linux":
+        raise argparse.ArgumentTypeError("only Linux keeps such a limit")
+    return size
+
+
+def _host_name(text: str) -> str:
+    try:
+        split_host(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither NAME nor NAME:PORT") from None
+    return text
+
+
+class _RefuseToken(argparse.Action):
+    """Refuses a token where everybody on the machine can read it, without repeating it."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        parser.error(
+            "a token on the command line is seen by everybody on this machine; --token-file FILE "
+            f"or the variable {VARIABLE} hold it"
+        )
+
+
+def _add_access(options: argparse.ArgumentParser) -> None:
+    options.add_argument("--token", action=_RefuseToken, help=argparse.SUPPRESS)
+    options.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        help="holds a token of 16 characters or more, which every request must carry; without "
+        f"this option the variable {VARIABLE} may hold it",
+    )
+    options.add_argument(
+        "--no-auth",
+        action="store_true",
+        help="serve everybody without a token, also on a --host that others can reach",
+    )
+    options.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        type=_host_name,
+        metavar="NAME",
+        help="a further name (or NAME:PORT) that the server is known by, such as a proxy's; "
+        "repeatable",
+    )
+    options.add_argument(
+        "--no-shutdown", action="store_true", help="clients cannot stop the server"
+    )
+    options.add_argument(
+        "--allow-path",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="DIR",
+        help="a directory in which kwargs may name files, on a server with a token or a --host "
+        "that others can reach; repeatable",
+    )
+
+
+def _number(least: int, greatest: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= greatest:
+            raise argparse.ArgumentTypeError(f"{text!r} is not between {least} and {greatest}")
+        return int(text)
+
+    return parse

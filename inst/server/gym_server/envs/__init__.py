@@ -1,0 +1,1 @@
+"""Gymnasium's environments: which there are, and how they are made and wrapped."""

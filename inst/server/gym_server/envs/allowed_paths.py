@@ -1,0 +1,78 @@
+"""Which paths clients may hand to environments and wrappers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from gym_server.envs.config import Choices
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+
+# Separators of any system, a home directory, a drive, what is hidden or climbs, and what ends
+# a name in C.
+_PATH_LIKE = re.compile(r"[/\\\0]|^[~.]|^[A-Za-z]:")
+
+# Deeper than anything that a constructor takes, and far from where recursion ends.
+_DEEPEST = 32
+
+
+class AllowedPaths:
+    """What clients may name of this machine's files."""
+
+    def __init__(self, directories: Collection[Path] | None = None) -> None:
+        """Set the limits.
+
+        Args:
+            directories: paths must lie below one of them; None for any path, where the client
+                is who started the server.
+        """
+        self._directories = None if directories is None else [d.resolve() for d in directories]
+
+    def check(self, choices: Choices) -> None:
+        """Look through everything that a client hands to constructors.
+
+        Raises:
+            GymServerError: ``invalid_kwargs``.
+        """
+        self._check(choices.kwargs or {}, "kwargs")
+        for wrapper in choices.wrappers:
+            self._check(wrapper.kwargs, wrapper.name)
+
+    def _check(self, kwargs: dict, owner: str) -> None:
+        for text in _texts(kwargs, owner):
+            if self._directories is None or _PATH_LIKE.search(text) is None:
+                continue
+            if not self._lies_below(text, self._directories):
+                raise GymServerError(
+                    "invalid_kwargs",
+                    f"{owner}: {brief(text)} may be a path, and clients may name none that does "
+                    "not lie in a directory that the server's operator allowed",
+                    "start the server with --allow-path DIR, and give the whole path",
+                )
+
+    def _lies_below(self, text: str, directories: list[Path]) -> bool:
+        try:
+            path = Path(text)
+            # What another one means depends on who opens it.
+            return path.is_absolute() and any(d in path.resolve().parents for d in directories)
+        except (OSError, RuntimeError, ValueError):
+            return False
+
+
+def _texts(value: object, owner: str, depth: int = 0) -> Iterator[str]:
+    """Return all texts in a JSON value, names too."""
+    if depth > _DEEPEST:
+        raise GymServerError(
+            "invalid_kwargs", f"{owner}: there are more than {_DEEPEST} lists in one another"
+        )
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            yield name
+            yield from _texts(item, owner, depth + 1)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _texts(item, owner, depth + 1)

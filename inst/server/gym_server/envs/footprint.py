@@ -1,0 +1,245 @@
+"""How much memory an environment will take, reckoned before it takes it.
+
+What is reckoned is the most that the environment and one answer in JSON need at a time. The figures
+for the environments themselves were measured as the growth of a process by each further one
+(Gymnasium 1.4, ale_py 0.12), and rounded up.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Dict, Graph, OneOf, Sequence, Text, Tuple
+
+from gym_server.budget import Budget
+from gym_server.envs.registry import module_of
+from gym_server.errors import GymServerError
+
+_KB, _MB = 2**10, 2**20
+
+# By the beginning of its module, the longest first; those of all other modules are small.
+_ENVIRONMENT_BYTES = {
+    "gymnasium.envs.toy_text.taxi": 1 * _MB,
+    "gymnasium.envs.toy_text": 128 * _KB,
+    "gymnasium.envs.box2d.car_racing": 5 * _MB,
+    "gymnasium.envs.box2d": 512 * _KB,
+    "gymnasium.envs.mujoco": 2 * _MB,
+    "ale_py": 2 * _MB,
+}
+_OTHER_ENVIRONMENT_BYTES = 16 * _KB
+
+# A map of FrozenLake becomes a table of transitions, of so much for each of its letters. What a
+# few arguments say is in the figures above.
+_ARGUMENT_LETTER_BYTES = 2 * _KB
+_FREE_ARGUMENT_LETTERS = 64
+
+# Arrays of bounds, with the digits that they are written in.
+_WRAPPER_LETTER_BYTES = 16
+_WRAPPER_BYTES = 1 * _KB
+
+# Each space has an object for each part of it; its bounds, and an observation.
+_PART_BYTES = 512
+_COPIES = 3
+
+# A number as it is sent as JSON: an object in a list (small integers are there already), its digits
+# in a text, and again as bytes. And its two bounds as such objects in the space's description.
+_SHORT_NUMBER_BYTES, _NUMBER_BYTES = 44 + 16, 80 + 64
+
+
+class Account:
+    """What one creation takes of a budget.
+
+    Attributes:
+        taken: how many bytes that are.
+    """
+
+    def __init__(self, budget: Budget | None = None, num_envs: int = 1) -> None:
+        """Have taken nothing.
+
+        Args:
+            budget: what it takes from; None for one without an end.
+            num_envs: what is charged is charged for so many.
+        """
+        self._budget = budget or Budget()
+        self._num_envs = num_envs
+        self.taken = 0.0
+
+    def charge(self, size: float, what: str, soon: float = 0.0) -> None:
+        """Take memory for something of each sub-environment, before it is made.
+
+        Args:
+            size: bytes of one of them.
+            what: names it in a refusal.
+            soon: bytes that will be charged later, for which there must be room as well.
+
+        Raises:
+            GymServerError: ``too_much_memory``.
+        """
+        self.take((size + soon) * self._num_envs, what)
+        self.taken -= soon * self._num_envs
+        self._budget.give_back(soon * self._num_envs)
+
+    def take(self, size: float, what: str) -> None:
+        """Take memory; see ``charge()``."""
+        if not self._budget.take(size):
+            raise self._refusal(size, what)
+        self.taken += size
+
+    def give_back(self) -> None:
+        """Give everything back."""
+        taken, self.taken = self.taken, 0.0
+        self._budget.give_back(taken)
+
+    def _refusal(self, size: float, what: str) -> GymServerError:
+        whose = f" of {self._num_envs} sub-environments" if self._num_envs > 1 else ""
+        return GymServerError(
+            "too_much_memory",
+            f"{what}{whose} would bring this environment to {_in_mb(self.taken + size)} MiB, "
+            f"reckoned at its most, and {_in_mb(self._budget.left + self.taken)} MiB are left of "
+            f"the {_in_mb(self._budget.most)} MiB for all environments together",
+            "fewer sub-environments or smaller observations take less; close what is not needed, "
+            "GET /v1/instances/ lists it; the server's option --max-memory-mb sets the limit",
+        )
+
+
+def _in_mb(size: float) -> str:
+    return f"{size / _MB:,.0f}" if size < 1e15 else f"{size / _MB:.1e}"
+
+
+def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
+    """Reckon an environment without its observations."""
+    module = module_of(spec)
+    letters = len(json.dumps(kwargs, default=str))
+    for beginning, size in _ENVIRONMENT_BYTES.items():
+        if module.startswith(beginning):
+            return size + _ARGUMENT_LETTER_BYTES * max(0, letters - _FREE_ARGUMENT_LETTERS)
+    return _OTHER_ENVIRONMENT_BYTES + _WRAPPER_LETTER_BYTES * letters
+
+
+def vector_bytes(spec: EnvSpec, kwargs: dict) -> float:
+    """Reckon a sub-environment of an environment's own vector implementation."""
+    if module_of(spec).partition(".")[0] != "ale_py":
+        return environment_bytes(spec, kwargs)
+    # Atari's stacks pictures of a size that its arguments say.
+    sides = [_number(kwargs.get(f"img_{side}", 84)) for side in ("height", "width")]
+    frames = _number(kwargs.get("stack_num", 4)) * (1 if kwargs.get("grayscale", True) else 3)
+    return environment_bytes(spec, kwargs) + _COPIES * frames * math.prod(sides)
+
+
+def answer_bytes(space: gymnasium.Space) -> float:
+    """Reckon an observation on its way to the client, for each sub-environment."""
+    return sum(
+        _PART_BYTES
+        + _COPIES * elements * size
+        + elements * (_NUMBER_BYTES if size > 1 else _SHORT_NUMBER_BYTES)
+        for elements, size in _parts(space)
+    )
+
+
+def observation_bytes(space: gymnasium.Space) -> float:
+    """Return how many bytes an observation has."""
+    return sum(elements * size for elements, size in _parts(space))
+
+
+class Reckoned(NamedTuple):
+    """What a wrapper takes, in bytes: for as long as it is there, and on the way to the client."""
+
+    kept: float
+    answer: float
+
+
+def reckon_wrapper(name: str, kwargs: dict, env: gymnasium.Env) -> Reckoned:
+    """Reckon a wrapper around an environment, before it is made.
+
+    Args:
+        name: the wrapper's.
+        kwargs: what it gets.
+        env: what it is put around.
+    """
+    space = env.observation_space
+    elements = sum(elements for elements, _ in _parts(space))
+    observation = observation_bytes(space)
+    queue = 0.0
+    match name:
+        case "FrameStackObservation":
+            size = _number(kwargs.get("stack_size"))
+            elements, observation = elements * size, observation * size
+            # It keeps the last ones, and an array for all of them.
+            queue = 2 * observation
+        case "DelayObservation":
+            queue = observation * _number(kwargs.get("delay"))
+        case "ResizeObservation":
+            elements = observation = _product(kwargs.get("shape")) * _channels(space)
+        case "AtariPreprocessing":
+            elements = 3 * _product(kwargs.get("screen_size", 84))
+            observation = 4 * elements
+        case "FlattenObservation" | "TimeAwareObservation":
+            elements = 1 + _flat_elements(space)
+            observation = 8 * elements
+        case "DtypeObservation" | "NormalizeObservation":
+            observation = queue = 16 * elements
+        case "DiscretizeObservation":
+            queue = 16 * _bins(kwargs.get("bins"), space)
+        case "DiscretizeAction":
+            queue = 16 * _bins(kwargs.get("bins"), env.action_space)
+    letters = len(json.dumps(kwargs, default=str))
+    objects = _WRAPPER_BYTES + _PART_BYTES * len(list(_parts(space)))
+    return Reckoned(
+        objects + _WRAPPER_LETTER_BYTES * letters + _COPIES * observation + queue,
+        elements * (_NUMBER_BYTES if observation > elements else _SHORT_NUMBER_BYTES),
+    )
+
+
+def _parts(space: gymnasium.Space) -> Iterator[tuple[float, int]]:
+    """Return how many elements each part of a space has, and how many bytes one of them has."""
+    waiting = [space]
+    while waiting:
+        match waiting.pop():
+            case Dict() as one:
+                waiting.extend(one.spaces.values())
+            case Tuple() | OneOf() as one:
+                waiting.extend(one.spaces)
+            case Sequence() as one:
+                waiting.append(one.feature_space)
+            case Graph() as one:
+                waiting.extend(part for part in (one.node_space, one.edge_space) if part)
+            case Text() as one:
+                yield one.max_length, 4
+            case one:
+                dtype = one.dtype
+                yield math.prod(map(int, one.shape or ())), dtype.itemsize if dtype else 8
+
+
+def _flat_elements(space: gymnasium.Space) -> float:
+    try:
+        return gymnasium.spaces.flatdim(space)
+    except (ValueError, NotImplementedError, OverflowError):
+        # It is refused when it is made.
+        return 0
+
+
+def _bins(bins: object, space: gymnasium.Space) -> float:
+    elements = sum(elements for elements, _ in _parts(space))
+    return sum(map(_number, bins)) if isinstance(bins, list) else elements * _number(bins)
+
+
+def _channels(space: gymnasium.Space) -> int:
+    return math.prod((space.shape or ())[2:])
+
+
+def _product(shape: object) -> float:
+    """Return how many pixels there are in a picture of a shape, or of the length of its sides."""
+    sides = shape if isinstance(shape, list) else [shape, shape]
+    return math.prod(map(_number, sides))
+
+
+def _number(value: object) -> float:
+    """Return an argument that should be a number; what is none is refused when it is used."""
+    is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    return max(0, value) if is_number else 0

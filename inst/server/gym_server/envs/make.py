@@ -1,0 +1,276 @@
+"""Make an environment from its id, and say what is wrong with an id that names none."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import gymnasium
+from gymnasium import error
+from gymnasium.envs import registration
+
+from gym_server.envs import footprint, mujoco, repeats
+from gym_server.envs.atari import classic_game
+from gym_server.envs.extras import extra_of, is_available, missing_extra, unmet_module
+from gym_server.envs.registry import LONGEST_ID, importing, look_up, near
+from gym_server.errors import GymServerError, environment_error, invalid_parameter
+from gym_server.json_values import brief, from_words
+
+if TYPE_CHECKING:
+    from gym_server.envs.footprint import Account
+    from gym_server.envs.wrappers import Wrapper
+
+
+def make_env(
+    env_id: object,
+    render_mode: str | None,
+    kwargs: dict,
+    allowed_modules: Collection[str],
+    wrappers: Sequence[Wrapper],
+    account: Account,
+) -> gymnasium.Env:
+    """Make an environment.
+
+    Args:
+        env_id: ``Name-v0``, or ``module:Name-v0`` for a module that registers it.
+        render_mode: "rgb_array", "human" (made as "rgb_array": the server opens no window), or
+            None for "rgb_array" where the environment can.
+        kwargs: handed to the environment.
+        allowed_modules: names of the modules that an id may import.
+        wrappers: what will be put around it.
+        account: what its memory is charged to.
+
+    Raises:
+        GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
+            ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
+            ``invalid_kwargs``, ``too_much_memory``, ``environment_error``.
+    """
+    check_kwargs(kwargs)
+    spec = find_spec(env_id, allowed_modules)
+    repeats.check(spec, kwargs, wrappers)
+    account.charge(footprint.environment_bytes(spec, kwargs), spec.id)
+    with naming_extra(spec):
+        chosen = choose_render_mode(load_creator(spec), spec, render_mode)
+        return make_from_spec(spec, chosen, from_words(kwargs))
+
+
+def check_kwargs(kwargs: dict) -> None:
+    """Raise ``invalid_kwargs`` for an argument that is a parameter of its own."""
+    if "render_mode" in kwargs:
+        raise GymServerError(
+            "invalid_kwargs",
+            "kwargs must not carry 'render_mode'",
+            "render_mode is a parameter of its own",
+        )
+
+
+@contextlib.contextmanager
+def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
+    """Name the server's extra in a refusal for want of what it would bring."""
+    try:
+        yield
+    except GymServerError as refusal:
+        extra = extra_of(spec)
+        if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):
+            raise missing_extra(spec.id, extra) from refusal
+        module = unmet_module(spec)
+        if refusal.code == "missing_dependency" and module:
+            raise GymServerError(
+                "missing_dependency",
+                f"{spec.id} needs the Python package '{module}', which no extra brings",
+                "install it into the server's Python",
+            ) from refusal
+        raise
+
+
+def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
+    """Return what the registry knows of an id, after importing its module when it names one.
+
+    Raises:
+        GymServerError: as for ``make_env()``.
+    """
+    if not isinstance(env_id, str) or len(env_id) > LONGEST_ID:
+        raise _malformed(brief(env_id))
+    module, colon, name = env_id.rpartition(":")
+    if registration.ENV_ID_RE.fullmatch(name) is None or (colon and not _is_module(module)):
+        raise _malformed(env_id)
+    if module and module not in allowed_modules:
+        raise GymServerError(
+            "module_not_allowed",
+            f"This server may not import the module '{module}'",
+            f"start the server with --allow-module {module}",
+        )
+    try:
+        with importing:
+            if module:
+                ask(importlib.import_module, module)
+            return look_up(name)
+    except error.Error as failure:
+        raise _explain(failure, env_id, name) from failure
+
+
+def _is_module(text: str) -> bool:
+    return all(part.isidentifier() for part in text.split("."))
+
+
+def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
+    match failure:
+        case error.DeprecatedEnv():
+            return GymServerError(
+                "deprecated_env_id", f"The environment '{env_id}' is deprecated", _use_latest(name)
+            )
+        case error.VersionNotFound():
+            return GymServerError(
+                "unknown_env_id", f"There is no such version of '{env_id}'", _use_latest(name)
+            )
+        case _:
+            return GymServerError(
+                "unknown_env_id",
+                f"There is no environment '{env_id}'",
+                _use_ale(name) or _did_you_mean(name),
+            )
+
+
+def _malformed(env_id: str) -> GymServerError:
+    # The classic server's words.
+    return GymServerError(
+        "malformed_env_id", f"Attempted to look up malformed environment ID '{env_id}'"
+    )
+
+
+def _use_ale(name: str) -> str | None:
+    game = classic_game(name)
+    if game is None:
+        return None
+    env_id, shows_memory = game
+    return f'use {env_id} with kwargs {{"obs_type": "ram"}}' if shows_memory else f"use {env_id}"
+
+
+def _use_latest(name: str) -> str:
+    namespace, bare_name, _ = registration.parse_env_id(name)
+    latest = registration.find_highest_version(namespace, bare_name)
+    return f"use {registration.get_env_id(namespace, bare_name, latest)}"
+
+
+def _did_you_mean(name: str) -> str | None:
+    ids = near(name)
+    return f"did you mean {' or '.join(ids)}?" if ids else None
+
+
+def load_creator(spec: registration.EnvSpec) -> Callable:
+    """Import what makes an environment.
+
+    Raises:
+        GymServerError: ``missing_dependency``, ``environment_error``.
+    """
+    return ask(_load_creator, spec)
+
+
+def _load_creator(spec: registration.EnvSpec) -> Callable:
+    with importing:
+        importlib.import_module("gymnasium.wrappers")
+        if callable(spec.entry_point):
+            return spec.entry_point
+        if extra_of(spec) != "mujoco":
+            return registration.load_env_creator(spec.entry_point)
+        mujoco.choose_gl()
+        creator = registration.load_env_creator(spec.entry_point)
+        mujoco.log_warnings()
+        return creator
+
+
+def choose_render_mode(
+    creator: Callable, spec: registration.EnvSpec, wanted: str | None
+) -> str | None:
+    """Return the render_mode to make an environment with.
+
+    Args:
+        creator: what makes it; its metadata say what it can.
+        spec: names it.
+        wanted: see ``make_env()``.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
+    """
+    metadata = getattr(creator, "metadata", None)
+    # A function says nothing of what it makes; then Gymnasium gets to see what was asked.
+    modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
+    if wanted is None:
+        return "rgb_array" if modes and "rgb_array" in modes else None
+    if wanted not in ("rgb_array", "human") or (modes is not None and "rgb_array" not in modes):
+        can_draw = modes is None or "rgb_array" in modes
+        supported = '"rgb_array" or "human"' if can_draw else "left out"
+        raise invalid_parameter("render_mode", wanted, f"{supported} for {spec.id}")
+    return "rgb_array"
+
+
+def make_from_spec(
+    spec: registration.EnvSpec, render_mode: str | None, kwargs: dict
+) -> gymnasium.Env:
+    """Make an environment of what the registry knows.
+
+    Raises:
+        GymServerError: ``missing_dependency``, ``invalid_kwargs``, ``environment_error``.
+    """
+    # The checker would repeat itself in a log that nobody reads, and takes time in each step.
+    ours = {"disable_env_checker": True}
+    if render_mode is not None:
+        ours["render_mode"] = render_mode
+    return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **kwargs}), kwargs)
+
+
+def make_vector_entry_point(
+    spec: registration.EnvSpec, num_envs: int, render_mode: str | None, kwargs: dict
+) -> gymnasium.vector.VectorEnv:
+    """Make an environment's own vector implementation.
+
+    Raises:
+        GymServerError: as for ``make_from_spec()``.
+    """
+
+    def make() -> gymnasium.vector.VectorEnv:
+        ours = {} if render_mode is None else {"render_mode": render_mode}
+        return gymnasium.make_vec(
+            spec,
+            num_envs=num_envs,
+            vectorization_mode="vector_entry_point",
+            vector_kwargs={},
+            wrappers=(),
+            **ours,
+            **kwargs,
+        )
+
+    return ask(_refusing_kwargs, make, kwargs)
+
+
+def _refusing_kwargs(make: Callable, kwargs: dict):
+    try:
+        return make()
+    except TypeError as failure:
+        if kwargs and any(words in str(failure) for words in _ABOUT_ARGUMENTS):
+            raise GymServerError("invalid_kwargs", str(failure)) from failure
+        raise
+
+
+_ABOUT_ARGUMENTS = ("unexpected keyword argument", "multiple values for", "required positional")
+
+
+def ask(function: Callable, *args: object):
+    """Call into Gymnasium or an environment; translate what it raises.
+
+    Raises:
+        GymServerError: ``missing_dependency`` or ``environment_error``, or one that the function
+            raises itself.
+    """
+    try:
+        return function(*args)
+    except GymServerError:
+        raise
+    except (error.DependencyNotInstalled, ImportError) as failure:
+        raise GymServerError("missing_dependency", str(failure)) from failure
+    except BaseException as failure:
+        # Also KeyboardInterrupt and SystemExit: Ctrl-C is a signal handler's affair in this server,
+        # so only an environment raises them, and its client is owed an answer as for any error.
+        raise environment_error(failure) from failure

@@ -1,0 +1,159 @@
+"""What can be created: Gymnasium's registry, and what packages add to it."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import importlib
+import logging
+import threading
+from collections.abc import Collection, Iterable
+
+import gymnasium
+from gymnasium import error
+from gymnasium.envs import registration
+from gymnasium.envs.registration import EnvSpec
+
+from gym_server.envs.atari import classic_game
+from gym_server.envs.extras import extra_of, is_available, missing_extra, why_unavailable
+from gym_server.errors import GymServerError, invalid_parameter
+
+log = logging.getLogger(__name__)
+
+# Packages whose environments are known here: what they are like, and what their arguments mean.
+KNOWN_PACKAGES = ("gymnasium", "ale_py")
+
+# Python lets go of its import locks where modules import each other in a circle, as Gymnasium's
+# do; two threads would see them half made.
+importing = threading.RLock()
+
+# Nothing that is longer is looked for: saying what it resembles would take seconds.
+LONGEST_ID = 200
+
+# Since Gymnasium 1.0 packages are no longer found by themselves.
+_PACKAGES = {"ALE": "ale_py"}
+
+# The environments of older Gyms, when shimmy is installed. Their argument env_id names modules
+# that they import, whatever the operator allowed.
+_UNGUARDED = ("GymV21Environment", "GymV26Environment")
+_WHY_UNGUARDED = "may import any module that its env_id names, so this server makes none"
+
+
+def look_up(name: str) -> EnvSpec:
+    """Return what is registered under an id; the newest version for one that names none.
+
+    Raises:
+        gymnasium.error.Error: when nothing is.
+        GymServerError: ``missing_dependency``, ``module_not_allowed``.
+    """
+    namespace, bare_name, _ = registration.parse_env_id(name)
+    if bare_name in _UNGUARDED:
+        raise GymServerError(
+            "module_not_allowed",
+            f"{name} {_WHY_UNGUARDED}",
+        )
+    with importing:
+        try:
+            return gymnasium.spec(_with_version(name))
+        except (error.NameNotFound, error.NamespaceNotFound):
+            _register_packages()
+            _require_atari(name, namespace)
+            return gymnasium.spec(_with_version(name))
+
+
+def _require_atari(name: str, namespace: str | None) -> None:
+    """Name the extra that an Atari game needs, if it is missing."""
+    if _PACKAGES["ALE"] in _registered:
+        return
+    if namespace == "ALE":
+        raise missing_extra(name, "atari") from None
+    if game := classic_game(name):
+        raise missing_extra(f"{name}, today {game[0]},", "atari") from None
+
+
+_registered: set[str] = set()
+
+
+def _register_packages() -> None:
+    """Import the packages that register environments, as far as they are installed."""
+    for package in _PACKAGES.values():
+        if package not in _registered:
+            with contextlib.suppress(ImportError):
+                importlib.import_module(package)
+                _registered.add(package)
+
+
+def _with_version(name: str) -> str:
+    """Return the newest version of an id that names none, as Gymnasium does."""
+    namespace, bare_name, version = registration.parse_env_id(name)
+    if version is None and name not in gymnasium.registry:
+        version = registration.find_highest_version(namespace, bare_name)
+    return registration.get_env_id(namespace, bare_name, version)
+
+
+def near(name: str, limit: int = 3) -> list[str]:
+    """Return the ids that are most like a name, the nearest first.
+
+    Those that no extra of the server could make are left out.
+    """
+    ids = [i for i, spec in gymnasium.registry.items() if extra_of(spec) or is_available(spec)]
+    found = difflib.get_close_matches(name, ids, n=limit, cutoff=0.6)
+    if not found:
+        by_lower_case = {env_id.lower(): env_id for env_id in ids}
+        matches = difflib.get_close_matches(name.lower(), by_lower_case, n=limit, cutoff=0.6)
+        found = [by_lower_case[match] for match in matches]
+    return found
+
+
+def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
+    """Return what is registered, one object an environment.
+
+    Args:
+        text: a part of the id, in lower or upper case; when it is part of none, the nearest ids
+            are returned. None for all. Longer ones than any id are refused: looking for what
+            is near them would take seconds.
+        allowed_modules: modules that the operator allowed; what they register belongs to it.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
+    """
+    if text and len(text) > LONGEST_ID:
+        raise invalid_parameter("search", text, f"of at most {LONGEST_ID} characters")
+    with importing:
+        _register_packages()
+        for module in allowed_modules:
+            try:
+                importlib.import_module(module)
+            except BaseException as failure:
+                log.warning("The allowed module %s cannot be imported: %s", module, failure)
+        return [_entry(spec) for spec in _matching(text)]
+
+
+def _matching(text: str | None) -> Iterable[EnvSpec]:
+    specs = gymnasium.registry
+    if not text:
+        return specs.values()
+    parts = [spec for env_id, spec in specs.items() if text.lower() in env_id.lower()]
+    return parts or [specs[env_id] for env_id in near(text, limit=10)]
+
+
+def _entry(spec: EnvSpec) -> dict:
+    unguarded = spec.name in _UNGUARDED
+    reason = f"it {_WHY_UNGUARDED}" if unguarded else why_unavailable(spec)
+    return {
+        "id": spec.id,
+        "max_episode_steps": spec.max_episode_steps,
+        "reward_threshold": spec.reward_threshold,
+        "vectorised": spec.vector_entry_point is not None,
+        "extra": extra_of(spec),
+        "available": reason is None,
+        "reason": reason,
+    }
+
+
+def module_of(spec: EnvSpec) -> str:
+    """Return the module that makes an environment, or ""."""
+    entry_point = spec.entry_point
+    if isinstance(entry_point, str):
+        return entry_point.partition(":")[0]
+    return getattr(entry_point, "__module__", None) or ""

@@ -1,0 +1,236 @@
+"""Stands for an instance that lives in a process of its own."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from gym_server.envs.config import Choices
+from gym_server.envs.footprint import Account
+from gym_server.errors import GymServerError
+from gym_server.instances.listed import Listed
+from gym_server.instances.lock import Hold
+from gym_server.isolation.worker import Surroundings, keep_instance
+from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.processes.messages import Seen
+from gym_server.processes.worker_process import WorkerProcess
+from gym_server.protocol.safetensors import Tensor
+from gym_server.protocol.wire import Ready
+from gym_server.spaces import Parts
+from gym_server.viewing.viewer import Screen
+
+# What an environment is asked that keeps its process from any word: what is known is told.
+_ABOUT_SECONDS = 1.0
+
+
+class IsolatedInstance(Listed):
+    """One environment in a process of its own, with the methods of ``Instance``.
+
+    The order of moves, the watchers and their pace are kept here, as for an environment in the
+    server's process; everything else is asked of the process, and when that ends by itself,
+    every call raises ``environment_died``.
+    """
+
+    # Its pictures are drawn in its own process.
+    draws_when_stepped = False
+
+    def __init__(
+        self,
+        choices: Choices,
+        surroundings: Surroundings,
+        on_end: Callable[[IsolatedInstance, GymServerError], None],
+    ) -> None:
+        """Start the process; ``create()`` waits for the environment.
+
+        Args:
+            choices: what the client wants.
+            surroundings: what the process is to know of the server.
+            on_end: called with this and the reason when the process has ended by itself.
+        """
+        self.env_id = str(choices.env_id)
+        self._choices = choices
+        self._on_end = on_end
+        self.hold = Hold(self)  # type: ignore[arg-type]
+        self.screen = Screen(self, None)  # type: ignore[arg-type]
+        self._for_eyes = choices.render_mode == "human"
+        self._made = time.monotonic()
+        self._num_envs = choices.num_envs
+        self._steps = 0
+        self._about: dict = {}
+        hint = (
+            f"the server's option --max-worker-mb lets it have {surroundings.max_mb} MiB"
+            if surroundings.max_mb
+            else ""
+        )
+        self._worker = WorkerProcess(
+            keep_instance, choices, surroundings, on_end=self._end, hint=hint
+        )
+
+    def create(self, account: Account) -> None:
+        """Wait until the environment is made.
+
+        Args:
+            account: what its memory is charged to, as far as its process tells it.
+
+        Raises:
+            GymServerError: see ``factory.make_instance()``; ``environment_died``.
+        """
+        made = self._value(self._worker.first_word())
+        self._about = made["about"]
+        account.take(max(0.0, float(made["memory"])), self.env_id)
+        self.env_id = str(self._about["env_id"])
+        self._lanes = int(self._about["lanes"])
+        self.screen = Screen(self, made["fps"])  # type: ignore[arg-type]
+        self._made = self.hold.used = time.monotonic()
+
+    def stay(self) -> None:
+        """Hear that it is on the list, which it leaves when its process ends."""
+        self._worker.stay()
+
+    @staticmethod
+    def _value(seen: Seen) -> dict:
+        return seen.value  # type: ignore[return-value]
+
+    # Moves ----------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | tuple[int | None, ...] | None,
+        options: dict | None,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+    ) -> Ready:
+        """Start an episode; see ``Instance.reset()`` and ``VectorInstance.reset()``."""
+        if self._for_eyes:
+            self.screen.pace()
+        with self.hold:
+            return self._move("reset", seed, options, tensors, mask)
+
+    def step(
+        self,
+        action: object,
+        tensors: bool = False,
+        mask: np.ndarray | None = None,
+        for_eyes: bool = False,
+    ) -> Ready:
+        """Take one step; see ``Instance.step()`` and ``VectorInstance.step()``."""
+        if for_eyes or self._for_eyes:
+            self.screen.pace()
+        if isinstance(action, Parts):
+            action = _sendable(action)
+        with self.hold:
+            answer = self._move("step", action, tensors, mask)
+            self._steps += self._lanes if mask is None else int(mask.sum())
+            return answer
+
+    def _move(self, method: str, *args: object) -> Ready:
+        self._tell_of_move()
+        return self._worker.move(method, *args)
+
+    def sample_action(self) -> object:
+        """Draw an action from the action space's own generator."""
+        with self.hold:
+            return self._worker.move("sample_action").value
+
+    # Looks ----------------------------------------------------------------------------------
+
+    def render(self, lane: int = 0) -> np.ndarray:
+        """Draw the current state of a lane; see ``Instance.render()``."""
+        self.check_lane(lane)
+        with self.hold:
+            return self._worker.move("render", lane).frame
+
+    def draws_on_render_thread(self) -> bool:
+        """Tell whether a picture takes the server's render thread."""
+        return False
+
+    def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a lane; whoever calls it has the hold."""
+        seen = self._worker.move("look", lane)
+        return dict(self._value(seen)), seen.frame
+
+    # While it moves -------------------------------------------------------------------------
+
+    @property
+    def action_space_info(self) -> dict:
+        """The description of the action space."""
+        return self._value(self._worker.question("action_space_info"))
+
+    @property
+    def observation_space_info(self) -> dict:
+        """The description of the observation space."""
+        return self._value(self._worker.question("observation_space_info"))
+
+    def action_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; see ``spaces.contains()``."""
+        return bool(self._worker.question("action_contains", claim).value)
+
+    def observation_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; see ``spaces.contains()``."""
+        return bool(self._worker.question("observation_contains", claim).value)
+
+    def about(self) -> dict:
+        """Return all that is known of the instance, without waiting for its environment."""
+        try:
+            self._about = self._value(self._worker.question("about", seconds=_ABOUT_SECONDS))
+        except TimeoutError:
+            logging.getLogger(__name__).info("Instance %s says nothing now", self.instance_id)
+        return {**self._about, **self.line(), "isolated": True}
+
+    @property
+    def busy_since(self) -> float | None:
+        """Since when a call has waited for it; also one that asks what can be said meanwhile."""
+        since = (self.hold.busy_since, self._worker.questioned_since)
+        return min((one for one in since if one is not None), default=None)
+
+    # Monitors -------------------------------------------------------------------------------
+
+    def start_monitor(self, root: MonitorRoot, directory: str, *how: object) -> None:
+        """Record the episodes that start from now on; see ``Monitor``."""
+        with self.hold:
+            # Lanes are refused by the process, which says why.
+            path = None if self._num_envs is not None else root.resolve(directory)
+            self._worker.move("start_monitor", self.instance_id, path, directory, *how)
+
+    def close_monitor(self) -> None:
+        """Stop recording and finish the files; see ``Instance.close_monitor()``."""
+        with self.hold:
+            self._worker.move("close_monitor")
+
+    # The end --------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Finish the monitor and close the environment; whoever waits learns that it is gone."""
+        with self.hold:
+            gone = self.hold.gone()
+            self.hold.closed = True
+            self.screen.end(gone)
+            self._worker.expect_end()
+            try:
+                self._worker.move("close")
+            finally:
+                self._worker.let_go(gone)
+
+    def condemn(self, why: GymServerError) -> None:
+        """End the process at once.
+
+        Who waits for it hears why, and so does everybody who comes later: none is stuck.
+        """
+        self._worker.condemn(why)
+        self.screen.end(why)
+
+    def _end(self, why: GymServerError) -> None:
+        self.screen.end(why)
+        self._on_end(self, why)
+
+
+def _sendable(action: Parts) -> Parts:
+    """Return tensors whose bytes can be pickled."""
+    tensors = {
+        name: Tensor(tensor.dtype, tensor.shape, bytes(tensor.data))
+        for name, tensor in action.tensors.items()
+    }
+    return Parts(tensors, action.texts)

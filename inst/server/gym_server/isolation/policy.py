@@ -1,0 +1,163 @@
+"""Which environments get a process of their own, and why not all or none.
+
+A thread cannot be ended, and code in C that crashes, or ``os._exit``, ends its whole process. So
+what is not trusted needs a process. Gymnasium's own environments and ale_py's do not do that, and
+in the server's process they are faster and need no memory of their own; an environment that an
+operator allowed by ``--allow-module`` may be anybody's first one. Hence "foreign". One process
+for several of them would save the memory, and let the second one die with the first.
+
+Measured on two noisy cores that others used, too (Python 3.11, Gymnasium 1.4, CartPole):
+
+=====================================  ==============  =====================  ================
+what                                   server process  a process by fork-     by spawn (as on
+                                                       server, an instance    Windows)
+=====================================  ==============  =====================  ================
+to create one, ms                      2               20 (the first: 1000)   530 to 1000
+memory an instance, MiB (PSS)          0.02            7.7                    29
+processor time of a step by HTTP, us   202             350 (both processes)   as by forkserver
+single steps a second from R           420             384 (9.6 % lost)
+steps of 1,024 lanes a second from R   235,000         203,000 (14.5 % lost)
+=====================================  ==============  =====================  ================
+
+(Rates: medians of 60 interleaved rounds of 300 and 60 calls, and of the ratios of their pairs;
+six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the lanes'. Waking another
+process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a step does so
+twice; with an environment that takes its time itself the share is smaller.)
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections.abc import Collection
+
+from gymnasium import error
+
+from gym_server.envs import registry
+from gym_server.errors import GymServerError, call_too_long, shutting_down
+from gym_server.isolation.worker import Surroundings, list_registry
+from gym_server.processes.worker_process import WorkerProcess
+
+log = logging.getLogger(__name__)
+
+MODES = ("none", "foreign", "all")
+
+
+class Isolation:
+    """Says what runs where, and what processes are told.
+
+    Attributes:
+        mode: one of ``MODES``.
+    """
+
+    def __init__(self, mode: str = "none", max_mb: int = 0) -> None:
+        """Set the rule.
+
+        Args:
+            mode: one of ``MODES``.
+            max_mb: how much memory a process may have, in MiB; 0 for no limit.
+        """
+        self.mode = mode
+        self._max_mb = max_mb
+        self._searching = threading.Lock()
+
+    def wants(self, env_id: object, allowed_modules: Collection[str]) -> bool:
+        """Tell whether an environment gets a process, without importing its module.
+
+        Args:
+            env_id: what is to be made; also nonsense, which gets none.
+            allowed_modules: names of the modules that an env_id may import.
+        """
+        # Looking for what is near one that is too long would take minutes.
+        is_id = isinstance(env_id, str) and len(env_id) <= registry.LONGEST_ID
+        if self.mode == "none" or not is_id:
+            return False
+        module, colon, name = env_id.rpartition(":")
+        if colon and module not in allowed_modules:
+            return False
+        return self.mode == "all" or _is_foreign(module or _home(name, allowed_modules))
+
+    def surroundings(
+        self,
+        env_id: object,
+        allowed_modules: Collection[str],
+        max_num_envs: int,
+        memory: float = math.inf,
+    ) -> Surroundings:
+        """Return what the process of an environment is told; see ``Surroundings``."""
+        allowed = frozenset(allowed_modules)
+        # An id of the registry's list has no module, and any of them may have registered it.
+        bare = isinstance(env_id, str) and ":" not in env_id
+        imported = allowed if bare and _home(env_id, allowed) is _UNKNOWN else frozenset()
+        return Surroundings(
+            allowed, imported, max_num_envs, memory, self._max_mb, logging.getLogger().level
+        )
+
+    def search(
+        self, text: str | None, allowed_modules: Collection[str], seconds: float
+    ) -> list[dict]:
+        """Return what is registered when the allowed modules are imported, elsewhere.
+
+        Args:
+            text: see ``registry.search()``.
+            allowed_modules: names of the modules.
+            seconds: how long that may take; 0 for as long as it takes.
+        """
+        try:
+            # One at a time: everybody may ask, and each takes a process.
+            if not self._searching.acquire(timeout=seconds or -1):
+                raise _search_too_long(seconds)
+            try:
+                return self._search(text, allowed_modules, seconds)
+            finally:
+                self._searching.release()
+        except GymServerError as failure:
+            log.warning("The allowed modules cannot be listed: %s", failure)
+            return registry.search(text, ())
+
+    def _search(
+        self, text: str | None, allowed_modules: Collection[str], seconds: float
+    ) -> list[dict]:
+        worker = WorkerProcess(
+            list_registry,
+            text,
+            self.surroundings(None, allowed_modules, 0),
+            on_end=lambda why: None,
+            hint="",
+        )
+        overdue = threading.Timer(seconds, worker.condemn, (_search_too_long(seconds),))
+        overdue.daemon = True
+        if seconds:
+            overdue.start()
+        try:
+            return worker.first_word().value
+        finally:
+            overdue.cancel()
+            # It has no more to say, and a thread of a module's would keep it.
+            worker.condemn(shutting_down())
+
+
+def _search_too_long(seconds: float) -> GymServerError:
+    return call_too_long(
+        "Importing the allowed modules", seconds, "what they register is not listed"
+    )
+
+
+_UNKNOWN = "?"
+
+
+def _home(name: str, allowed_modules: Collection[str]) -> str:
+    """Return the module that an id without one belongs to, "" for an id that is in error."""
+    try:
+        spec = registry.look_up(name)
+    except (error.NameNotFound, error.NamespaceNotFound, error.VersionNotFound):
+        # One of these may register it, and the server's process does not import them.
+        return _UNKNOWN if allowed_modules else ""
+    except (error.Error, GymServerError):
+        return ""
+    return registry.module_of(spec) or _UNKNOWN
+
+
+def _is_foreign(module: str) -> bool:
+    return module != "" and module.partition(".")[0] not in registry.KNOWN_PACKAGES

@@ -1,0 +1,1 @@
+"""All environments of a server: their list, their limits, and their ends."""

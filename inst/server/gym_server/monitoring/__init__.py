@@ -1,0 +1,1 @@
+"""Recordings of episodes in files, as Gym's monitor wrote them."""

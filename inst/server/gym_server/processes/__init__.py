@@ -1,0 +1,1 @@
+"""Processes of the server's own, and how it talks with them."""

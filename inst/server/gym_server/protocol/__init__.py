@@ -1,0 +1,1 @@
+"""What bodies hold: JSON, safetensors, the fields of requests, answers."""

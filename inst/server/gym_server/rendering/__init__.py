@@ -1,0 +1,1 @@
+"""The one thread that draws, and pictures as PNG."""

@@ -1,0 +1,1 @@
+"""What one thread does to another one that is stuck."""

@@ -1,0 +1,206 @@
+import http.client
+import signal
+import sys
+import threading
+import time
+
+import pytest
+
+from gym_server.cli import main
+
+needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+
+
+def test_one_line_says_where_the_server_is(serve):
+    server = serve()
+    assert server.first_line == f"Server starting at: http://127.0.0.1:{server.port}\n"
+    assert server.get("/v1/health")[0] == 200
+    status, output, errors = server.stop()
+    assert (status, output, errors) == (0, "", "")
+
+
+@needs_signals
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_it_with_status_0(serve, how):
+    server = serve()
+    server.create("CartPole-v1")
+    began = time.monotonic()
+    assert server.stop(how)[0] == 0
+    assert time.monotonic() - began < 5
+
+
+def test_the_end_of_standard_input_stops_it_when_asked(serve):
+    server = serve("--stop-on-stdin-eof")
+    server.process.stdin.write("nobody listens\n")
+    server.process.stdin.flush()
+    assert server.get("/v1/health")[0] == 200
+    assert server.stop(how=None)[0] == 0
+
+
+@pytest.mark.slow
+@needs_signals
+@pytest.mark.parametrize("isolate", ["all", "none"])
+def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
+    server = serve("--isolate", isolate, TMPDIR=str(tmp_path))
+    how = {"num_envs": 1, "vectorization_mode": "async"}
+    # The second is made by processes that the first has left as they are.
+    urls = [server.create("faulty_envs:Hanging-v0", **how) for _ in range(2)]
+    assert any(tmp_path.iterdir())
+    for url in urls:
+        server.post(f"{url}/reset/")
+    with server.socket() as hanging:
+        body = b'{"action": [0]}'
+        head = f"POST {urls[0]}/step/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {len(body)}"
+        hanging.sendall(head.encode() + b"\r\n\r\n" + body)
+        server.get("/v1/health")
+        assert server.stop()[0] == 0
+    assert not list(tmp_path.glob("pymp-*"))
+
+
+def test_the_end_of_standard_input_means_nothing_otherwise(serve):
+    server = serve()
+    server.process.stdin.close()
+    time.sleep(0.3)
+    assert server.get("/v1/health")[0] == 200
+
+
+def test_shutdown_is_answered_and_stops_it(serve):
+    server = serve()
+    assert server.post("/v1/shutdown/") == (200, {"message": "Server shutting down"})
+    assert server.stop(how=None)[0] == 0
+
+
+@pytest.mark.slow
+@needs_signals
+def test_a_port_is_free_again_at_once(serve):
+    server = serve()
+    port = server.port
+    server.get("/v1/health")
+    server.stop()
+    again = serve("--port", str(port))
+    assert again.port == port
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7"])
+def test_only_this_machine_is_served_unless_asked(host, capsys, monkeypatch):
+    monkeypatch.delenv("GYM_SERVER_TOKEN", raising=False)
+    assert main.main(["--host", host]) == 1
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert "--no-auth" in errors and "--token-file" in errors and "GYM_SERVER_TOKEN" in errors
+
+
+def test_a_host_that_is_not_ours_is_one_line_and_status_1(capsys):
+    assert main.main(["--host", "192.0.2.1", "--no-auth", "--port", "0"]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_monitor_directory_that_cannot_be_made_is_one_line_and_status_1(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main.main(["--port", "0", "--monitor-dir", str(tmp_path / "file" / "runs")]) == 1
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert str(tmp_path / "file") in errors
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--port", "65536"],
+        ["--port", "x"],
+        ["--max-body-mb", "0"],
+        ["--max-num-envs", "0"],
+        ["--max-worker-mb", "-1"],
+    ],
+)
+def test_options_out_of_range_are_refused(options, capsys):
+    with pytest.raises(SystemExit):
+        main.main(options)
+    assert "is not between" in capsys.readouterr().err
+
+
+def test_the_monitor_directory_is_the_one_that_was_named(serve, tmp_path):
+    server = serve("--monitor-dir", str(tmp_path / "runs"))
+    url = server.create("CartPole-v1")
+    assert server.post(f"{url}/monitor/start/", {"directory": "a"})[0] == 204
+    assert server.stop()[0] == 0
+    assert (tmp_path / "runs" / "a" / "episodes.csv").read_text().startswith("episode,return")
+
+
+@pytest.mark.slow
+@needs_signals
+def test_its_own_monitor_directory_is_there_only_for_what_was_written(serve, tmp_path):
+    for directory in ("..", "a"):
+        server = serve(TMPDIR=str(tmp_path))
+        assert list(tmp_path.iterdir()) == []
+        url = server.create("CartPole-v1")
+        server.post(f"{url}/monitor/start/", {"directory": directory})
+        server.stop()
+        assert len(list(tmp_path.iterdir())) == (directory == "a")
+
+
+def test_the_size_of_a_request_is_limited_as_asked(serve):
+    server = serve("--max-body-mb", "1")
+    assert server.post("/v1/envs/", {"env_id": "x" * 2**20})[1]["code"] == "body_too_large"
+
+
+def test_the_number_of_lanes_is_limited_as_asked(serve):
+    server = serve("--max-num-envs", "3")
+    assert server.create("CartPole-v1", num_envs=3)
+    status, answer = server.post("/v1/envs/", {"env_id": "CartPole-v1", "num_envs": 4})
+    assert (status, answer["code"]) == (429, "too_many_lanes")
+
+
+def test_modules_are_allowed_by_the_operator_alone(serve):
+    server = serve()
+    assert server.create("faulty_envs:Counting-v0")
+    status, answer = server.post("/v1/envs/", {"env_id": "os:Counting-v0"})
+    assert (status, answer["code"]) == (400, "module_not_allowed")
+
+
+@needs_signals
+def test_a_video_under_way_is_finished_at_the_stop(serve, tmp_path):
+    pytest.importorskip("moviepy")
+    server = serve("--monitor-dir", str(tmp_path))
+    url = server.create("CartPole-v1")
+    server.post(f"{url}/monitor/start/", {"directory": "a", "video_callable": True})
+    server.post(f"{url}/reset/")
+    server.post(f"{url}/step/", {"action": 0})
+    assert server.stop()[0] == 0
+    assert (tmp_path / "a" / "rl-video-episode-0.mp4").stat().st_size > 1000
+
+
+@pytest.mark.slow
+@needs_signals
+def test_what_never_returns_does_not_keep_it_alive(serve, tmp_path):
+    pytest.importorskip("moviepy")
+    server = serve("--monitor-dir", str(tmp_path))
+    stepping = server.create("faulty_envs:Hanging-v0")
+    drawing = server.create("faulty_envs:Drawing-v0", kwargs={"frame": "hangs"})
+    healthy = [server.create("CartPole-v1") for _ in range(2)]
+    for url in healthy:
+        fields = {"directory": url[-8:], "video_callable": True}
+        server.post(f"{url}/monitor/start/", fields)
+    for url in (stepping, drawing, *healthy):
+        server.post(f"{url}/reset/")
+    calls = [
+        threading.Thread(target=_without_answer, args=(server.post, f"{stepping}/step/")),
+        threading.Thread(target=_without_answer, args=(server.get, f"{drawing}/render/")),
+    ]
+    for call in calls:
+        call.start()
+    time.sleep(0.5)
+    began = time.monotonic()
+    status, _, errors = server.stop()
+    assert status == 0
+    assert 9 < time.monotonic() - began < 20
+    assert "did not finish" in errors
+    for url in healthy:
+        assert (tmp_path / url[-8:] / "rl-video-episode-0.mp4").stat().st_size > 1000
+    for call in calls:
+        call.join()
+
+
+def _without_answer(call, url):
+    with pytest.raises((OSError, http.client.HTTPException)):
+        call(url, {"action": 0}) if url.endswith("step/") else call(url)

@@ -1,0 +1,222 @@
+import gymnasium
+import pytest
+from faulty_envs import Counting
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+from gym_server.api.app import Config, create_app
+from gym_server.manager.limits import Limits
+
+
+class OwnLanes(VectorEnv):
+    """A vector implementation that knows one argument and resets in the same step."""
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+    closed_ones = 0
+
+    def __init__(self, num_envs, length=5):
+        self.num_envs = num_envs
+        self.single_action_space = Counting.action_space
+        self.single_observation_space = Counting.observation_space
+        batch = gymnasium.vector.utils.batch_space
+        self.action_space = batch(self.single_action_space, num_envs)
+        self.observation_space = batch(self.single_observation_space, num_envs)
+
+    def close_extras(self, **_):
+        type(self).closed_ones += 1
+
+
+class HasNoLanes(OwnLanes):
+    def __init__(self, num_envs, length=5):
+        raise RuntimeError("no lanes today")
+
+
+class OtherLanes(OwnLanes):
+    """Has actions that the environment has not."""
+
+    def __init__(self, num_envs, length=5, colour=0):
+        super().__init__(num_envs)
+        self.single_action_space = gymnasium.spaces.Discrete(9)
+        self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
+
+
+gymnasium.register("faultyOtherLanes-v0", entry_point=Counting, vector_entry_point=OtherLanes)
+gymnasium.register("faultyOwnLanes-v0", entry_point=Counting, vector_entry_point=OwnLanes)
+gymnasium.register("faultyHasNoLanes-v0", entry_point=Counting, vector_entry_point=HasNoLanes)
+
+
+def chosen(client, env_id="CartPole-v1", **fields):
+    answer = client.post("/v1/envs/", json={"env_id": env_id, "num_envs": 2, **fields})
+    assert answer.status_code == 200, answer.json
+    about = client.get(f"/v1/envs/{answer.json['instance_id']}").json
+    return about["vectorization_mode"], about["autoreset_mode"]
+
+
+def refused(client, status=400, env_id="CartPole-v1", **fields):
+    answer = client.post("/v1/envs/", json={"env_id": env_id, "num_envs": 2, **fields})
+    assert answer.status_code == status, answer.json
+    assert client.get("/v1/envs/").json == {"all_envs": {}}
+    return answer.json
+
+
+def test_an_environments_own_implementation_is_the_fastest(client):
+    assert chosen(client) == ("vector_entry_point", "NextStep")
+    assert chosen(client, "Pendulum-v1") == ("sync", "NextStep")
+    assert chosen(client, kwargs={"sutton_barto_reward": True})[0] == "vector_entry_point"
+    assert chosen(client, seed=3, render_mode="human")[0] == "vector_entry_point"
+
+
+WHAT_IT_CANNOT = [
+    {"wrappers": [{"name": "TimeLimit", "kwargs": {"max_episode_steps": 5}}]},
+    {"autoreset_mode": "SameStep"},
+    {"autoreset_mode": "Disabled"},
+    {"seed": [1, 2]},
+    {"kwargs": {"max_episode_steps": -1}},
+    {"kwargs": {"max_episode_steps": None}},
+    {"kwargs": {"disable_env_checker": True}},
+]
+
+
+@pytest.mark.parametrize("fields", WHAT_IT_CANNOT)
+def test_what_it_cannot_do_others_do(client, fields):
+    mode = chosen(client, **fields)
+    assert mode == ("sync", fields.get("autoreset_mode", "NextStep"))
+
+
+@pytest.mark.parametrize("fields", WHAT_IT_CANNOT)
+def test_what_it_cannot_do_is_refused_when_it_was_asked_for(client, fields):
+    refusal = refused(client, vectorization_mode="vector_entry_point", **fields)
+    assert refusal["code"] == "not_supported"
+    assert "'vector_entry_point' is not possible: " in refusal["message"]
+    assert "'sync'" in refusal["hint"]
+
+
+def test_an_environment_without_an_own_implementation_says_so(client):
+    refusal = refused(client, env_id="Pendulum-v1", vectorization_mode="vector_entry_point")
+    assert refusal["message"].endswith("Pendulum-v1 has none")
+
+
+def test_an_implementation_is_judged_by_what_it_is(client):
+    own = "faultyOwnLanes-v0"
+    assert chosen(client, own, autoreset_mode="same_step") == ("vector_entry_point", "SameStep")
+    before = OwnLanes.closed_ones
+    assert chosen(client, own) == ("sync", "NextStep")
+    assert OwnLanes.closed_ones == before + 1
+    # It draws nothing, and so it is taken when nobody asks for pictures.
+    assert chosen(client, own, autoreset_mode="SAME_STEP", kwargs={"seconds": 0})[0] == "sync"
+
+
+def test_an_implementation_of_another_task_is_taken_only_when_asked_for(client):
+    other = "faultyOtherLanes-v0"
+    assert chosen(client, other, autoreset_mode="SameStep")[0] == "sync"
+    mode = "vector_entry_point"
+    assert chosen(client, other, autoreset_mode="SameStep", vectorization_mode=mode)[0] == mode
+    # Only it knows the argument.
+    assert chosen(client, other, autoreset_mode="SameStep", kwargs={"colour": 1})[0] == mode
+
+
+def test_an_implementation_that_fails_is_not_passed_over(client):
+    refusal = refused(client, status=500, env_id="faultyHasNoLanes-v0")
+    assert refusal["message"] == "The environment raised RuntimeError: no lanes today"
+
+
+@pytest.mark.parametrize(
+    "mode", ["vector_entry_point", "sync", "async", "SYNC", "VectorEntryPoint"]
+)
+def test_an_implementation_can_be_asked_for(client, mode):
+    letters = mode.lower().replace("_", "")
+    assert chosen(client, vectorization_mode=mode)[0].replace("_", "") == letters
+
+
+@pytest.mark.parametrize(
+    ("mode", "meant"),
+    [("next_step", "NextStep"), ("SAMESTEP", "SameStep"), ("Same_Step", "SameStep"),
+     ("disabled", "Disabled")],
+)  # fmt: skip
+def test_case_and_underscores_do_not_matter_in_an_autoreset_mode(client, mode, meant):
+    assert chosen(client, autoreset_mode=mode)[1] == meant
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "wanted"),
+    [
+        ("num_envs", 0, "an integer, 1 or greater"),
+        ("num_envs", -1, "an integer, 1 or greater"),
+        ("num_envs", 1.5, "an integer, 1 or greater"),
+        ("num_envs", "4", "an integer, 1 or greater"),
+        ("num_envs", True, "an integer, 1 or greater"),
+        ("num_envs", [4], "an integer, 1 or greater"),
+        ("vectorization_mode", "fast", '"vector_entry_point", "sync" or "async"'),
+        ("vectorization_mode", 1, '"vector_entry_point", "sync" or "async"'),
+        ("autoreset_mode", "never", '"NextStep", "SameStep" or "Disabled"'),
+        ("seed", [1, -1], "an integer, 0 or greater, or a list of one, or null, for each lane"),
+        ("seed", [1, 2, 3], "hold one integer or null for each of the 2 lanes, not 3"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_named(client, field, value, wanted):
+    refusal = refused(client, **{field: value})
+    assert refusal["code"] == "invalid_parameter"
+    assert f"'{field}' must " in refusal["message"]
+    assert wanted in refusal["message"]
+
+
+@pytest.mark.parametrize(
+    "fields", [{"vectorization_mode": "sync"}, {"autoreset_mode": "NextStep"}, {"seed": [1]}]
+)
+def test_what_is_for_lanes_needs_lanes(client, fields):
+    refusal = refused(client, num_envs=None, **fields)
+    assert refusal["code"] == "invalid_parameter"
+    assert "'num_envs' was not provided" in refusal["message"]
+    assert next(iter(fields)) in refusal["message"]
+
+
+@pytest.fixture
+def small_server():
+    app = create_app(Config(limits=Limits(max_num_envs=100)))
+    yield app.test_client()
+    app.close()
+
+
+def test_a_server_has_a_largest_number_of_lanes(small_server):
+    assert chosen(small_server, num_envs=100)[0] == "vector_entry_point"
+    answer = small_server.post("/v1/envs/", json={"env_id": "CartPole-v1", "num_envs": 101})
+    assert (answer.status_code, answer.json["code"]) == (429, "too_many_lanes")
+    assert answer.json["message"] == "This server takes at most 100 lanes, not 101"
+    assert "--max-num-envs" in answer.json["hint"]
+
+
+def test_processes_are_fewer(client):
+    refusal = refused(client, 429, num_envs=65, vectorization_mode="async")
+    assert refusal["code"] == "too_many_lanes"
+    assert "--max-num-envs" in refusal["hint"]
+    refusal = refused(client, 429, num_envs=16385)
+    assert refusal["message"] == "This server takes at most 16384 lanes, not 16385"
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+@pytest.mark.parametrize(
+    ("env_id", "fields", "code"),
+    [
+        ("CartPol-v1", {}, "unknown_env_id"),
+        ("this:X-v0", {}, "module_not_allowed"),
+        ("CartPole-v1", {"kwargs": {"colour": 1}}, "invalid_kwargs"),
+        ("CartPole-v1", {"kwargs": {"render_mode": "x"}}, "invalid_kwargs"),
+        ("CartPole-v1", {"render_mode": "ansi"}, "invalid_parameter"),
+        ("CartPole-v1", {"wrappers": [{"name": "Nope"}]}, "wrapper_not_allowed"),
+        ("CartPole-v1", {"wrappers": [{"name": "TimeLimit"}]}, "invalid_kwargs"),
+        ("faulty_envs:CustomSpace-v0", {}, "unsupported_space"),
+        ("faulty_envs:LongDouble-v0", {}, "unsupported_space"),
+    ],
+)
+def test_what_no_environment_can_have_no_lane_can(client, mode, env_id, fields, code):
+    assert refused(client, env_id=env_id, vectorization_mode=mode, **fields)["code"] == code
+
+
+@pytest.mark.parametrize("mode", [None, "sync", "async"])
+def test_an_environment_that_cannot_be_made_says_why(client, mode):
+    refusal = refused(client, 500, "faulty_envs:RaisesInConstructor-v0", vectorization_mode=mode)
+    assert refusal["message"] == "The environment raised RuntimeError: no such table"
+
+
+def test_arguments_cannot_change_what_was_chosen(client):
+    for name in ("num_envs", "vectorization_mode", "vector_kwargs", "wrappers"):
+        assert refused(client, kwargs={name: 3})["code"] == "invalid_kwargs"

@@ -1,0 +1,192 @@
+"""One connection's code, whose patience is short, and a client that behaves badly."""
+
+import gc
+import socket
+import threading
+import time
+import weakref
+from contextlib import suppress
+
+import pytest
+
+from gym_server.budget import Budget
+from gym_server.http_server import connection as connection_module
+from gym_server.http_server.connection import Connection
+
+GET = b"GET /%s HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+POST = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n"
+LARGE = 2**24
+ROOM = 2**18
+
+
+def app(environ, start_response):
+    """Answer with as many bytes as the path says."""
+    size = int(environ["PATH_INFO"].strip("/") or 0)
+    environ["wsgi.input"].read()
+    start_response("200 OK", [("Content-Length", str(size))])
+    return [bytes(size)]
+
+
+@pytest.fixture
+def patience(monkeypatch):
+    monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 2**20)
+
+
+@pytest.fixture
+def converse(patience):
+    """Return a function that connects a client to a connection of its own, and that thread."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    clients, threads = [], []
+
+    def converse(budget=None, most=2**20, seen=lambda connection: None, **how):
+        client = socket.socket()
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        client.settimeout(20)
+        client.connect(listener.getsockname())
+        accepted, _ = listener.accept()
+        environ = {"wsgi.url_scheme": "http", "SERVER_NAME": "x"}
+        bodies = (budget or Budget(ROOM)).share()
+        connection = Connection(accepted, app, environ, most, bodies, **how)
+        seen(connection)
+        thread = threading.Thread(target=connection.serve)
+        thread.start()
+        clients.append(client)
+        threads.append(thread)
+        return client, thread
+
+    yield converse
+    for client in clients:
+        client.close()
+    for thread in threads:
+        thread.join(10)
+        assert not thread.is_alive()
+    listener.close()
+
+
+def read_head(client):
+    data = b""
+    while b"\r\n\r\n" not in data:
+        more = client.recv(65536)
+        assert more, "closed without an answer"
+        data += more
+    return data
+
+
+# Answers that are not read -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("asked", [1, 50])
+def test_an_answer_that_is_not_read_is_given_up(converse, asked):
+    client, thread = converse()
+    client.sendall(GET % b"%d" % LARGE * asked)
+    thread.join(20)
+    assert not thread.is_alive()
+
+
+def test_an_answer_that_is_read_drop_by_drop_is_given_up(converse):
+    client, thread = converse()
+    client.sendall(GET % b"%d" % LARGE)
+    received = 0
+    with suppress(ConnectionError):
+        while thread.is_alive() and received < 2**21:
+            # Never nothing for as long as that may be, and yet too little.
+            received += len(client.recv(4096))
+            thread.join(0.01)
+    assert received < 2**21
+
+
+def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
+    client, _ = converse()
+    client.sendall(GET % b"%d" % 2**22)
+    began, received = time.monotonic(), len(read_head(client))
+    while received < 2**22:
+        # Twice as fast as it has to be, for longer than nothing may be read.
+        time.sleep(max(0, began + received / 2**21 - time.monotonic()))
+        received += len(client.recv(65536))
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
+
+
+def test_a_client_that_is_known_may_be_silent_for_long(converse):
+    client, _ = converse()
+    for _ in range(2):
+        client.sendall(GET % b"")
+        assert b"200 OK" in read_head(client)
+        time.sleep(1.2)
+
+
+# Those who have not shown that they belong here ----------------------------------------------
+
+
+def strangers(environ):
+    return False
+
+
+def test_a_stranger_gets_one_answer(converse):
+    client, _ = converse(knows=strangers)
+    client.sendall((GET % b"") * 2)
+    answer = b""
+    while more := client.recv(65536):
+        answer += more
+    assert (answer.count(b"200 OK"), answer.count(b"Connection: close")) == (1, 1)
+
+
+@pytest.mark.parametrize("begun", [b"", GET[:20], POST % 1000])
+def test_a_stranger_may_not_be_silent(converse, begun):
+    client, _ = converse(knows=strangers)
+    client.sendall(begun)
+    assert client.recv(1) == b""
+
+
+def test_a_client_is_asked_for_until_it_is_known(converse):
+    asked = []
+    client, _ = converse(knows=lambda environ: asked.append(environ["PATH_INFO"]) or True)
+    for path in (b"1", b"2"):
+        client.sendall(GET % path)
+        read_head(client)
+    assert asked == ["/1"]
+
+
+# Bodies --------------------------------------------------------------------------------------
+
+
+def test_a_body_for_which_there_is_no_room_is_503(converse):
+    client, _ = converse()
+    client.sendall(POST % (2 * ROOM) + bytes(2 * ROOM))
+    answer = read_head(client)
+    assert answer.startswith(b"HTTP/1.1 503 ")
+    assert b"\r\nRetry-After: " in answer
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
+
+
+@pytest.mark.parametrize("sent", [ROOM, ROOM - 1], ids=["answered", "half-sent"])
+def test_the_room_of_a_body_is_given_back(converse, sent):
+    budget = Budget(ROOM)
+    client, thread = converse(budget)
+    client.sendall(POST % ROOM + bytes(sent))
+    if sent == ROOM:
+        read_head(client)
+    else:
+        client.close()
+        thread.join(10)
+    assert budget.share().take(ROOM)
+
+
+def test_what_was_half_sent_leaves_nothing_for_the_garbage_collection(converse):
+    readers = []
+    gc.collect()
+    gc.disable()
+    try:
+        client, thread = converse(
+            seen=lambda connection: readers.append(weakref.ref(connection._reader))
+        )
+        client.sendall(POST % ROOM + bytes(ROOM - 1))
+        client.close()
+        thread.join(10)
+        del thread
+        assert readers[0]() is None
+    finally:
+        gc.enable()

@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from gym_server.instances.episode_statistics import LaneTally, Standing, Tally, told
+
+
+def play(tally, rewards, ends=True):
+    tally.begin()
+    for index, reward in enumerate(rewards):
+        tally.step(reward, ends and index == len(rewards) - 1)
+
+
+def test_an_episode_is_counted_from_its_reset():
+    tally = Tally()
+    assert tally.of(0) == Standing(0, 0, 0.0, False)
+    tally.begin()
+    assert tally.of(0) == Standing(1, 0, 0.0, False)
+    tally.step(1.5, False)
+    tally.step(2.0, True)
+    assert tally.of(0) == Standing(1, 2, 3.5, True)
+    tally.begin()
+    assert tally.of(0) == Standing(2, 0, 0.0, False)
+
+
+def test_watchers_are_told_of_the_episode_and_the_returns_before_it():
+    tally = Tally()
+    play(tally, [1, 2])
+    play(tally, [5], ends=False)
+    assert told(tally, 0) == {
+        "state": "running",
+        "episode": 2,
+        "step": 1,
+        "return": 5.0,
+        "returns": [3.0],
+    }
+
+
+def test_a_reset_that_follows_a_reset_begins_no_other_episode():
+    tally = Tally()
+    tally.begin()
+    tally.begin()
+    assert tally.of(0).episode == 1
+
+
+def test_returns_are_of_episodes_that_ended():
+    tally = Tally()
+    play(tally, [1, 2])
+    play(tally, [5], ends=False)
+    play(tally, [4])
+    assert list(tally.returns) == [3, 4]
+    assert tally.of(0).episode == 3
+
+
+def test_steps_after_the_end_count_for_nothing():
+    tally = Tally()
+    play(tally, [1])
+    tally.step(7, True)
+    assert tally.of(0) == Standing(1, 1, 1.0, True)
+    assert list(tally.returns) == [1]
+
+
+def test_the_last_hundred_returns_are_kept():
+    tally = Tally()
+    for number in range(130):
+        play(tally, [number])
+    assert list(tally.returns) == list(range(30, 130))
+
+
+def lanes_of(mode, lanes=3):
+    tally = LaneTally(lanes, mode)
+    tally.begin(None)
+    return tally
+
+
+def step(tally, rewards, ended, lanes=None):
+    rows = None if lanes is None else np.array(lanes)
+    tally.step(np.array(rewards, dtype=float), np.array(ended, dtype=bool), rows)
+
+
+def test_the_step_that_resets_a_lane_is_no_step_of_its_episode():
+    tally = lanes_of(AutoresetMode.NEXT_STEP)
+    step(tally, [1, 1, 1], [0, 1, 0])
+    assert tally.of(1) == Standing(1, 1, 1.0, True)
+    step(tally, [1, 0, 1], [0, 0, 0])
+    assert tally.of(1) == Standing(2, 0, 0.0, False)
+    assert tally.of(0) == Standing(1, 2, 2.0, False)
+    step(tally, [1, 1, 1], [1, 0, 0])
+    assert tally.of(1) == Standing(2, 1, 1.0, False)
+    assert list(tally.returns) == [1, 3]
+
+
+def test_a_lane_that_resets_at_once_is_in_its_next_episode():
+    tally = lanes_of(AutoresetMode.SAME_STEP)
+    step(tally, [2, 1, 1], [1, 0, 0])
+    assert tally.of(0) == Standing(2, 0, 0.0, False)
+    step(tally, [3, 1, 1], [1, 1, 0])
+    assert list(tally.returns) == [2, 3, 2]
+
+
+def test_lanes_reset_by_a_mask_begin_anew_and_others_go_on():
+    tally = lanes_of(AutoresetMode.DISABLED)
+    step(tally, [1, 1, 1], [1, 0, 0])
+    step(tally, [5, 6], [0, 1], lanes=[1, 2])
+    tally.begin(np.array([True, False, False]))
+    assert [tally.of(lane) for lane in range(3)] == [
+        Standing(2, 0, 0.0, False),
+        Standing(1, 2, 6.0, False),
+        Standing(1, 2, 7.0, True),
+    ]
+    assert list(tally.returns) == [1, 7]
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_lanes_return_what_the_environment_gave(client, lanes, app, mode):
+    url = lanes(num_envs=3, autoreset_mode=mode, vectorization_mode="sync")
+    client.post(f"{url}/reset/", json={"seed": 1})
+    so_far, returns, over = np.zeros(3), [], np.zeros(3, dtype=bool)
+    for _ in range(30):
+        action = client.get(f"{url}/action_space/sample").json["action"]
+        out = client.post(f"{url}/step/", json={"action": action}).json
+        so_far += out["reward"]
+        so_far[over] = 0
+        done = np.array(out["done"])
+        returns += so_far[done].tolist()
+        over = done if mode == "NextStep" else np.zeros(3, dtype=bool)
+        if mode == "SameStep":
+            so_far[done] = 0
+    tally = app._instances.get(url.rsplit("/", 1)[1])._tally
+    assert len(returns) > 10
+    assert list(tally.returns) == pytest.approx(returns)

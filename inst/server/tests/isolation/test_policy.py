@@ -1,0 +1,40 @@
+"""Which environments get a process of their own."""
+
+import faulty_envs  # noqa: F401 - it registers what is asked for here
+import pytest
+
+from gym_server.isolation.policy import MODES, Isolation
+
+ALLOWED = ["faulty_envs"]
+
+
+@pytest.mark.parametrize(
+    ("env_id", "allowed", "wanting"),
+    [
+        ("CartPole-v1", ALLOWED, ["all"]),
+        ("CartPole", ALLOWED, ["all"]),
+        ("gymnasium.envs.classic_control:CartPole-v1", ["gymnasium.envs.classic_control"], ["all"]),
+        ("faulty_envs:Counting-v0", ALLOWED, ["foreign", "all"]),
+        ("Counting-v0", ALLOWED, ["foreign", "all"]),
+        # Maybe an allowed module registers it.
+        ("Nobody-v0", ALLOWED, ["foreign", "all"]),
+        ("Nobody-v0", [], ["all"]),
+        # Refused without a process.
+        ("os:Counting-v0", ALLOWED, []),
+        (7, ALLOWED, []),
+        ("x" * 201 + "-v0", ALLOWED, []),
+    ],
+)
+def test_gymnasiums_own_are_not_foreign(env_id, allowed, wanting):
+    assert [mode for mode in MODES if Isolation(mode).wants(env_id, allowed)] == wanting
+
+
+def test_only_an_id_that_nobody_knows_imports_all_modules():
+    isolation = Isolation("all", 100)
+    for env_id, imported in [
+        ("CartPole-v1", set()),
+        ("faulty_envs:Counting-v0", set()),
+        ("Nobody-v0", set(ALLOWED)),
+    ]:
+        told = isolation.surroundings(env_id, ALLOWED, 5)
+        assert (told.imported, told.max_num_envs, told.max_mb) == (imported, 5, 100)

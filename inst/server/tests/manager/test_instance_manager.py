@@ -1,0 +1,183 @@
+import os
+import re
+import signal
+import threading
+import time
+
+import pytest
+
+from gym_server.api.app import Config, create_app
+from gym_server.manager.instance_manager import Instances
+
+
+@pytest.fixture
+def in_background(app):
+    """POST from another thread; call the result for the answer."""
+
+    def in_background(url, body=None):
+        answers = []
+        thread = threading.Thread(
+            target=lambda: answers.append(app.test_client().post(url, json=body))
+        )
+        thread.start()
+
+        def answer():
+            thread.join(20)
+            return answers[0]
+
+        return answer
+
+    return in_background
+
+
+def test_an_instance_id_is_8_hex_digits(create):
+    assert re.fullmatch("/v1/envs/[0-9a-f]{8}", create())
+
+
+def test_environments_are_listed_until_they_are_closed(client, create):
+    first, second = create("CartPole-v0"), create("Pendulum-v1")
+    ids = {url.rsplit("/", 1)[1]: url for url in (first, second)}
+    assert set(client.get("/v1/envs/").json["all_envs"]) == set(ids)
+    client.post(f"{first}/close/")
+    assert client.get("/v1/envs/").json == {"all_envs": {second.rsplit("/", 1)[1]: "Pendulum-v1"}}
+
+
+def test_an_env_id_that_is_listed_can_be_created_again(client, create, faulty):
+    create("CartPole"), faulty("Counting")
+    listed = client.get("/v1/envs/").json["all_envs"].values()
+    assert sorted(listed) == ["CartPole-v1", "faulty_envs:Counting-v0"]
+
+
+def test_a_closed_instance_is_unknown(client, create):
+    url = create()
+    client.post(f"{url}/close/")
+    for answer in (client.post(f"{url}/close/"), client.post(f"{url}/reset/"), client.get(url)):
+        assert answer.status_code == 400
+        assert answer.json["message"] == f"Instance_id {url.rsplit('/', 1)[1]} unknown"
+
+
+def test_who_waits_for_an_instance_that_closes_learns_that_it_is_gone(
+    app, client, faulty, in_background
+):
+    url = faulty("Counting")
+    client.post(f"{url}/reset/")
+    instance = app._instances.get(url.rsplit("/", 1)[1])
+    with instance.hold:
+        waiting = in_background(f"{url}/step/", {"action": 0})
+        time.sleep(0.2)
+        instance.hold.closed = True
+    assert waiting().json["message"] == f"Instance_id {instance.instance_id} unknown"
+    assert instance.about()["steps"] == 0
+
+
+def test_steps_that_meet_a_close_are_taken_or_refused(client, faulty, in_background):
+    url = faulty("Counting", seconds=0.05, length=1000)
+    client.post(f"{url}/reset/")
+    steps = [in_background(f"{url}/step/", {"action": 0}) for _ in range(8)]
+    assert client.post(f"{url}/close/").status_code == 204
+    for step in steps:
+        answer = step()
+        assert answer.status_code == 200 or answer.json["code"] == "unknown_instance"
+
+
+def test_environments_do_not_wait_for_each_other(
+    client, create, faulty, in_background, eventually, tmp_path
+):
+    meeting = tmp_path / "meeting"
+    meeting.mkdir()
+    slow, quick = faulty("Meeting", directory=str(meeting), count=2), create()
+    client.post(f"{slow}/reset/")
+    step = in_background(f"{slow}/step/", {"action": 0})
+    eventually(lambda: list(meeting.iterdir()))
+    assert client.post(f"{quick}/reset/").status_code == 200
+    assert client.get("/v1/envs/").status_code == 200
+    create()
+    # Had one of these waited for the step, it would have given up by now.
+    (meeting / "the test").touch()
+    assert step().status_code == 200
+
+
+def test_calls_of_one_environment_wait_for_each_other(client, faulty, in_background):
+    url = faulty("Counting", length=100)
+    client.post(f"{url}/reset/")
+    steps = [in_background(f"{url}/step/", {"action": 0}) for _ in range(20)]
+    seen = sorted(step().json["observation"][0] for step in steps)
+    assert seen == list(range(1, 21))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("CustomSpace", "OwnSpace"), ("LongDouble", "Box")],
+)
+def test_an_environment_whose_space_is_not_supported_is_refused_by_name(client, name, kind):
+    answer = client.post("/v1/envs/", json={"env_id": f"faulty_envs:{name}-v0"})
+    assert (answer.status_code, answer.json["code"]) == (400, "unsupported_space")
+    assert kind in answer.json["message"]
+    assert client.get("/v1/envs/").json == {"all_envs": {}}
+
+
+def test_at_the_end_everything_is_closed_and_nothing_more_is_made(app, client, create):
+    create(), create()
+    app._instances.close_all()
+    assert client.get("/v1/envs/").json == {"all_envs": {}}
+    answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1"})
+    assert (answer.status_code, answer.json["code"]) == (503, "shutting_down")
+
+
+def test_an_environment_that_fails_to_close_does_not_keep_the_others_open(app, faulty, create):
+    faulty("RaisesInClose"), create()
+    app._instances.close_all()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
+    monkeypatch, eventually
+):
+    app = create_app(Config(isolate="all"))
+    enlist = Instances._enlist
+
+    def end_it_and_enlist(self, instance, making):
+        os.kill(instance._worker.pid, signal.SIGKILL)
+        eventually(lambda: instance._worker.why is not None)
+        return enlist(self, instance, making)
+
+    monkeypatch.setattr(Instances, "_enlist", end_it_and_enlist)
+    client = app.test_client()
+    instance_id = client.post("/v1/envs/", json={"env_id": "CartPole-v1"}).json["instance_id"]
+    assert client.get("/v1/envs/").json["all_envs"] == {}
+    answer = client.post(f"/v1/envs/{instance_id}/reset/")
+    assert (answer.status_code, answer.json["code"]) == (500, "environment_died")
+    app.close()
+
+
+def test_instances_are_listed_with_who_uses_them_how_much(client, create):
+    url = create("CartPole-v1", name="Änne's pole")
+    lanes = create("CartPole-v1", num_envs=3)
+    client.post(f"{lanes}/reset/")
+    client.post(f"{lanes}/step/", json={"action": [0, 0, 0]})
+    client.get(f"{lanes}/watch/presence/")
+    first, second = client.get("/v1/instances/").json["instances"]
+    assert first["age_seconds"] >= first.pop("idle_seconds") >= 0
+    assert first.pop("age_seconds") >= second["age_seconds"]
+    assert first == {
+        "instance_id": url.rsplit("/", 1)[1],
+        "env_id": "CartPole-v1",
+        "name": "Änne's pole",
+        "num_envs": None,
+        "steps": 0,
+        "watched": False,
+    }
+    expected = {"name": None, "num_envs": 3, "steps": 3, "watched": True}
+    assert {key: second[key] for key in expected} == expected
+    assert client.get(url).json["name"] == "Änne's pole"
+    # Strictly typed classic clients know no more than this.
+    assert set(client.get("/v1/envs/").json) == {"all_envs"}
+
+
+@pytest.mark.parametrize(
+    "name", ["x" * 101, "two\nlines", "\x1b[31mred", "nul\0", "\u202eright to left", 7, ["a"]]
+)
+def test_a_name_is_a_short_text_on_one_line(client, name):
+    refusal = client.post("/v1/envs/", json={"env_id": "CartPole-v1", "name": name})
+    assert (refusal.status_code, refusal.json["code"]) == (400, "invalid_parameter")
+    assert "1 to 100 printable characters" in refusal.json["message"]

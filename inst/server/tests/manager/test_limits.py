@@ -1,0 +1,211 @@
+"""How much there is for all clients together."""
+
+import threading
+
+import pytest
+
+from gym_server.api.app import Config, create_app
+from gym_server.envs.vector_envs import AsyncLanes
+from gym_server.errors import GymServerError
+from gym_server.manager.limits import Limits, Room, Watchers
+
+
+@pytest.fixture
+def limited():
+    """Return a client of an application with limits."""
+    apps = []
+
+    def limited(isolate="none", **limits):
+        apps.append(
+            create_app(
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate=isolate)
+            )
+        )
+        return apps[-1].test_client()
+
+    yield limited
+    for app in apps:
+        app.close()
+
+
+def make(client, **fields):
+    return client.post("/v1/envs/", json={"env_id": "CartPole-v1", **fields})
+
+
+def refused(answer, code):
+    return (answer.status_code, answer.json["code"]) == (429, code)
+
+
+def test_there_are_only_so_many_instances(limited):
+    client = limited(max_instances=2)
+    first, second = make(client), make(client)
+    refusal = make(client)
+    assert refused(refusal, "too_many_instances")
+    assert "2 environments" in refusal.json["message"]
+    assert "--max-instances" in refusal.json["hint"]
+    for answer in (first, second):
+        assert client.post(f"/v1/envs/{answer.json['instance_id']}/close/").status_code == 204
+        assert make(client).status_code == 200
+
+
+def test_many_that_come_at_once_get_no_more(limited):
+    client = limited(max_instances=3)
+    answers = []
+    threads = [
+        threading.Thread(
+            target=lambda: answers.append(
+                client.application.test_client().post(
+                    "/v1/envs/",
+                    json={"env_id": "faulty_envs:HangsWhere-v0", "kwargs": SHORTLY},
+                )
+            )
+        )
+        for _ in range(12)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(answer.status_code for answer in answers) == [200] * 3 + [429] * 9
+
+
+SHORTLY = {"where": "init", "hours": 0.3 / 3600}
+
+
+def test_what_could_not_be_made_takes_no_room(limited):
+    client = limited(max_instances=1, max_num_envs=4, max_total_lanes=4)
+    for _ in range(3):
+        assert make(client, env_id="NoSuch-v0").status_code == 400
+        assert make(client, num_envs=4, kwargs={"none": 1}).status_code == 400
+    assert make(client, num_envs=4).status_code == 200
+
+
+def test_all_together_have_only_so_many_lanes(limited):
+    client = limited(max_num_envs=8, max_total_lanes=10)
+    assert make(client, num_envs=8).status_code == 200
+    refusal = make(client, num_envs=3)
+    assert refused(refusal, "too_many_lanes")
+    assert refusal.json["message"] == (
+        "All environments together may have 10 lanes, and 2 are left, not 3"
+    )
+    assert "--max-total-lanes" in refusal.json["hint"]
+    # One without lanes is one.
+    assert make(client).status_code == make(client).status_code == 200
+    assert refused(make(client), "too_many_lanes")
+
+
+def test_one_that_is_too_large_hears_of_that(limited):
+    refusal = make(limited(max_num_envs=8), num_envs=9)
+    assert refused(refusal, "too_many_lanes")
+    assert "--max-num-envs" in refusal.json["hint"]
+
+
+def test_the_lanes_of_all_follow_those_of_one():
+    Limits(max_num_envs=100_000).check_room(0, Room(0), Room(100_000))
+    with pytest.raises(GymServerError, match="may have 400000 lanes"):
+        Limits(max_num_envs=100_000).check_room(4, Room(400_000), Room(1))
+
+
+def test_watchers_leave_room_for_others():
+    watchers = Watchers(1)
+    for _ in range(2):
+        with watchers.one_more():
+            with pytest.raises(GymServerError) as refusal, watchers.one_more():
+                pass
+            assert refusal.value.status == 429
+
+
+def test_one_watcher_too_many_is_told_so(limited):
+    client = limited(max_watchers=1)
+    url = f"/v1/envs/{make(client).json['instance_id']}"
+    client.post(f"{url}/reset/")
+    number = client.get(f"{url}/watch/state/").json["number"]
+    other = client.application.test_client()
+    waiting = threading.Thread(target=lambda: other.get(f"{url}/watch/state/?after={number}"))
+    waiting.start()
+    answers = []
+    while not (answers and answers[-1].status_code == 429):
+        answers.append(client.get(f"{url}/watch/state/"))
+        assert len(answers) < 10_000
+    assert answers[-1].json["code"] == "too_many_watchers"
+    client.post(f"{url}/close/")
+    waiting.join()
+
+
+def ask_for_processes(client, number):
+    return make(client, num_envs=number, vectorization_mode="async")
+
+
+def test_all_together_have_only_so_many_processes(limited):
+    client = limited(max_processes=3)
+    first = ask_for_processes(client, 2)
+    assert first.status_code == 200
+    refusal = ask_for_processes(client, 2)
+    assert refused(refusal, "too_many_processes")
+    assert refusal.json["message"] == (
+        "All environments together may have 3 processes, and 1 are left, not 2"
+    )
+    assert "--max-processes" in refusal.json["hint"]
+    assert ask_for_processes(client, 1).status_code == 200
+    # What takes none is not refused.
+    assert make(client, num_envs=8).status_code == make(client).status_code == 200
+    client.post(f"/v1/envs/{first.json['instance_id']}/close/")
+    assert ask_for_processes(client, 2).status_code == 200
+
+
+def test_processes_that_are_started_at_once_are_no_more(limited):
+    client = limited(max_processes=4)
+    answers = []
+
+    def ask():
+        answers.append(ask_for_processes(client.application.test_client(), 2).status_code)
+
+    threads = [threading.Thread(target=ask) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(answers) == [200] * 2 + [429] * 4
+
+
+def test_processes_count_until_they_have_ended(limited, monkeypatch):
+    client = limited(max_processes=2)
+    closing, released = threading.Event(), threading.Event()
+    close = AsyncLanes.close_extras
+
+    def close_when_released(self, **how):
+        closing.set()
+        released.wait(20)
+        close(self, **how)
+
+    url = f"/v1/envs/{ask_for_processes(client, 2).json['instance_id']}"
+    monkeypatch.setattr(AsyncLanes, "close_extras", close_when_released)
+    closer = threading.Thread(target=lambda: client.post(f"{url}/close/"))
+    closer.start()
+    assert closing.wait(20)
+    assert refused(ask_for_processes(client.application.test_client(), 1), "too_many_processes")
+    released.set()
+    closer.join()
+    assert ask_for_processes(client, 2).status_code == 200
+
+
+def test_isolated_environments_and_their_processes_count(limited):
+    client = limited(max_processes=4, isolate="all")
+    first = ask_for_processes(client, 2)
+    assert first.status_code == 200
+    assert refused(ask_for_processes(client, 1), "too_many_processes")
+    second = make(client)
+    assert second.status_code == 200
+    assert refused(make(client), "too_many_processes")
+    assert client.post(f"/v1/envs/{second.json['instance_id']}/close/").status_code == 204
+    assert make(client).status_code == 200
+
+
+def test_a_process_that_ended_by_itself_makes_room(limited, eventually):
+    client = limited(max_processes=1, isolate="all")
+    kwargs = {"does": "exits", "at": "step"}
+    answer = make(client, env_id="faulty_envs:Rogue-v0", kwargs=kwargs)
+    url = f"/v1/envs/{answer.json['instance_id']}"
+    client.post(f"{url}/reset/")
+    assert client.post(f"{url}/step/", json={"action": 0}).json["code"] == "environment_died"
+    eventually(lambda: make(client).status_code == 200)

@@ -1,0 +1,219 @@
+import json
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from gym_server.errors import GymServerError
+from gym_server.monitoring.monitor_directory import MonitorRoot
+
+
+@pytest.fixture
+def root(monitor_dir):
+    return MonitorRoot(monitor_dir, allow_temporary=False)
+
+
+@pytest.fixture(autouse=True)
+def claimed():
+    """Give back at the end whatever a test has claimed."""
+    CLAIMED.clear()
+    yield
+    for files in CLAIMED:
+        files.table.close()
+
+
+CLAIMED = []
+
+
+def claim(root, directory, force=False, resume=False, instance_id="0123abcd"):
+    files = root.claim(str(directory), instance_id, force, resume)
+    CLAIMED.append(files)
+    files.begin(["episode"])
+    return files
+
+
+def refused(root, directory, **options):
+    with pytest.raises(GymServerError) as caught:
+        claim(root, directory, **options)
+    assert caught.value.code == "monitor_directory"
+    assert caught.value.hint
+    return caught.value.message
+
+
+def fill(root, directory="run", episodes=(0,), videos=()):
+    claimed = claim(root, directory, resume=True)
+    for number in episodes:
+        claimed.table.write(f"{number}\n")
+        claimed.next_episode = number + 1
+    for name in videos:
+        claimed.add(name)
+        (claimed.path / name).write_text("video")
+    claimed.release()
+    return claimed.path
+
+
+def test_a_relative_directory_lies_below_the_root(root, monitor_dir):
+    assert claim(root, "a/b").path == monitor_dir / "a" / "b"
+    assert (monitor_dir / "a" / "b").is_dir()
+
+
+def test_an_absolute_directory_may_lie_below_the_root(root, monitor_dir):
+    assert claim(root, monitor_dir / "run").path == monitor_dir / "run"
+
+
+@pytest.mark.parametrize(
+    "directory",
+    ["..", "../run", "a/../../run", "a/..", "a\\..\\b", "/etc/gym", "~/../x/..", "a\0b", ".", "/"],
+)
+def test_any_other_directory_is_refused(root, directory, tmp_path):
+    before = sorted(tmp_path.rglob("*"))
+    refused(root, directory)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_sibling_whose_name_begins_alike_is_refused(root, monitor_dir):
+    refused(root, f"{monitor_dir}-other/run")
+
+
+def test_the_temporary_directory_is_only_allowed_where_it_is_said(monitor_dir, root):
+    with tempfile.TemporaryDirectory() as directory:
+        refused(root, Path(directory, "run"))
+        trusting = MonitorRoot(monitor_dir, allow_temporary=True)
+        assert claim(trusting, Path(directory, "run")).path.is_dir()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the classic examples' path")
+def test_the_classic_examples_directory_is_accepted(monitor_dir):
+    trusting = MonitorRoot(monitor_dir, allow_temporary=True)
+    with tempfile.TemporaryDirectory(dir="/tmp") as directory:
+        assert claim(trusting, f"{directory}/random-agent-results").path.is_dir()
+    refused(trusting, "/tmp")
+    refused(trusting, "/tmp/../etc/gym")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links")
+def test_a_link_that_leads_out_is_refused(root, monitor_dir, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (monitor_dir / "link").symlink_to(tmp_path / "elsewhere")
+    refused(root, "link")
+    refused(root, "link/run")
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links")
+@pytest.mark.parametrize("name", ["episodes.csv", "gym-monitor.json"])
+def test_a_file_that_became_a_link_is_not_followed(root, tmp_path, name):
+    path = fill(root)
+    (tmp_path / "precious").write_text("precious")
+    (path / name).unlink()
+    (path / name).symlink_to(tmp_path / "precious")
+    refused(root, "run", resume=True)
+    refused(root, "run", force=True)
+    assert (tmp_path / "precious").read_text() == "precious"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes with names")
+def test_a_pipe_of_that_name_is_refused_and_not_waited_for(root, monitor_dir):
+    (monitor_dir / "run").mkdir()
+    os.mkfifo(monitor_dir / "run" / "episodes.csv")
+    refused(root, "run", force=True)
+
+
+def test_a_file_in_the_way_is_refused(root, monitor_dir):
+    (monitor_dir / "run").write_text("a file")
+    refused(root, "run")
+    refused(root, "run/deeper")
+
+
+def test_the_files_of_an_earlier_monitor_are_kept_unless_the_client_decides(root):
+    path = fill(root)
+    assert "earlier monitor" in refused(root, "run")
+    assert (path / "episodes.csv").read_text() == "episode\n0\n"
+
+
+def test_resume_goes_on_counting(root):
+    fill(root, episodes=[0, 1, 3])
+    claimed = claim(root, "run", resume=True)
+    assert claimed.next_episode == 4
+    claimed.release()
+    assert claim(root, "run", resume=True).next_episode == 4
+
+
+def test_resume_goes_on_counting_after_a_server_was_killed(root):
+    path = fill(root, episodes=[0])
+    with open(path / "episodes.csv", "a") as table:
+        table.write("1\n2\n")
+    assert claim(root, "run", resume=True).next_episode == 3
+
+
+def test_resuming_nothing_begins_at_0(root):
+    assert claim(root, "run", resume=True).next_episode == 0
+
+
+def test_force_deletes_what_monitors_wrote_and_nothing_else(root):
+    path = fill(root, videos=["rl-video-episode-0.mp4"])
+    for name in ("notes.txt", "my-episodes.csv", "holiday.mp4"):
+        (path / name).write_text("mine")
+    claimed = claim(root, "run", force=True)
+    assert claimed.next_episode == 0
+    assert sorted(os.listdir(path)) == [
+        "episodes.csv",
+        "gym-monitor.json",
+        "holiday.mp4",
+        "my-episodes.csv",
+        "notes.txt",
+    ]
+
+
+@pytest.mark.parametrize("name", ["episodes.csv", "rl-video-episode-3.mp4"])
+@pytest.mark.parametrize("options", [{}, {"force": True}, {"resume": True}])
+def test_a_file_of_that_name_from_elsewhere_is_never_touched(root, monitor_dir, name, options):
+    (monitor_dir / "run").mkdir()
+    (monitor_dir / "run" / name).write_text("mine")
+    assert name in refused(root, "run", **options)
+    assert (monitor_dir / "run" / name).read_text() == "mine"
+    assert os.listdir(monitor_dir / "run") == [name]
+
+
+def test_a_forged_list_deletes_nothing(root, monitor_dir):
+    path = fill(root)
+    (monitor_dir / "precious.csv").write_text("precious")
+    (path / "notes.txt").write_text("mine")
+    manifest = json.loads((path / "gym-monitor.json").read_text())
+    manifest["files"] += ["../precious.csv", "notes.txt", str(monitor_dir / "precious.csv")]
+    (path / "gym-monitor.json").write_text(json.dumps(manifest))
+    claim(root, "run", force=True)
+    assert (monitor_dir / "precious.csv").exists()
+    assert (path / "notes.txt").exists()
+
+
+def test_a_damaged_table_is_refused(root):
+    path = fill(root)
+    (path / "episodes.csv").write_text("episode\n\u00e9pisode\n", encoding="utf-8")
+    refused(root, "run", resume=True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links")
+def test_writing_the_list_follows_no_link(root, monitor_dir, tmp_path):
+    (monitor_dir / "run").mkdir()
+    (tmp_path / "precious").write_text("precious")
+    (monitor_dir / "run" / "gym-monitor.json.new").symlink_to(tmp_path / "precious")
+    claim(root, "run")
+    assert (tmp_path / "precious").read_text() == "precious"
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 1}'])
+def test_a_list_that_cannot_be_read_is_refused(root, text):
+    path = fill(root)
+    (path / "gym-monitor.json").write_text(text)
+    refused(root, "run", force=True)
+    assert (path / "episodes.csv").exists()
+
+
+def test_a_directory_that_was_refused_is_free_again(root, monitor_dir):
+    (monitor_dir / "run").mkdir()
+    (monitor_dir / "run" / "episodes.csv").write_text("mine")
+    refused(root, "run")
+    (monitor_dir / "run" / "episodes.csv").unlink()
+    claim(root, "run")

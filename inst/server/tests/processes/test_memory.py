@@ -1,0 +1,92 @@
+"""Memory goes back to the system."""
+
+import gc
+import subprocess
+import sys
+import weakref
+
+import pytest
+
+from gym_server.manager import watchdog
+from gym_server.processes import memory
+
+
+class Circle:
+    def __init__(self):
+        self.itself = self
+
+
+def test_what_refers_to_itself_is_collected():
+    gc.disable()
+    try:
+        circle = weakref.ref(Circle())
+        assert circle() is not None
+        memory.give_back()
+        assert circle() is None
+    finally:
+        gc.enable()
+
+
+# In processes of their own, where nothing was freed before.
+RESIDENT = """
+import os, threading
+from gym_server.processes import memory
+
+def resident():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+"""
+
+SMALL_PIECES = """
+kept = []
+
+def use():
+    pieces = [bytes(2**14) for _ in range(2**12)]
+    # It lies behind all that is freed.
+    kept.append(pieces[-1])
+
+before = resident()
+thread = threading.Thread(target=use)
+thread.start()
+thread.join()
+memory.give_back()
+print((resident() - before) // 2**20)
+"""
+
+LARGE_BODIES = """
+def receive():
+    body = bytearray()
+    for _ in range(2**8):
+        body += bytes(2**16)
+
+memory.prepare()
+before = resident()
+for _ in range(3):
+    threads = [threading.Thread(target=receive) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+memory.give_back()
+print((resident() - before) // 2**20)
+"""
+
+
+@pytest.mark.skipif(memory._malloc_trim is None, reason="glibc keeps what is free, others do not")
+@pytest.mark.parametrize("script", [SMALL_PIECES, LARGE_BODIES], ids=["small", "large"])
+def test_what_threads_have_freed_does_not_stay(script):
+    told = subprocess.run(
+        [sys.executable, "-c", RESIDENT + script], stdout=subprocess.PIPE, text=True, check=True
+    )
+    assert int(told.stdout) < 8
+
+
+def test_the_watchdog_sees_to_it(monkeypatch, client, create, eventually):
+    given_back = []
+    monkeypatch.setattr(watchdog, "_GIVE_BACK_SECONDS", 0.0)
+    monkeypatch.setattr(memory, "give_back", given_back.append)
+    eventually(lambda: len(given_back) > 1)
+    assert not any(given_back)
+    client.post(f"{create()}/close/")
+    eventually(lambda: any(given_back))
+    eventually(lambda: not given_back[-1])

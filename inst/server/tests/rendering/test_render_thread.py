@@ -1,0 +1,103 @@
+import threading
+
+import pytest
+
+from gym_server.rendering.render_thread import Occupied, RenderThread
+
+
+def test_everything_is_drawn_on_one_thread():
+    renderer = RenderThread()
+    drawn_on = set()
+    threads = [
+        threading.Thread(target=lambda: drawn_on.add(renderer.run(threading.current_thread).ident))
+        for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(drawn_on) == 1
+    renderer.stop()
+
+
+def test_what_drawing_raises_is_raised():
+    renderer = RenderThread()
+    with pytest.raises(ZeroDivisionError):
+        renderer.run(lambda: 1 / 0)
+    renderer.stop()
+
+
+def test_pygame_outlives_an_environment_that_quits_it():
+    import pygame
+
+    renderer = RenderThread()
+    renderer.run(pygame.font.init)
+    renderer.run(lambda: (pygame.display.quit(), pygame.quit()))
+    assert renderer.run(pygame.font.get_init)
+    renderer.stop()
+
+
+def test_drawing_may_call_for_drawing():
+    renderer = RenderThread()
+    threads = renderer.run(lambda: (threading.get_ident(), renderer.run(threading.get_ident)))
+    assert threads[0] == threads[1] != threading.get_ident()
+    renderer.stop()
+
+
+@pytest.fixture
+def occupied():
+    """Return a render thread that is at work until the test lets it go on, and how to do that."""
+    renderer, over = RenderThread(), threading.Event()
+    blocker = threading.Thread(target=renderer.run, args=(over.wait, 30))
+    blocker.start()
+    yield renderer, over.set
+    over.set()
+    blocker.join(5)
+    renderer.stop()
+
+
+def test_who_loses_patience_is_not_drawn(occupied):
+    renderer, go_on = occupied
+    drawn = []
+    with pytest.raises(Occupied):
+        renderer.run_while(lambda: False, drawn.append, "never")
+    go_on()
+    renderer.run(drawn.append, "later")
+    assert drawn == ["later"]
+
+
+def test_what_has_begun_is_waited_for_without_patience():
+    renderer, asked = RenderThread(), threading.Event()
+    # It ends only after the question whether to wait on.
+    assert renderer.run_while(asked.set, asked.wait, 30)
+    renderer.stop()
+
+
+def test_the_patient_get_their_turn(occupied):
+    renderer, go_on = occupied
+    assert renderer.run_while(lambda: go_on() or True, lambda: "drawn") == "drawn"
+
+
+def test_another_thread_draws_on_when_one_hangs():
+    renderer, began, may_end = RenderThread(), threading.Event(), threading.Event()
+    outcomes = []
+
+    def ask():
+        try:
+            renderer.run(lambda: (began.set(), may_end.wait(10), threading.get_ident()))
+        except ValueError as why:
+            outcomes.append(str(why))
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    assert began.wait(10)
+    assert not renderer.give_up(threading.get_ident(), ValueError("not mine"))
+    assert renderer.give_up(asking.ident, ValueError("it hangs"))
+    asking.join(10)
+    assert outcomes == ["it hangs"]
+    first = renderer.run(threading.get_ident)
+    # The one that comes back draws no more.
+    may_end.set()
+    assert {renderer.run(threading.get_ident) for _ in range(20)} == {first}
+    assert not renderer.give_up(first, ValueError("it does not hang"))
+    renderer.stop()

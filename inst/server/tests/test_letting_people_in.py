@@ -1,0 +1,151 @@
+"""The real server, as its operator lets people in."""
+
+import http.client
+import json
+import os
+import socket
+from contextlib import closing
+
+import pytest
+from conftest import TOKEN
+
+from gym_server.cli import main
+
+
+@pytest.fixture
+def token_file(tmp_path):
+    file = tmp_path / "token"
+    file.write_text(TOKEN + "\n")
+    file.chmod(0o600)
+    return file
+
+
+def ask(server, method="GET", path="/v1/health/", body=None, token=TOKEN, **headers):
+    """Return status and answer."""
+    if token is not None:
+        headers["Authorization"] = f"Bearer {token}"
+    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)) as connection:
+        connection.request(method, path, json.dumps(body) if body else None, headers)
+        answer = connection.getresponse()
+        return answer.status, json.loads(answer.read() or "null")
+
+
+def test_a_token_from_a_file_opens_a_server_that_others_can_reach(serve, token_file):
+    server = serve("--host", "0.0.0.0", "--token-file", str(token_file))
+    assert ask(server)[0] == 200
+    assert ask(server, token=None)[0] == 401
+    assert ask(server, token=TOKEN + "x")[0] == 401
+    assert ask(server, "POST", "/v1/shutdown/", token=None)[0] == 401
+    assert ask(server, "POST", "/v1/shutdown/")[0] == 200
+    status, output, errors = server.stop(how=None)
+    assert (status, TOKEN in output + errors) == (0, False)
+
+
+def test_a_token_from_the_variable_is_asked_for_on_loopback_too(serve):
+    server = serve(GYM_SERVER_TOKEN=TOKEN)
+    assert ask(server)[0] == 200
+    assert ask(server, token=None)[0] == 401
+
+
+def test_who_shows_no_token_gets_one_answer_a_connection(serve):
+    server = serve(GYM_SERVER_TOKEN=TOKEN)
+    paths = {"/v1/health/": 401, "/v1/envs/00000000/watch/watch.js": 200}
+    for path, status in paths.items():
+        for token, closes in ((None, "close"), (TOKEN, None)):
+            headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+            with closing(server.connect()) as connection:
+                connection.request("GET", path, headers=headers)
+                answer = connection.getresponse()
+                assert answer.status == (status if token is None else 200)
+                assert answer.headers["Connection"] == closes
+
+
+def test_no_auth_says_that_the_variable_is_not_meant(serve):
+    assert ask(serve("--no-auth", GYM_SERVER_TOKEN=TOKEN), token=None)[0] == 200
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("short", [], "16 to 1,024"),
+        ("", [], "16 to 1,024"),
+        (TOKEN, ["--no-auth"], "exclude each other"),
+        (None, [], "cannot be read"),
+    ],
+)
+def test_a_token_that_will_not_do_is_one_line_and_status_1(
+    token_file, capsys, text, options, words
+):
+    token_file.unlink() if text is None else token_file.write_text(text)
+    assert main.main(["--port", "0", "--token-file", str(token_file), *options]) == 1
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1 and words in errors
+    assert TOKEN not in errors
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX permissions")
+def test_a_file_that_everybody_can_read_is_warned_of(serve, token_file):
+    token_file.chmod(0o644)
+    server = serve("--token-file", str(token_file))
+    assert ask(server)[0] == 200
+    assert "chmod 600" in server.stop()[2]
+
+
+def test_there_is_no_option_for_the_token_itself(capsys):
+    # Everybody sees what a process was started with.
+    for words in (["--token", TOKEN], [f"--token={TOKEN}"]):
+        with pytest.raises(SystemExit):
+            main.main(words)
+        errors = capsys.readouterr().err
+        assert TOKEN not in errors and "--token-file" in errors
+
+
+@pytest.mark.parametrize("name", ["https://gym.example.org", "gym.example.org/", "", "a b", "*"])
+def test_a_host_that_is_no_name_is_refused(name, capsys):
+    with pytest.raises(SystemExit):
+        main.main(["--port", "0", "--allow-host", name])
+    assert "neither NAME nor NAME:PORT" in capsys.readouterr().err
+
+
+def test_pages_and_other_names_are_refused_by_a_server_without_a_token(serve):
+    server = serve("--allow-host", "gym.example.org")
+    for headers, status in (
+        ({"Host": "gym.example.org"}, 200),
+        ({"Host": "gym.example.org", "Origin": "https://gym.example.org"}, 200),
+        ({"Host": "localhost:9"}, 200),
+        ({"Host": "evil.example"}, 403),
+        ({"Origin": "https://evil.example"}, 403),
+        ({"Sec-Fetch-Site": "cross-site"}, 403),
+    ):
+        assert ask(server, token=None, **headers)[0] == status, headers
+
+
+def test_shutdown_can_be_switched_off(serve):
+    server = serve("--no-shutdown")
+    status, answer = ask(server, "POST", "/v1/shutdown/")
+    assert (status, answer["code"]) == (403, "shutdown_disabled")
+    assert server.stop()[0] == 0
+
+
+@pytest.mark.slow
+def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve):
+    body = {"env_id": "Ant-v5", "kwargs": {"xml_file": "/no/such.xml"}}
+
+    def refused_by_us(*options, **variables):
+        answer = ask(serve(*options, **variables), "POST", "/v1/envs/", body)[1]
+        return "may be a path" in answer["message"]
+
+    assert not refused_by_us()
+    assert refused_by_us(GYM_SERVER_TOKEN=TOKEN)
+    assert refused_by_us("--host", "0.0.0.0", "--no-auth")
+    assert not refused_by_us("--allow-path", "/no", GYM_SERVER_TOKEN=TOKEN)
+
+
+def test_http_1_0_needs_no_host(serve):
+    server = serve()
+    with server.socket() as connection:
+        connection.sendall(b"GET /v1/health/ HTTP/1.0\r\n\r\n")
+        assert connection.recv(1000).startswith(b"HTTP/1.1 200")
+    with socket.create_connection(("127.0.0.1", server.port)) as connection:
+        connection.sendall(b"GET /v1/health/ HTTP/1.1\r\n\r\n")
+        assert connection.recv(1000).startswith(b"HTTP/1.1 400")

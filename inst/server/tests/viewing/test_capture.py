@@ -1,0 +1,99 @@
+"""What a look waits for, and what does not wait for it."""
+
+import threading
+import time
+
+import pytest
+from test_viewer import in_background, play, state
+
+from gym_server.viewing import viewer as screens
+
+
+@pytest.fixture
+def occupied(app, client, faulty, watch):
+    """Have another environment draw for as long as the test does not call what it is given."""
+    url = faulty("Drawing")
+    instance, _ = watch(url)
+    begun, over = threading.Event(), threading.Event()
+    draw = instance._draw
+
+    def for_long():
+        begun.set()
+        over.wait(30)
+
+    instance._draw = lambda lane: instance.renderer.run(for_long) or draw(lane)
+    client.post(f"{url}/reset/")
+    thread, _ = in_background(state, app.test_client(), url)
+    assert begun.wait(5)
+    yield over.set
+    over.set()
+    thread.join(5)
+
+
+def test_a_watcher_that_waits_for_others_drawing_holds_up_no_step(app, client, create, occupied):
+    url = create()
+    client.post(f"{url}/reset/")
+    watcher, seen = in_background(state, app.test_client(), url)
+    time.sleep(0.3)
+    player, _ = in_background(play, client, url)
+    player.join(5)
+    assert not player.is_alive()
+    assert watcher.is_alive()
+    occupied()
+    watcher.join(5)
+    assert seen[0]["step"] == 1
+    assert seen[0]["frame"] is not None
+
+
+@pytest.mark.parametrize("made", [{}, {"num_envs": 2, "vectorization_mode": "async"}])
+def test_who_needs_no_drawing_here_does_not_wait_for_others(
+    client, app, faulty, create, occupied, made
+):
+    url = create(**made) if made else faulty("Counting")
+    client.post(f"{url}/reset/")
+    watcher, seen = in_background(state, app.test_client(), url)
+    watcher.join(5)
+    assert seen[0]["state"] == "running"
+
+
+def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occupied):
+    url = create()
+    client.post(f"{url}/reset/")
+    watcher, answers = in_background(app.test_client().get, f"{url}/watch/state/")
+    time.sleep(0.2)
+    app.end_watching()
+    watcher.join(5)
+    assert answers[0].json["code"] == "shutting_down"
+
+
+def test_who_waits_for_others_drawing_for_long_is_told(client, create, occupied, monkeypatch):
+    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.2)
+    url = create()
+    client.post(f"{url}/reset/")
+    assert state(client, url) == {"number": None, "state": "busy"}
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.05])
+@pytest.mark.parametrize("draws_when_stepped", [False, True])
+def test_who_is_stepped_all_the_time_is_seen(
+    app, client, faulty, watch, draws_when_stepped, seconds
+):
+    over = threading.Event()
+
+    def play_on(url):
+        player = app.test_client()
+        while not over.is_set():
+            play(player, url)
+
+    urls = [faulty("Drawing", seconds=seconds, length=10**6) for _ in range(2)]
+    for url in urls:
+        watch(url)[0].draws_when_stepped = draws_when_stepped
+        client.post(f"{url}/reset/")
+    players = [in_background(play_on, url)[0] for url in urls]
+    number, end = 0, time.monotonic() + 60
+    while number < 4 and time.monotonic() < end:
+        number = state(client, urls[0], after=number)["number"]
+    over.set()
+    for player in players:
+        player.join(5)
+    assert number == 4

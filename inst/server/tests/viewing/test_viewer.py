@@ -1,0 +1,373 @@
+"""What the watchers of an environment get to see, and when it is drawn for them."""
+
+import base64
+import contextlib
+import threading
+import time
+
+import numpy as np
+import pytest
+from pictures import decode
+
+from gym_server.viewing import capture
+from gym_server.viewing import viewer as screens
+
+
+def state(client, url, **query):
+    answer = client.get(f"{url}/watch/state/", query_string=query)
+    assert answer.status_code == 200, answer.json
+    return answer.json
+
+
+def play(client, url, steps=1, action=0, **fields):
+    for _ in range(steps):
+        answer = client.post(f"{url}/step/", json={"action": action, **fields})
+        assert answer.status_code == 200, answer.json
+
+
+def in_background(call, *args, **how):
+    results = []
+
+    def run():
+        # What was closed meanwhile cannot be played on.
+        with contextlib.suppress(AssertionError):
+            results.append(call(*args, **how))
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread, results
+
+
+def frame_of(seen):
+    return decode(base64.b64decode(seen["frame"]))
+
+
+# What there is to see ---------------------------------------------------------------------
+
+
+def test_a_watcher_sees_the_frame_and_the_numbers_that_belong_to_it(client, create):
+    url = create(seed=1)
+    client.post(f"{url}/reset/")
+    play(client, url, 3)
+    seen = state(client, url)
+    assert frame_of(seen).shape == (400, 600, 3)
+    told = {name: seen[name] for name in ("env_id", "state", "episode", "step", "return")}
+    assert told == {
+        "env_id": "CartPole-v1",
+        "state": "running",
+        "episode": 1,
+        "step": 3,
+        "return": 3.0,
+    }
+    assert (seen["lanes"], seen["returns"], seen["reward_threshold"]) == (None, [], 475.0)
+
+
+def test_episodes_and_returns_are_counted_unwatched_too(client, faulty):
+    url = faulty("Counting", length=2)
+    for _ in range(3):
+        client.post(f"{url}/reset/")
+        play(client, url, 2)
+    seen = state(client, url)
+    assert (seen["episode"], seen["step"], seen["state"]) == (3, 2, "ended")
+    assert seen["returns"] == [3.0, 3.0, 3.0]
+
+
+def test_before_the_first_reset_it_says_so(client, create):
+    seen = state(client, create())
+    assert (seen["state"], seen["frame"], seen["episode"]) == ("not_reset", None, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kwargs", "why"),
+    [
+        ("Counting", {}, "draws no pictures"),
+        ("Drawing", {"frame": "nothing"}, "is no picture"),
+        ("Drawing", {"frame": "raises"}, "out of paint"),
+    ],
+)
+def test_what_cannot_be_drawn_shows_its_observation_and_says_why(client, faulty, name, kwargs, why):
+    url = faulty(name, **kwargs)
+    client.post(f"{url}/reset/")
+    play(client, url, 2)
+    seen = state(client, url)
+    assert seen["frame"] is None
+    assert why in seen["why_no_picture"]
+    assert seen["observation"] == {"names": ["[0]"], "values": [2], "size": 1}
+
+
+def test_values_that_json_has_no_word_for_are_seen(client, faulty):
+    url = faulty("NotANumber")
+    client.post(f"{url}/reset/")
+    assert state(client, url)["observation"]["values"][:3] == ["NaN", "Infinity", "-Infinity"]
+
+
+@pytest.mark.parametrize("mode", ["sync", "vector_entry_point", "async"])
+def test_each_lane_can_be_watched(client, create, mode):
+    url = create(num_envs=3, vectorization_mode=mode, seed=1)
+    client.post(f"{url}/reset/")
+    for _ in range(8):
+        play(client, url, action=[0, 1, 1])
+    seen = [state(client, url, lane=lane) for lane in range(3)]
+    assert [(one["lane"], one["lanes"], one["step"]) for one in seen] == [
+        (0, 3, 8),
+        (1, 3, 8),
+        (2, 3, 8),
+    ]
+    # The carts went apart.
+    assert not np.array_equal(frame_of(seen[0]), frame_of(seen[1]))
+    refused = client.get(f"{url}/watch/state/?lane=3")
+    assert (refused.status_code, refused.json["code"]) == (400, "invalid_parameter")
+
+
+def test_more_lanes_than_can_be_drawn_at_once_show_their_observations(client, create):
+    url = create(num_envs=20, vectorization_mode="vector_entry_point", seed=1)
+    observations = client.post(f"{url}/reset/").json["observation"]
+    seen = state(client, url, lane=19)
+    assert seen["frame"] is None
+    assert "all of its 20 lanes at once" in seen["why_no_picture"]
+    assert seen["observation"]["values"] == pytest.approx(observations[19])
+
+
+def test_the_observation_of_a_lane_is_its_own_when_only_others_stepped(app, client, lanes):
+    url = lanes("bytes", num_envs=3, longest=9, vectorization_mode="sync")
+    instance = app._instances.get(url.rsplit("/", 1)[1])
+    before = client.post(f"{url}/reset/", json={"seed": 1}).json["observation"]
+    fields = {"action": [[0] * 4] * 2, "step_mask": [True, False, True]}
+    after = client.post(f"{url}/step/", json=fields).json["observation"]
+    seen = [instance._observed(lane).tolist() for lane in range(3)]
+    assert seen == [after[0], before[1], after[1]]
+
+
+# When it is drawn -------------------------------------------------------------------------
+
+
+def test_nothing_is_drawn_unwatched(client, create, watch):
+    url = create(render_mode="human")
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    play(client, url, 5, render=True)
+    assert drawn == []
+
+
+def test_an_environment_that_nobody_steps_is_drawn_once(client, create, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    url = create()
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    first = state(client, url)
+    assert first["frame"] is not None
+    again = state(client, url, after=first["number"])
+    assert again["number"] == first["number"]
+    assert drawn == [0]
+
+
+def test_a_watcher_waits_for_the_next_move(client, create, watch):
+    url = create()
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    first = state(client, url)
+    thread, later = in_background(
+        state, client.application.test_client(), url, after=first["number"]
+    )
+    time.sleep(0.2)
+    assert later == []
+    play(client, url)
+    thread.join(5)
+    assert later[0]["step"] == 1
+    assert len(drawn) == 2
+
+
+def test_who_has_left_has_nothing_drawn(client, create, watch):
+    url = create()
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    state(client, url)
+    play(client, url, 100)
+    assert len(drawn) == 1
+
+
+def test_a_frame_is_drawn_once_for_all_who_watch(app, client, create, watch):
+    url = create()
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    first = state(client, url)["number"]
+    watchers = [in_background(state, app.test_client(), url, after=first) for _ in range(6)]
+    time.sleep(0.2)
+    play(client, url)
+    for thread, _ in watchers:
+        thread.join(5)
+    assert {results[0]["number"] for _, results in watchers} == {first + 1}
+    assert len(drawn) == 2
+
+
+def test_the_latest_wins_and_is_seen_when_the_steps_end(client, create):
+    url = create()
+    client.post(f"{url}/reset/")
+    seen = state(client, url)
+    play(client, url, 7)
+    while seen["step"] < 7:
+        seen = state(client, url, after=seen["number"])
+    assert seen["step"] == 7
+
+
+def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_LEAST_SECONDS", 0.2)
+    url = faulty("Drawing")
+    _, drawn = watch(url)
+    client.post(f"{url}/reset/")
+    began = time.monotonic()
+    number = None
+    while time.monotonic() - began < 1:
+        number = state(client, url, **({} if number is None else {"after": number}))["number"]
+        play(client, url)
+    assert 2 <= len(drawn) <= 1 + (time.monotonic() - began) / 0.2
+
+
+def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch):
+    url = faulty("Drawing")
+    instance, drawn = watch(url)
+    draw = instance._draw
+
+    def slowly(lane):
+        time.sleep(0.05)
+        return draw(lane)
+
+    instance._draw = slowly
+    client.post(f"{url}/reset/")
+    number = state(client, url)["number"]
+    began = time.monotonic()
+    while time.monotonic() - began < 1.5:
+        play(client, url)
+        number = state(client, url, after=number)["number"]
+    # A fifth of the time, and not half of it; the second comes a little early.
+    assert 2 <= len(drawn) <= 2 + (time.monotonic() - began) / 0.25
+
+
+def test_lanes_that_nobody_looks_at_any_more_are_forgotten(client, create, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_KEPT_SECONDS", 0.1)
+    url = create(num_envs=8, vectorization_mode="sync")
+    instance, _ = watch(url)
+    client.post(f"{url}/reset/")
+    for lane in range(8):
+        state(client, url, lane=lane)
+        time.sleep(0.06)
+    assert len(instance.screen._shots) < 5
+
+
+def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
+    monkeypatch.setattr(capture, "_PATIENCE", 0.2)
+    url = faulty("Counting", seconds=1.5)
+    client.post(f"{url}/reset/")
+    thread, _ = in_background(play, app.test_client(), url)
+    time.sleep(0.2)
+    assert state(client, url) == {"number": None, "state": "busy"}
+    thread.join()
+    assert state(client, url)["step"] == 1
+
+
+def test_one_never_drawn_whose_turn_is_far_off_is_told_in_time(client, faulty, watch, monkeypatch):
+    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    url = faulty("Drawing")
+    instance, _ = watch(url)
+    client.post(f"{url}/reset/")
+    instance.screen._due = time.monotonic() + 3600
+    waits = []
+    wait = instance.screen._changed.wait
+    monkeypatch.setattr(
+        instance.screen._changed, "wait", lambda seconds: (waits.append(seconds), wait(seconds))
+    )
+    thread, seen = in_background(state, client.application.test_client(), url)
+    thread.join(5)
+    assert seen == [{"number": None, "state": "busy"}]
+    assert len(waits) < 5
+
+
+# The end ------------------------------------------------------------------------------------
+
+
+def test_who_watches_while_it_is_closed_hears_of_it(app, client, create):
+    url = create()
+    client.post(f"{url}/reset/")
+    number = state(client, url)["number"]
+    thread, answers = in_background(app.test_client().get, f"{url}/watch/state/?after={number}")
+    time.sleep(0.2)
+    client.post(f"{url}/close/")
+    thread.join(5)
+    assert (answers[0].status_code, answers[0].json["code"]) == (400, "unknown_instance")
+
+
+def test_at_the_end_all_watchers_are_sent_away(app, client, create):
+    urls = [create() for _ in range(3)]
+    waiting = []
+    for url in urls:
+        client.post(f"{url}/reset/")
+        number = state(client, url)["number"]
+        waiting.append(in_background(app.test_client().get, f"{url}/watch/state/?after={number}"))
+    time.sleep(0.2)
+    app.end_watching()
+    for thread, answers in waiting:
+        thread.join(5)
+        assert (answers[0].status_code, answers[0].json["code"]) == (503, "shutting_down")
+
+
+# The pace -----------------------------------------------------------------------------------
+
+
+def is_paced(instance):
+    return instance.screen._next_tick > 0
+
+
+@pytest.mark.parametrize("how", ["human", "render", "lanes"])
+def test_what_people_want_to_see_moves_in_real_time_while_they_watch(client, create, watch, how):
+    made = {"render_mode": "human"} if how != "render" else {}
+    url = create(**made, num_envs=2 if how == "lanes" else None)
+    instance, _ = watch(url)
+    fields = {"render": True} if how == "render" else {}
+    if how == "lanes":
+        fields["action"] = [0, 1]
+    client.post(f"{url}/reset/")
+    play(client, url, 10, **fields)
+    assert not is_paced(instance)
+    client.get(f"{url}/watch/presence/")
+    began = time.monotonic()
+    play(client, url, 26, **fields)
+    # CartPole's clock ticks 50 times a second.
+    assert time.monotonic() - began >= 0.48
+
+
+def test_what_nobody_asked_to_see_is_never_held_up(client, create, watch):
+    url = create()
+    instance, _ = watch(url)
+    client.post(f"{url}/reset/")
+    state(client, url)
+    play(client, url, 5, render=False)
+    assert not is_paced(instance)
+
+
+def test_one_that_is_held_up_holds_up_no_other_and_is_seen(app, client, create):
+    slow, quick = create(render_mode="human"), create()
+    for url in (slow, quick):
+        client.post(f"{url}/reset/")
+    client.get(f"{slow}/watch/presence/")
+    thread, _ = in_background(play, app.test_client(), slow, 100)
+    play(client, quick, 40)
+    assert state(client, slow)["step"] < 100
+    assert thread.is_alive()
+    client.post(f"{slow}/close/")
+    thread.join()
+
+
+@pytest.mark.parametrize(("fps", "expected"), [(50, 50), (None, 30), (0, 30), ("x", 30), (0.1, 30)])
+def test_a_speed_that_makes_no_sense_is_the_usual_one(fps, expected):
+    assert screens.Screen(None, fps).fps == expected
+
+
+def test_being_watched_is_known_and_is_no_use_of_the_environment(client, create):
+    url = create()
+    client.post(f"{url}/reset/")
+    assert client.get(url).json["watched"] is False
+    time.sleep(0.2)
+    state(client, url)
+    about = client.get(url).json
+    assert about["watched"] is True
+    assert about["idle_seconds"] >= 0.2
