@@ -74,11 +74,12 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
   check_flag(progress)
   call <- rlang::current_env()
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
-  with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
-    warn_of_own_limit(max_steps, lanes, call)
-    settings <- settings_in(lanes, settings)
+  with_vector_env(env, as.numeric(rounds) * episodes, client, function(vector_env) {
+    warn_of_own_limit(max_steps, vector_env, call)
+    settings <- settings_in(vector_env, settings)
     check_target(settings, call)
-    play_searches(lanes, policy_bind(policy, lanes, call = call), settings, seeds, progress, call)
+    policy <- policy_bind(policy, vector_env, call = call)
+    play_searches(vector_env, policy, settings, seeds, progress, call)
   })
 }
 
@@ -116,7 +117,7 @@ check_target <- function(settings, call) {
 #' An interrupt ends them early, an error does too and carries what was played.
 #' @return As [search_repeat()].
 #' @noRd
-play_searches <- function(lanes, template, settings, seeds, progress, call) {
+play_searches <- function(vector_env, template, settings, seeds, progress, call) {
   started <- proc.time()[["elapsed"]]
   show <- if (progress) searches_bar(length(seeds)) else function(finished, solved) NULL
   rows <- list()
@@ -124,7 +125,7 @@ play_searches <- function(lanes, template, settings, seeds, progress, call) {
   interrupted <- FALSE
   tryCatch(
     for (seed in seeds) {
-      search <- play_search(lanes, template, settings, seed, call)
+      search <- play_search(vector_env, template, settings, seed, call)
       if (search$interrupted) {
         rlang::interrupt()
       }
@@ -143,10 +144,10 @@ play_searches <- function(lanes, template, settings, seeds, progress, call) {
 }
 
 # What is lost of a search that is interrupted is said once, for all of them.
-play_search <- function(lanes, template, settings, seed, call) {
+play_search <- function(vector_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
-    with_random_seed(seed, play_rounds(lanes, template, settings, progress = FALSE, call)),
+    with_random_seed(seed, play_rounds(vector_env, template, settings, progress = FALSE, call)),
     gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd)
   )
 }

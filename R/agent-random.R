@@ -60,7 +60,7 @@
 #' reads.
 #'
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
-#'   [gym_make()], with lanes or without.
+#'   [gym_make()], with sub-environments or without.
 #' @param policy The kind of policy to search among: a network made by [policy_network()],
 #'   by default that of the tutorial *Artificial Intelligence in R (I)*, with 4 inputs, 2 hidden
 #'   neurons and 1 output.
@@ -99,12 +99,13 @@
 #'     \item{rounds}{A data frame with one row for each round: `round` (integer),
 #'       `mean_return` (double), `steps` (integer).}
 #'     \item{episodes}{A data frame with one row for each episode: `round`, `episode`, `seed`,
-#'       `lane` (integers), `return` (double), `length` (integer, in steps), `terminated`,
+#'       `sub_env` (integers), `return` (double), `length` (integer, in steps), `terminated`,
 #'       `truncated` (logical).}
 #'     \item{target}{The target, a double, or `NULL`.}
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{env}{The environment when an object was given, otherwise `NULL`.}
-#'     \item{num_envs}{How many lanes share the seed of an episode, an integer; `NULL` where
+#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
+#'     where
 #'       each episode has a seed of its own. [rollout()] tells how to begin one again.}
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps, seed}{`policy`, `rounds`, `max_steps` and `seed` as
@@ -146,11 +147,11 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     client <- if (is_playable(env)) env$client else client
     return(finished_search(kept$saved, settings, client, kept$path))
   }
-  with_lanes(env, as.numeric(rounds) * episodes, client, function(lanes) {
-    warn_of_own_limit(max_steps, lanes, call)
-    settings <- settings_in(lanes, settings)
-    bound <- policy_bind(policy, lanes, call = call)
-    with_random_seed(seed, play_rounds(lanes, bound, settings, progress, call, kept))
+  with_vector_env(env, as.numeric(rounds) * episodes, client, function(vector_env) {
+    warn_of_own_limit(max_steps, vector_env, call)
+    settings <- settings_in(vector_env, settings)
+    bound <- policy_bind(policy, vector_env, call = call)
+    with_random_seed(seed, play_rounds(vector_env, bound, settings, progress, call, kept))
   })
 }
 
@@ -173,11 +174,11 @@ search_settings <- function(env, policy, rounds, episodes, target, max_steps,
   )
 }
 
-settings_in <- function(lanes, settings) {
-  settings["target"] <- list(settings$target %||% lanes$spec$reward_threshold)
-  settings["num_envs"] <- list(lanes$num_envs)
-  settings["client"] <- list(lanes$client)
-  settings$env_id <- environment_label(lanes)
+settings_in <- function(vector_env, settings) {
+  settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
+  settings["num_envs"] <- list(vector_env$num_envs)
+  settings["client"] <- list(vector_env$client)
+  settings$env_id <- environment_label(vector_env)
   settings
 }
 
@@ -187,7 +188,7 @@ settings_in <- function(lanes, settings) {
 #' @param checkpoint As [open_checkpoint()] returns it, or `NULL`.
 #' @return A search, as [new_search()] makes it.
 #' @noRd
-play_rounds <- function(lanes, template, settings, progress, call, checkpoint = NULL) {
+play_rounds <- function(vector_env, template, settings, progress, call, checkpoint = NULL) {
   started <- proc.time()[["elapsed"]]
   show <- if (progress) progress_bar(settings$rounds) else function(finished, best) NULL
   record <- new_rounds(settings$rounds, settings$episodes, settings$target, show)
@@ -196,16 +197,16 @@ play_rounds <- function(lanes, template, settings, progress, call, checkpoint = 
     if (!is.null(saved)) {
       settings$policy <- saved$template
       started <- started - saved$elapsed
-      resume_rounds(record, saved, lanes, settings, checkpoint$path, call)
+      resume_rounds(record, saved, vector_env, settings, checkpoint$path, call)
     }
-    keep_rounds(record, checkpoint, lanes, settings, started, call)
+    keep_rounds(record, checkpoint, vector_env, settings, started, call)
   }
   interrupted <- FALSE
   begin <- function(block, episodes) {
-    list(seeds = lanes$draw_seeds(), policy = draw_policies(record, template, episodes))
+    list(seeds = vector_env$draw_seeds(), policy = draw_policies(record, template, episodes))
   }
   tryCatch(
-    play_episodes(lanes, record, begin, settings$max_steps),
+    play_episodes(vector_env, record, begin, settings$max_steps),
     interrupt = function(cnd) {
       interrupted <<- TRUE
       inform_interrupted(count_finished(record), settings$rounds)

@@ -11,17 +11,17 @@
 #'   [gym_wrap()] made of one. [env_registry()] lists the ids.
 #' @param seed Seed of the first reset that is given none, and of the sampling
 #'   of actions: a whole number of at least 0, `NULL` for a random one. For an
-#'   environment with lanes also one for each of them, see [env_reset()].
+#'   environment with sub-environments also one for each of them, see [env_reset()].
 #' @param render_mode `"rgb_array"` for pictures, or `"human"` for an environment that
 #'   people want to see: the same pictures, and its page opens, on which it moves in real
 #'   time, see [env_watch()]. `NULL`, the default, takes pictures where the environment
 #'   can draw them. They are drawn only when [env_render()] asks for them or while
 #'   somebody watches.
-#' @param num_envs How many lanes the environment is to have, a whole number of at
+#' @param num_envs How many sub-environments the environment is to have, a whole number of at
 #'   least 1: copies that are reset and stepped together, each with a row of its own
 #'   in observations and actions, also when there is but one. The server sets a limit,
 #'   16,384 unless it was started with another. `NULL`, the default, makes a single
-#'   environment, without lanes.
+#'   environment, without sub-environments.
 #' @param kwargs A named list of further arguments for the environment, such as
 #'   `list(gravity = -5)` for LunarLander or `list(map_name = "8x8")` for
 #'   FrozenLake. `list(max_episode_steps = 1000)` sets another limit of steps for any
@@ -31,13 +31,13 @@
 #'   wrapper's name, a string, and its arguments by name, such as
 #'   `list("TimeLimit", max_episode_steps = 50)`. [gym_wrap()] writes such a list
 #'   with a pipe.
-#' @param vectorization_mode How the lanes are run: `"vector_entry_point"`, by the
+#' @param vectorization_mode How the sub-environments are run: `"vector_entry_point"`, by the
 #'   environment's own implementation, by far the fastest where there is one, as in
 #'   CartPole; `"sync"`, one after the other; `"async"`, each in a process of its own,
 #'   for environments that take long for a step. `NULL`, the default, takes the
 #'   environment's own implementation where there is one that does what is asked for,
 #'   else `"sync"`. Only with `num_envs`.
-#' @param autoreset_mode What becomes of a lane whose episode has ended:
+#' @param autoreset_mode What becomes of a sub-environment whose episode has ended:
 #'   `"NextStep"`, it is reset by the next step, whose action and reward do not
 #'   count; `"SameStep"`, it is reset within the step, and its last observation is in
 #'   the info, see [env_step()]; `"Disabled"`, it wants [env_reset()] with a `mask`
@@ -52,8 +52,8 @@
 #'   allow (code `wrapper_not_allowed`; the hint lists those that it does), for a
 #'   `vectorization_mode` that cannot do what else is asked for (code `not_supported`;
 #'   the hint says what can), and when a part of the server is not installed (code
-#'   `missing_dependency`; the hint says how); `gym_error_http_429` for more lanes than
-#'   the server allows (code `too_many_lanes`), when it has as many environments or
+#'   `missing_dependency`; the hint says how); `gym_error_http_429` for more sub-environments than
+#'   the server allows (code `too_many_sub_envs`), when it has as many environments or
 #'   processes as it allows (codes `too_many_instances`, `too_many_processes`), or where the
 #'   environment would take more memory than is left (code `too_much_memory`);
 #'   `gym_error_http_504` when making it takes longer than the server allows a call to take
@@ -73,10 +73,10 @@
 #' env_close(client, instance_id)
 #'
 #' # Three poles at once, each with its seed.
-#' lanes <- env_create(client, "CartPole-v1", seed = 1:3, num_envs = 3)
-#' env_reset(client, lanes)
-#' env_step(client, lanes, c(1, 0, 1))$reward
-#' env_close(client, lanes)
+#' sub-environments <- env_create(client, "CartPole-v1", seed = 1:3, num_envs = 3)
+#' env_reset(client, sub-environments)
+#' env_step(client, sub-environments, c(1, 0, 1))$reward
+#' env_close(client, sub-environments)
 env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NULL,
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
                        autoreset_mode = NULL, name = NULL) {
@@ -114,17 +114,17 @@ env_list_all <- function(x) {
 #' @inheritParams env_create
 #' @param instance_id An instance's id, as [env_create()] returns it.
 #' @param seed Seed of the environment and of the sampling of actions: a whole
-#'   number of at least 0; `NULL` goes on with the generator as it is. With lanes
-#'   one number is for all: each lane gets it plus the number of lanes before it, or
-#'   where the environment's own implementation has one generator for all lanes, that
-#'   gets it. Or one number for each lane, `NA` for a lane whose generator goes on as it
-#'   is.
+#'   number of at least 0; `NULL` goes on with the generator as it is. With sub-environments
+#'   one number is for all: each sub-environment gets it plus the number of sub-environments before
+#'   it, or where the environment's own implementation has one generator for all sub-environments,
+#'   that gets it. Or one number for each sub-environment, `NA` for a sub-environment whose
+#'   generator goes on as it is.
 #' @param options A named list of options for the environment's reset, such as
 #'   `list(low = -0.1, high = 0.1)` for CartPole.
 #' @param return_info Whether to return what the environment tells besides, too:
 #'   `TRUE` or `FALSE`, the default.
-#' @param mask For an environment with lanes: which of them to reset, a logical
-#'   vector with an element for each lane, at least one of them `TRUE`. `NULL`, the
+#' @param mask For an environment with sub-environments: which of them to reset, a logical
+#'   vector with an element for each sub-environment, at least one of them `TRUE`. `NULL`, the
 #'   default, resets all. An environment's own vector implementation knows no masks:
 #'   make it with `vectorization_mode = "sync"`.
 #' @return The first observation, in the form of the observation space: a
@@ -132,13 +132,13 @@ env_list_all <- function(x) {
 #'   integer for Discrete; [space_sample()] lists all kinds. With
 #'   `return_info = TRUE` a list of `observation` and `info`.
 #'
-#'   With lanes, the observations of all lanes, the lane first: a matrix with a row a
-#'   lane for a Box of one dimension, an array with the lane as its first dimension for
-#'   one of more, a vector with an element a lane for Discrete and Text, for Tuple and
-#'   Dict a list in which each part has this form, and for Sequence, Graph and OneOf a
-#'   list with an element a lane. Numbers are integer where those of all lanes fit. In
-#'   an info each element has an entry a lane in the same way, `NA` (in a list `NULL`)
-#'   for a lane that told none.
+#'   With sub-environments, the observations of all sub-environments, the sub-environment first: a
+#'   matrix with a row a sub-environment for a Box of one dimension, an array with the
+#'   sub-environment as its first dimension for one of more, a vector with an element a
+#'   sub-environment for Discrete and Text, for Tuple and Dict a list in which each part has this
+#'   form, and for Sequence, Graph and OneOf a list with an element a sub-environment. Numbers are
+#'   integer where those of all sub-environments fit. In an info each element has an entry a
+#'   sub-environment in the same way, `NA` (in a list `NULL`) for a sub-environment that told none.
 #'
 #'   An `info` is a list with names. It travels without types: an array of plain
 #'   values of one kind becomes a vector, an array of equally long arrays a matrix
@@ -146,11 +146,11 @@ env_list_all <- function(x) {
 #'   the number, nor the texts "NaN", "Infinity" and "-Infinity" from these numbers
 #'   unless there is other text beside them; an integer beyond 2^53 arrives as text.
 #' @section Errors: `gym_error_http_400` for an unknown instance, and with code
-#'   `not_supported` for a `mask` or a seed for each lane where the environment's own
+#'   `not_supported` for a `mask` or a seed for each sub-environment where the environment's own
 #'   implementation cannot do that (`"sync"` can); `gym_error_http_500` for an error
 #'   inside the environment; `gym_error_argument`, also for a `mask` or `seed` whose
-#'   length is not the number of lanes; `gym_error_connection`. No lane has moved,
-#'   except perhaps after an error inside an environment.
+#'   length is not the number of sub-environments; `gym_error_connection`. No sub-environment has
+#'   moved, except perhaps after an error inside an environment.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -170,21 +170,21 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' last step of an episode the environment wants [env_reset()]; stepping on is
 #' left to the environment and warned of once an episode.
 #'
-#' With lanes it takes an action for each of them, and moves each on. What becomes of
-#' a lane whose episode has ended is a matter of `autoreset_mode`, see [env_create()]: by
+#' With sub-environments it takes an action for each of them, and moves each on. What becomes of
+#' a sub-environment whose episode has ended is a matter of `autoreset_mode`, see [env_create()]: by
 #' default, `"NextStep"`, this step resets it, takes no action in it and returns its new first
 #' observation, the reward 0 and neither `terminated` nor `truncated`.
 #'
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete, a
 #'   numeric vector or array for Box; [space_sample()] has the table of all kinds.
-#'   With lanes one for each, in the form in which [env_reset()] gives observations:
-#'   a vector for Discrete, a matrix with a row a lane for a Box of one dimension.
+#'   With sub-environments one for each, in the form in which [env_reset()] gives observations:
+#'   a vector for Discrete, a matrix with a row a sub-environment for a Box of one dimension.
 #' @param render Whether people want to see it: `TRUE` or `FALSE`, the default. The first
 #'   `TRUE` opens the environment's page, see [env_watch()], and while somebody watches
 #'   there each such step waits for real time. [env_render()] fetches a picture.
-#' @param lanes For an environment with lanes: the numbers of those that are to step,
-#'   counted from 1 and in increasing order; `action` and what is returned then have
+#' @param sub-environments For an environment with sub-environments: the numbers of those that are
+#'   to step, counted from 1 and in increasing order; `action` and what is returned then have
 #'   rows for these alone. `NULL`, the default, steps all. Needs `"sync"`.
 #' @return A list of
 #'   * `observation`, as from [env_reset()],
@@ -194,19 +194,19 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   * `terminated`, whether the episode ended by the environment's own rules,
 #'   * `truncated`, whether it was cut off, such as by its limit of steps.
 #'
-#'   With lanes, `reward` is a numeric vector and `done`, `terminated` and `truncated`
-#'   are logical vectors, with an element for each lane that stepped. With autoreset
-#'   mode `"SameStep"` the info has, when a lane has ended, `final_obs`: a list with
-#'   the last observation of each lane that ended, `NULL` for the others.
+#'   With sub-environments, `reward` is a numeric vector and `done`, `terminated` and `truncated`
+#'   are logical vectors, with an element for each sub-environment that stepped. With autoreset
+#'   mode `"SameStep"` the info has, when a sub-environment has ended, `final_obs`: a list with
+#'   the last observation of each sub-environment that ended, `NULL` for the others.
 #' @section Errors: `gym_error_space` for an action that does not fit the action
 #'   space, the environment has not moved then; a Box action outside of the bounds goes to
-#'   the environment, as in Gymnasium, and most clip it. With lanes also for a wrong number of
-#'   actions, and the message names the lane whose action does not fit: by its number
-#'   from 1, or where the server refuses it by its index from 0, such as `[2]` for the
-#'   third. `gym_error_argument` for `lanes` that are none. `gym_error_http_400` with
-#'   code `reset_needed` before the first reset, or when a lane that is to step has
-#'   ended and `autoreset_mode` is `"Disabled"` (the message counts lanes from 0), and
-#'   with code `not_supported` for `lanes` where only all can step;
+#'   the environment, as in Gymnasium, and most clip it. With sub-environments also for a wrong
+#'   number of actions, and the message names the sub-environment whose action does not fit: by its
+#'   number from 1, or where the server refuses it by its index from 0, such as `[2]` for the
+#'   third. `gym_error_argument` for `which` that are none. `gym_error_http_400` with
+#'   code `reset_needed` before the first reset, or when a sub-environment that is to step has
+#'   ended and `autoreset_mode` is `"Disabled"` (the message counts sub-environments from 0), and
+#'   with code `not_supported` for `which` where only all can step;
 #'   `gym_error_http_500` for an error inside the environment; `gym_error_connection`.
 #' @section Warnings: `gym_warning_step_after_done`.
 #' @export
@@ -217,14 +217,14 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' str(env_step(client, instance_id, 1))
 #' env_close(client, instance_id)
 #'
-#' lanes <- env_create(client, "CartPole-v1", num_envs = 3, vectorization_mode = "sync")
-#' env_reset(client, lanes, seed = 1)
-#' str(env_step(client, lanes, c(1, 0, 1)))
-#' env_step(client, lanes, c(0, 1), lanes = c(1, 3))$observation
-#' env_close(client, lanes)
-env_step <- function(x, instance_id, action, render = FALSE, lanes = NULL) {
+#' sub-environments <- env_create(client, "CartPole-v1", num_envs = 3, vectorization_mode = "sync")
+#' env_reset(client, sub-environments, seed = 1)
+#' str(env_step(client, sub-environments, c(1, 0, 1)))
+#' env_step(client, sub-environments, c(0, 1), sub-environments = c(1, 3))$observation
+#' env_close(client, sub-environments)
+env_step <- function(x, instance_id, action, render = FALSE, sub_envs = NULL) {
   check_flag(render)
-  step_instance(x, known_instance(x, instance_id), action, render, lanes)
+  step_instance(x, known_instance(x, instance_id), action, render, which)
 }
 
 #' Ask for an environment's spaces
@@ -236,10 +236,10 @@ env_step <- function(x, instance_id, action, render = FALSE, lanes = NULL) {
 #' @return A space: a list with the element `name` and, for Discrete, `n` (the
 #'   number of values) and `start` (the first of them), for Box, `shape`,
 #'   `dtype`, `low` and `high`, the bounds row by row, which may be infinite;
-#'   for the other kinds see [space_sample()]. With lanes it is the space of the values
-#'   of all lanes, the lane as the first dimension: a Box of shape 4 becomes one of
-#'   shape `c(n, 4)`, Discrete a MultiDiscrete of shape `n`, Tuple and Dict have such
-#'   parts, and the others become a Tuple with a space for each lane.
+#'   for the other kinds see [space_sample()]. With sub-environments it is the space of the values
+#'   of all sub-environments, the sub-environment as the first dimension: a Box of shape 4 becomes
+#'   one of shape `c(n, 4)`, Discrete a MultiDiscrete of shape `n`, Tuple and Dict have such
+#'   parts, and the others become a Tuple with a space for each sub-environment.
 #' @section Errors: `gym_error_http_400` for an unknown instance,
 #'   `gym_error_connection`.
 #' @export
@@ -266,7 +266,7 @@ env_observation_space_info <- function(x, instance_id) {
 #'
 #' @inheritParams env_reset
 #' @return An action that [env_step()] takes: a whole number for Discrete, a numeric
-#'   vector or array for Box; [space_sample()] has the table of all kinds. With lanes
+#'   vector or array for Box; [space_sample()] has the table of all kinds. With sub-environments
 #'   an action for each.
 #' @inheritSection env_action_space_info Errors
 #' @export
@@ -309,15 +309,19 @@ env_observation_space_contains <- function(x, instance_id, observation) {
 instance_contains <- function(x, instance_id, which, value, call = rlang::caller_env()) {
   instance <- known_instance(x, instance_id, call = call)
   single <- instance[[paste0("single_", which)]]
-  lanes <- instance$num_envs
-  space <- lanes_space(single, lanes)
+  num_envs <- instance$num_envs
+  space <- sub_envs_space(single, num_envs)
   if (instance$classic) {
     return(fits_space(space, value, bounds = TRUE))
   }
   if (!fits_space(space, value)) {
     return(FALSE)
   }
-  json <- if (is.null(lanes)) write_value(space, value) else write_lanes(single, value, lanes)
+  json <- if (is.null(num_envs)) {
+    write_value(space, value)
+  } else {
+    write_sub_envs(single, value, num_envs)
+  }
   fields <- c(value = json)
   answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
   if (!is_flag(answer$member)) {

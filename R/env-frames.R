@@ -11,8 +11,8 @@ new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
 }
 
-frames_of <- function(record, lanes) {
-  lapply(record$blocks, function(block) new_frames(block$frames, lanes$spec$render_fps))
+frames_of <- function(record, sub_envs) {
+  lapply(record$blocks, function(block) new_frames(block$frames, sub_envs$spec$render_fps))
 }
 
 #' @export
@@ -42,8 +42,8 @@ check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
     gym_abort(
-      c(paste0("Frames are kept of an environment without lanes, and this ", label, " has ",
-               count_of(env$num_envs, "lane"), "."),
+      c(paste0("Frames are kept of an environment without sub-environments, and this ", label,
+               " has ", count_of(env$num_envs, "sub-environment"), "."),
         i = paste0("Make it without `num_envs`, or name it by its id.")),
       class = "gym_error_argument", argument = "env", value = env, call = call
     )

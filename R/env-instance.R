@@ -11,8 +11,8 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
-  check_lane_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
-  check_lane_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_sub_env_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
+  check_sub_env_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
@@ -99,8 +99,8 @@ ask_instance <- function(x, instance_id, call) {
   instance$single_observation_space <- read_values(
     space_of(answer$observation_space), "Its `observation_space`"
   )
-  instance$actions <- lanes_space(instance$single_action_space, answer$num_envs)
-  instance$observations <- lanes_space(instance$single_observation_space, answer$num_envs)
+  instance$actions <- sub_envs_space(instance$single_action_space, answer$num_envs)
+  instance$observations <- sub_envs_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
   instance$takes_tensors <- as_tensors(instance$single_observation_space)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
@@ -170,17 +170,17 @@ info_from <- function(instance, answer) {
   if (is.null(instance$num_envs)) {
     info_from_json(answer$info %||% empty_object)
   } else {
-    info_by_lane(answer$info, instance$num_envs)
+    info_by_sub_env(answer$info, instance$num_envs)
   }
 }
 
-step_instance <- function(x, instance, action, render, lanes = NULL, call = rlang::caller_env()) {
+step_instance <- function(x, instance, action, render, which = NULL, call = rlang::caller_env()) {
   if (render && !instance$classic) {
     show_instance(x, instance, call)
   }
   fields <- c(render = if (render) "true" else "false")
-  if (!is.null(lanes) || !is.null(instance$num_envs)) {
-    return(step_lanes(x, instance, action, fields, lanes, call))
+  if (!is.null(which) || !is.null(instance$num_envs)) {
+    return(step_sub_envs(x, instance, action, fields, which, call))
   }
   space <- instance$actions
   # A classic server says no more of a wrong action than that something went wrong.
@@ -242,7 +242,8 @@ warn_step_after_done <- function(instance, call) {
   )
 }
 
-# One for all, or for a vector environment one for each lane, NA for a lane without.
+# One for all, or for a vector environment one for each sub-environment, NA for a sub-environment
+# without.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
@@ -251,7 +252,7 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
     check_count(seed, min = 0, max = 2^53, call = call)
     return(whole_text(seed))
   }
-  check_lane_seeds(seed, num_envs, call)
+  check_sub_env_seeds(seed, num_envs, call)
   json_array(ifelse(is.na(seed), "null", whole_text(seed)))
 }
 

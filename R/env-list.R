@@ -7,10 +7,10 @@
 #' @return A data frame with one row for each environment of all of the server's
 #'   clients, the oldest first: `instance_id` (a string, for [env_close()] and the other
 #'   classic calls), `name` (a string, what its owner called it by [gym_make()] or
-#'   [env_create()], `NA` for none), `env_id` (a string), `num_envs` (integer, its lanes,
+#'   [env_create()], `NA` for none), `env_id` (a string), `num_envs` (integer, its sub-environments,
 #'   `NA` for an environment without), `age` and `idle` (double, the seconds since it was
 #'   made and since it was last reset or stepped), `steps` (double, how many it has
-#'   taken, in all lanes together) and `watched` (logical, whether somebody watches it).
+#'   taken, in all sub-environments together) and `watched` (logical, whether somebody watches it).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()

@@ -10,18 +10,18 @@
 #' thrown away, or at the session's end: keep the object for as long as the environment is
 #' played.
 #'
-#' With `num_envs` it has lanes: copies of the environment that are reset and stepped
-#' together, with one call for all of them. Observations then have a row a lane, and so
+#' With `num_envs` it has sub-environments: copies of the environment that are reset and stepped
+#' together, with one call for all of them. Observations then have a row a sub-environment, and so
 #' have actions; [env_reset()] and [env_step()] tell the forms of all kinds. An
-#' environment's own implementation of lanes may be another game than the single one
+#' environment's own implementation of sub-environments may be another game than the single one
 #' in details, such as the size of the Atari games' pictures.
 #'
 #' # After an episode's end
 #'
 #' An environment without `num_envs` wants `$reset()` when a step has returned `done`. With
-#' `num_envs` `autoreset_mode` says what becomes of a lane that has ended while the others play
-#' on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken, its
-#' observation is the first of the new episode, its reward is 0, and neither `terminated` nor
+#' `num_envs` `autoreset_mode` says what becomes of a sub-environment that has ended while the
+#' others play on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken,
+#' its observation is the first of the new episode, its reward is 0, and neither `terminated` nor
 #' `truncated` is set. Whoever sums rewards or counts steps leaves that step out, as [rollout()]
 #' does. With `"SameStep"` the step that ends an episode already returns the first observation of
 #' the next one, with `"Disabled"` `$reset(mask = )` does it.
@@ -34,18 +34,18 @@
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
 #'     episode and returns the first observation, as [env_reset()],
-#'   * `$step(action, lanes = NULL)`: takes a step and returns a list, as [env_step()]; after an
+#'   * `$step(action, which = NULL)`: takes a step and returns a list, as [env_step()]; after an
 #'     episode's end see below,
-#'   * `$render(lane = 1)`: the current frame, as [env_render()],
+#'   * `$render(which = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,
 #'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
-#'   * `$single_action_space`, `$single_observation_space`: those of one lane; without
-#'     lanes the same,
-#'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many lanes there are
-#'     and what was chosen for them, see [env_create()]; `NULL` without lanes,
+#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; without
+#'     sub-environments the same,
+#'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many sub-environments there are
+#'     and what was chosen for them, see [env_create()]; `NULL` without sub-environments,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
 #'     the latter three `NULL` where the environment has none,
@@ -153,13 +153,13 @@ gym_env <- R6Class(
       check_flag(return_info)
       reset_instance(self$client, private$instance, seed, options, return_info, mask)
     },
-    step = function(action, lanes = NULL) {
+    step = function(action, which = NULL) {
       private$check_open()
-      step_instance(private$connected, private$instance, action, render = FALSE, lanes)
+      step_instance(private$connected, private$instance, action, render = FALSE, which)
     },
-    render = function(lane = 1) {
+    render = function(which = 1) {
       private$check_open()
-      env_render(self$client, self$instance_id, lane)
+      env_render(self$client, self$instance_id, which)
     },
     watch = function() {
       private$check_open()
@@ -173,12 +173,13 @@ gym_env <- R6Class(
       invisible(self)
     },
     print = function(...) {
-      lanes <- if (!is.null(self$num_envs)) {
-        paste0(", ", count_of(self$num_envs, "lane"), " (", self$vectorization_mode, ", ",
+      sub_envs <- if (!is.null(self$num_envs)) {
+        paste0(", ", count_of(self$num_envs, "sub-environment"), " (",
+               self$vectorization_mode, ", ",
                self$autoreset_mode, ")")
       }
       closed <- if (private$closed) ", closed"
-      cat("<gym_env: ", self$spec$id, lanes, closed, ">\n", sep = "")
+      cat("<gym_env: ", self$spec$id, sub_envs, closed, ">\n", sep = "")
       cat("  observations: ", format(private$instance$observations), "\n", sep = "")
       cat("  actions:      ", format(private$instance$actions), "\n", sep = "")
       invisible(self)

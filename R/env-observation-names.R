@@ -38,7 +38,7 @@ observation_names <- function(env_id, columns) {
 #'
 #' Numbers have a column each, in row-major order; so have the parts of Tuple and
 #' Dict. Values that may hold any number of parts have one column that is a list.
-#' @param values The values, as [lanes_from()] puts them together.
+#' @param values The values, as [sub_envs_from()] puts them together.
 #' @param name What they are, such as `"action"`.
 #' @return A named list of columns.
 #' @noRd
@@ -49,7 +49,7 @@ value_columns.default <- function(space, values, name) stats::setNames(list(I(va
 
 #' @exportS3Method
 value_columns.gym_space_array <- function(space, values, name) {
-  numbers <- lane_numbers(values)
+  numbers <- sub_env_numbers(values)
   n <- ncol(numbers)
   each <- lapply(seq_len(n), function(i) numbers[, i])
   stats::setNames(each, if (n == 1L) name else paste0(name, "_", seq_len(n), recycle0 = TRUE))

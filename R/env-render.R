@@ -3,9 +3,10 @@
 #' Asks the server for a picture of the environment as it is now.
 #'
 #' @inheritParams env_reset
-#' @param lane Which lane to draw where the environment has lanes, a number from 1, the
-#'   default. An implementation of an environment's own (`"vector_entry_point"`) draws
-#'   all lanes at once, and the server lets it have 16 at most for that.
+#' @param sub-environment Which sub-environment to draw where the environment has sub-environments,
+#'   a number from 1, the default. An implementation of an environment's own
+#'   (`"vector_entry_point"`) draws all sub-environments at once, and the server lets it have 16 at
+#'   most for that.
 #' @return An object of class `gym_frame`: an integer array of height x width x
 #'   3 (red, green, blue, each 0 to 255), where the environment draws such also x 1 (grey)
 #'   or x 4 (the last how opaque). [plot()] shows it, [as.raster()] makes it a raster image.
@@ -19,11 +20,11 @@
 #' frame <- env_render(env$client, env$instance_id)
 #' plot(frame)
 #' env$close()
-env_render <- function(x, instance_id, lane = 1) {
+env_render <- function(x, instance_id, which = 1) {
   check_client(x)
   check_string(instance_id)
-  check_count(lane)
-  query <- if (lane != 1) paste0("?lane=", whole_text(lane - 1))
+  check_count(which)
+  query <- if (which != 1) paste0("?sub_env=", whole_text(which - 1))
   route <- paste0(instance_route(instance_id), "render/", query)
   answer <- get_answer(x, route, take_tensors = TRUE)
   new_frame(check_frame(answer$tensors$frame))

@@ -2,7 +2,7 @@
 # rules as those of the server, but nothing has checked that it does.
 
 #' Take a step, and check what comes of it if the environment is of the user's own making
-#' @param n For how many lanes it steps.
+#' @param n For how many sub-environments it steps.
 #' @param ... As `env$step()` takes them.
 #' @noRd
 take_step <- function(env, n, call, ...) {
@@ -38,7 +38,7 @@ check_reward <- function(out, n, call) {
 
 check_step_flag <- function(out, flag, n, call) {
   if (!is.logical(out[[flag]]) || length(out[[flag]]) != n || anyNA(out[[flag]])) {
-    must <- if (n == 1L) "TRUE or FALSE" else paste("TRUE or FALSE for each of", n, "lanes")
+    must <- paste0("TRUE or FALSE", if (n != 1L) paste(" for each of", n, "sub-environments"))
     abort_step_element(flag, must, out, call)
   }
 }

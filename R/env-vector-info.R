@@ -1,24 +1,24 @@
-# What a vector environment tells besides, by lane.
+# What a vector environment tells besides, by sub-environment.
 
-#' Turn the info of several lanes into R values
+#' Turn the info of several sub-environments into R values
 #'
-#' For each key Gymnasium has an array with an entry for each lane, and beside it, under
+#' For each key Gymnasium has an array with an entry for each sub-environment, and beside it, under
 #' the key with `_` before it, a mask of those that have said something. Here the entries
 #' of the others are `NA`, or `NULL` in a list, and there are no masks.
 #' @noRd
-info_by_lane <- function(json, n) {
+info_by_sub_env <- function(json, n) {
   if (!length(json)) {
     return(json)
   }
   masks <- paste0("_", names(json))
   keys <- names(json)[!names(json) %in% masks]
-  told <- Map(info_of_lanes, json[keys], json[paste0("_", keys)], n)
+  told <- Map(info_of_sub_envs, json[keys], json[paste0("_", keys)], n)
   stats::setNames(told, keys)
 }
 
-info_of_lanes <- function(json, mask, n) {
+info_of_sub_envs <- function(json, mask, n) {
   if (!is.null(names(json))) {
-    return(info_by_lane(json, n))
+    return(info_by_sub_env(json, n))
   }
   mask <- unlist(mask)
   if (length(mask) != n || length(json) != n) {

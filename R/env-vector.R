@@ -1,15 +1,15 @@
-# What a vector environment takes and gives beyond a single one: lanes, by number or by
+# What a vector environment takes and gives beyond a single one: sub-environments, by number or by
 # mask, how they are made and begun again, and what each of them tells.
 
 vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
-# The space of what is sent and received: a batch where there are lanes.
-lanes_space <- function(space, num_envs) {
+# The space of what is sent and received: a batch where there are sub-environments.
+sub_envs_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Lanes always do where they can. A file must have a tensor, though.
+# Sub-environments always do where they can. A file must have a tensor, though.
 travels_as_tensors <- function(space, num_envs) {
   if (is.null(num_envs)) {
     tensors_pay(space)
@@ -20,28 +20,28 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_lanes <- function(x, instance, action, fields, lanes, call) {
-  check_step_lanes(lanes, instance, call)
+step_sub_envs <- function(x, instance, action, fields, which, call) {
+  check_step_sub_envs(which, instance, call)
   n <- instance$num_envs
   actions <- instance$actions
   observations <- instance$observations
-  if (length(lanes) && length(lanes) < n) {
-    mask <- seq_len(n) %in% lanes
+  if (length(which) && length(which) < n) {
+    mask <- seq_len(n) %in% which
     fields <- c(fields, step_mask = to_json(I(mask)))
-    n <- length(lanes)
+    n <- length(which)
     actions <- batch_space(instance$single_action_space, n)
     observations <- batch_space(instance$single_observation_space, n)
   }
   single <- instance$single_action_space
-  check_lanes(single, actions, action, n, call, lanes)
+  check_sub_envs(single, actions, action, n, call, which)
   answer <- send_action(
-    x, instance, actions, action, write_lanes(single, action, n), fields, call
+    x, instance, actions, action, write_sub_envs(single, action, n), fields, call
   )
-  result <- read_values(numbers_by_lane(answer), "Its `reward`")
+  result <- read_values(numbers_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
-  info <- read_values(info_by_lane(answer$info, n), "Its `info`")
-  if (length(answer$final_lanes)) {
+  info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
+  if (length(answer$final_sub_envs)) {
     info$final_obs <- final_observations(instance, answer, n)
   }
   list(
@@ -54,7 +54,7 @@ step_lanes <- function(x, instance, action, fields, lanes, call) {
   )
 }
 
-numbers_by_lane <- function(answer) {
+numbers_by_sub_env <- function(answer) {
   answer$tensors %||% list(
     reward = as.numeric(numbers_from_json(answer$reward)),
     terminated = unlist(answer$terminated),
@@ -62,32 +62,32 @@ numbers_by_lane <- function(answer) {
   )
 }
 
-# A list: the last observation of each lane that ended, NULL for the others.
+# A list: the last observation of each sub-environment that ended, NULL for the others.
 final_observations <- function(instance, answer, n) {
-  ended <- unlist(answer$final_lanes)
-  check_final_lanes(ended, n)
+  ended <- unlist(answer$final_sub_envs)
+  check_final_sub_envs(ended, n)
   ended <- ended + 1L
   space <- instance$single_observation_space
   values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
   final <- vector("list", n)
-  final[ended] <- lapply(seq_along(ended), function(i) lane_value(space, values, i))
+  final[ended] <- lapply(seq_along(ended), function(i) sub_env_value(space, values, i))
   final
 }
 
-# The server draws lane by lane.
+# The server draws sub-environment by sub-environment.
 decode_sample <- function(instance, json) {
   single <- instance$single_action_space
   if (is.null(instance$num_envs)) {
     decode_value(single, json)
   } else {
-    check_list(json, instance$num_envs, "all lanes")
-    lanes_from(single, lapply(json, decode_value, space = single))
+    check_list(json, instance$num_envs, "all sub-environments")
+    sub_envs_from(single, lapply(json, decode_value, space = single))
   }
 }
 
 # Checks --------------------------------------------------------------------------------
 
-check_lane_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
+check_sub_env_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
   if (is.null(x)) {
     return(invisible())
   }
@@ -95,7 +95,7 @@ check_lane_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), ca
   if (is.null(num_envs)) {
     gym_abort(
       c(
-        paste0("`", arg, "` is for an environment with lanes."),
+        paste0("`", arg, "` is for an environment with sub-environments."),
         i = "Say how many with `num_envs`."
       ),
       class = "gym_error_argument", argument = arg, value = x, call = call
@@ -103,11 +103,12 @@ check_lane_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), ca
   }
 }
 
-check_lane_seeds <- function(seed, num_envs, call) {
+check_sub_env_seeds <- function(seed, num_envs, call) {
   right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, 2^53)
   if (!right || length(seed) != num_envs) {
     must <- paste0(
-      "a whole number of at least 0, or ", num_envs, " of them, one for each lane (NA for none)"
+      "a whole number of at least 0, or ", num_envs,
+      " of them, one for each sub-environment (NA for none)"
     )
     abort_argument(seed, must, "seed", call)
   }
@@ -117,23 +118,25 @@ check_mask <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(invisible())
   }
-  check_has_lanes(instance, mask, "mask", call)
+  check_has_sub_envs(instance, mask, "mask", call)
   n <- instance$num_envs
   if (!is.logical(mask) || length(mask) != n || anyNA(mask) || !any(mask)) {
-    must <- paste0("a logical vector of length ", n, ", one for each lane, with a TRUE in it")
+    must <- paste0(
+      "a logical vector of length ", n, ", one for each sub-environment, with a TRUE in it"
+    )
     abort_argument(mask, must, "mask", call)
   }
 }
 
-check_step_lanes <- function(lanes, instance, call) {
-  if (is.null(lanes)) {
+check_step_sub_envs <- function(which, instance, call) {
+  if (is.null(which)) {
     return(invisible())
   }
-  check_has_lanes(instance, lanes, "lanes", call)
+  check_has_sub_envs(instance, which, "which", call)
   n <- instance$num_envs
-  if (!are_whole(lanes, 1, n) || length(lanes) == 0L || is.unsorted(lanes, strictly = TRUE)) {
-    must <- paste0("numbers of lanes from 1 to ", n, ", in increasing order")
-    abort_argument(lanes, must, "lanes", call)
+  if (!are_whole(which, 1, n) || length(which) == 0L || is.unsorted(which, strictly = TRUE)) {
+    must <- paste0("numbers of sub-environments from 1 to ", n, ", in increasing order")
+    abort_argument(which, must, "which", call)
   }
 }
 
@@ -141,11 +144,11 @@ are_whole <- function(x, min, max) {
   is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
 }
 
-check_has_lanes <- function(instance, x, arg, call) {
+check_has_sub_envs <- function(instance, x, arg, call) {
   if (is.null(instance$num_envs)) {
     gym_abort(
       c(
-        paste0("`", arg, "` is for an environment with lanes; this ", instance$spec$id,
+        paste0("`", arg, "` is for an environment with sub-environments; this ", instance$spec$id,
                " has none."),
         i = "`gym_make()` makes one with `num_envs`."
       ),

@@ -82,9 +82,9 @@ check_answer_results <- function(result, n) {
   }
 }
 
-check_final_lanes <- function(lanes, n) {
-  if (!is.null(lanes) && !(are_whole(lanes, 0, n - 1) && !anyDuplicated(lanes))) {
-    refuse_field(lanes, "final_lanes", paste("numbers from 0 to", n - 1))
+check_final_sub_envs <- function(sub_envs, n) {
+  if (!is.null(sub_envs) && !(are_whole(sub_envs, 0, n - 1) && !anyDuplicated(sub_envs))) {
+    refuse_field(sub_envs, "final_sub_envs", paste("numbers from 0 to", n - 1))
   }
 }
 
@@ -97,11 +97,11 @@ check_instance_id <- function(id) {
 
 #' Check what is told of an instance
 #'
-#' More lanes than these no answer could hold.
+#' More sub-environments than these no answer could hold.
 #' @noRd
 check_about <- function(about) {
-  is_lanes <- function(x) is_number(x) && are_whole(x, 1, 2^24)
-  check_told(about, "num_envs", is_lanes, "a whole number")
+  is_num_envs <- function(x) is_number(x) && are_whole(x, 1, 2^24)
+  check_told(about, "num_envs", is_num_envs, "a whole number")
   check_told(about, "max_episode_steps", is_number, "a number")
   for (name in c("env_id", "vectorization_mode", "autoreset_mode", "render_mode")) {
     check_told(about, name, rlang::is_string, "a string")

@@ -71,7 +71,7 @@ tensors_answer <- function(bytes, layouts, request = NULL) {
     tensors = file$tensors,
     texts = field("texts"),
     info = if (identical(file$metadata$info, "{}")) empty_object else field("info"),
-    final_lanes = field("final_lanes"),
+    final_sub_envs = field("final_sub_envs"),
     request = field("request")
   )
 }

@@ -131,7 +131,7 @@ open_handle <- function(client, sends, takes) {
     connecttimeout_ms = min(10, client$timeout) * 1000,
     timeout_ms = client$timeout * 1000,
     followlocation = FALSE,
-    # Thousands of lanes come in few pieces.
+    # Thousands of sub-environments come in few pieces.
     buffersize = 2^18
   )
   if (is_loopback(client$remote_base) && is.null(client$config$options$proxy)) {

@@ -1,5 +1,5 @@
-# Episodes played in lockstep: in blocks of one episode a lane. A lane whose episode has
-# ended waits for the block's end. Were it to begin another one at once, and the playing
+# Episodes played in lockstep: in blocks of one episode a sub-environment. A sub-environment whose
+# episode has ended waits for the block's end. Were it to begin another one at once, and the playing
 # to stop at the number asked for, short episodes would be favoured.
 
 #' Start to keep what comes of episodes
@@ -20,20 +20,22 @@ new_record <- function(wanted, on_end = function(record, episodes, returns) NULL
 
 #' Play blocks of episodes until those that are wanted have ended
 #'
-#' @param lanes As [lanes_of()] returns them.
+#' @param sub-environments As [vector_env_of()] returns them.
 #' @param begin A function that is given a block's number and the numbers of its episodes,
-#'   and returns a list of `seeds`, as `lanes` draw them, and `policy`, what plays.
+#'   and returns a list of `seeds`, as `vector_env` draw them, and `policy`, what plays.
 #' @param record As [new_record()] returns it; it has what was played also when an error
 #'   or an interrupt ends the playing.
 #' @noRd
-play_episodes <- function(lanes, record, begin, max_steps = NULL, keep_steps = FALSE) {
+play_episodes <- function(vector_env, record, begin, max_steps = NULL, keep_steps = FALSE) {
   while (record$begun < record$wanted) {
-    n <- as.integer(min(lanes$block, record$wanted - record$begun))
+    n <- as.integer(min(vector_env$block, record$wanted - record$begun))
     block <- length(record$blocks) + 1L
     begun <- begin(block, record$begun + seq_len(n))
     record$blocks[[block]] <- new_block(record$begun + seq_len(n), begun$seeds)
     record$begun <- record$begun + n
-    play_block(lanes, record$blocks[[block]], begun$policy, record, max_steps %||% Inf, keep_steps)
+    play_block(
+      vector_env, record$blocks[[block]], begun$policy, record, max_steps %||% Inf, keep_steps
+    )
     record$after_block(record)
   }
 }
@@ -41,7 +43,7 @@ play_episodes <- function(lanes, record, begin, max_steps = NULL, keep_steps = F
 new_block <- function(episodes, seeds) {
   n <- length(episodes)
   rlang::env(
-    episodes = episodes, seeds = seeds, seed = seeds[seq_len(n)], lane = seq_len(n),
+    episodes = episodes, seeds = seeds, seed = seeds[seq_len(n)], sub_env = seq_len(n),
     return = numeric(n), length = integer(n), terminated = logical(n), truncated = logical(n),
     steps = list(), frames = list()
   )
@@ -49,24 +51,24 @@ new_block <- function(episodes, seeds) {
 
 # All episodes of a block begin together, so that those that still play have taken as
 # many steps.
-play_block <- function(lanes, block, policy, record, max_steps, keep_steps) {
-  playing <- block$lane
-  observation <- lane_rows(lanes$observation_space, lanes$reset(block$seeds), playing)
-  keep_frame(block, lanes)
+play_block <- function(vector_env, block, policy, record, max_steps, keep_steps) {
+  playing <- block$sub_env
+  observation <- sub_env_rows(vector_env$observation_space, vector_env$reset(block$seeds), playing)
+  keep_frame(block, vector_env)
   if (block$episodes[[1L]] == 1L) {
-    ask_beforehand(policy, observation, playing, lanes)
+    ask_beforehand(policy, observation, playing, vector_env)
   }
   returns <- numeric(length(playing))
   at <- 0L
   while (length(playing)) {
-    action <- act_lanes(policy, observation, playing, lanes)
-    out <- lanes$step(action, playing)
+    action <- act_sub_envs(policy, observation, playing, vector_env)
+    out <- vector_env$step(action, playing)
     at <- at + 1L
-    keep_frame(block, lanes)
+    keep_frame(block, vector_env)
     returns <- returns + out$reward
     if (keep_steps) {
       block$steps[[at]] <- list(
-        lane = playing, observation = observation, action = action, reward = out$reward,
+        sub_env = playing, observation = observation, action = action, reward = out$reward,
         terminated = out$terminated, truncated = out$truncated
       )
     }
@@ -78,26 +80,26 @@ play_block <- function(lanes, block, policy, record, max_steps, keep_steps) {
       going <- which(!ended & block$episodes[playing] <= record$wanted)
       playing <- playing[going]
       returns <- returns[going]
-      observation <- lane_rows(lanes$observation_space, observation, going)
+      observation <- sub_env_rows(vector_env$observation_space, observation, going)
     }
   }
 }
 
 flags <- c("terminated", "truncated")
 
-# Lanes that draw are single, and their blocks have one episode each.
-keep_frame <- function(block, lanes) {
-  if (!is.null(lanes$frame)) {
-    block$frames[[length(block$frames) + 1L]] <- lanes$frame()
+# Sub-environments that draw are single, and their blocks have one episode each.
+keep_frame <- function(block, vector_env) {
+  if (!is.null(vector_env$frame)) {
+    block$frames[[length(block$frames) + 1L]] <- vector_env$frame()
   }
 }
 
 # One that neither terminated nor was truncated by the environment was cut short here.
-end_episodes <- function(block, lane, returns, at, out) {
-  block$return[lane] <- returns
-  block$length[lane] <- at
-  block$terminated[lane] <- out$terminated
-  block$truncated[lane] <- out$truncated | !out$terminated
+end_episodes <- function(block, sub_env, returns, at, out) {
+  block$return[sub_env] <- returns
+  block$length[sub_env] <- at
+  block$terminated[sub_env] <- out$terminated
+  block$truncated[sub_env] <- out$truncated | !out$terminated
 }
 
 # Tables --------------------------------------------------------------------------
@@ -112,7 +114,7 @@ episodes_table <- function(record, n = record$begun) {
   data.frame(
     episode = seq_len(n),
     seed = column("seed", integer()),
-    lane = column("lane", integer()),
+    sub_env = column("sub_env", integer()),
     return = column("return", numeric()),
     length = column("length", integer()),
     terminated = column("terminated", logical()),
@@ -122,19 +124,20 @@ episodes_table <- function(record, n = record$begun) {
 
 #' Put the steps of a record into a table, episode after episode
 #' @noRd
-steps_table <- function(record, episodes, lanes) {
+steps_table <- function(record, episodes, vector_env) {
   steps <- do.call(c, lapply(record$blocks, function(block) {
-    lapply(block$steps, function(step) c(list(episode = block$episodes[step$lane]), step))
+    lapply(block$steps, function(step) c(list(episode = block$episodes[step$sub_env]), step))
   }))
   column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
-  values <- function(name, space) bind_lanes(space, lapply(steps, function(step) step[[name]]))
-  observed <- lanes$observation_space
+  values <- function(name, space) bind_sub_envs(space, lapply(steps, function(step) step[[name]]))
+  observed <- vector_env$observation_space
   observations <- value_columns(observed, values("observation", observed), "obs")
   if (is_stackable(observed)) {
     names(observations) <- paste0("obs_", seq_along(observations), recycle0 = TRUE)
   }
-  names(observations) <- observation_names(lanes$spec$id, names(observations))
-  actions <- value_columns(lanes$action_space, values("action", lanes$action_space), "action")
+  names(observations) <- observation_names(vector_env$spec$id, names(observations))
+  acted <- vector_env$action_space
+  actions <- value_columns(acted, values("action", acted), "action")
   episode <- column("episode")
   # Stable, so that an episode's steps stay in their order.
   by_episode <- order(episode, method = "radix")

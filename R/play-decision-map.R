@@ -197,7 +197,7 @@ decide_value <- function(place, values, outputs, action, call) {
   space <- place$action_space
   n <- prod(space$shape)
   check_count(action, max = n, call = call)
-  numbers <- lane_numbers(policy_actions(place, values, outputs))
+  numbers <- sub_env_numbers(policy_actions(place, values, outputs))
   limits <- c(space$low[[action]], space$high[[action]])
   list(
     kind = "value", values = as.numeric(numbers[, action]),
@@ -213,9 +213,9 @@ policy_actions <- function(place, values, outputs) {
   }
   shape <- place$observation_space$shape
   observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))
-  lanes <- place[c("observation_space", "action_space")]
-  lanes$call <- rlang::caller_env()
-  act_lanes(place$policy, observation, seq_len(nrow(values)), lanes)
+  vector_env <- place[c("observation_space", "action_space")]
+  vector_env$call <- rlang::caller_env()
+  act_sub_envs(place$policy, observation, seq_len(nrow(values)), vector_env)
 }
 
 # What it says of itself ------------------------------------------------------------

@@ -13,27 +13,27 @@
 #' # Episodes side by side
 #'
 #' Where the environment is named by its id, or was made with `num_envs`, many episodes
-#' are played at once, each in a lane of its own: 256 where the environment has a vector
+#' are played at once, each in a sub-environment of its own: 256 where the environment has a vector
 #' implementation of its own (CartPole has), elsewhere 16. They are played in blocks:
-#' all lanes begin an episode together, and the next block begins when all have ended, so
+#' all sub-environments begin an episode together, and the next block begins when all have ended, so
 #' that short episodes are not favoured. The policy is asked about the episodes that still play:
 #' as they end, what a function is given has fewer and fewer rows, and it returns as many actions
 #' as there are. A row is not the same episode throughout.
 #'
 #' Only with `frames = TRUE` one episode is played after the other, in an environment without
-#' lanes: other episodes, in CartPole, than the same seed plays side by side, as they are
+#' sub-environments: other episodes, in CartPole, than the same seed plays side by side, as they are
 #' seeded otherwise there; elsewhere the same ones, if the policy draws nothing.
 #'
 #' # To begin an episode again
 #'
 #' A seed of the table begins the same episode again, by `env$reset(seed = )` of an
 #' environment made by [gym_make()]. A vector implementation of an environment's own has
-#' a single seed for all of its lanes; there `num_envs` of the result tells how many lanes
-#' it takes to begin the episode again, and `lane` of the table in which of them it is (see
-#' the examples).
+#' a single seed for all of its sub-environments; there `num_envs` of the result tells how many
+#' sub-environments it takes to begin the episode again, and `sub_env` of the table in which of them
+#' it is (see the examples).
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
-#'   see [gym_wrap()]), or an environment made by [gym_make()], with lanes or without.
+#'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
 #'   function of many observations that returns as many actions: for the usual
 #'   environments a function of a matrix with an observation in each row, one for each episode
@@ -53,13 +53,13 @@
 #'   made; the default is the session's own, [gym_client()].
 #' @param frames Keep pictures of the episodes as well? `FALSE`, the default, or `TRUE`, for
 #'   [animate()] and [plot(type = "filmstrip")][plot.gym_rollout()]: one before the first
-#'   step and one after each. Takes an environment that can be drawn, without lanes.
+#'   step and one after each. Takes an environment that can be drawn, without sub-environments.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
 #'   \describe{
 #'     \item{episodes}{A data frame with one row for each episode: `episode`, `seed`,
-#'       `lane` (integers; 1 where there are no lanes), `return` (double), `length`
+#'       `sub_env` (integers; 1 where there are no sub-environments), `return` (double), `length`
 #'       (integer, in steps), `terminated` (logical: ended by the environment's own
 #'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
 #'       by both at once is both where the limit is the environment's own).}
@@ -75,7 +75,7 @@
 #'       it (with package png).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
-#'     \item{num_envs}{How many lanes share the seed of an episode, an integer; `NULL`
+#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
 #'       where each episode has a seed of its own.}
 #'     \item{seed}{As given.}
 #'   }
@@ -102,7 +102,7 @@
 #' # The second episode begins again.
 #' second <- played$episodes[2, ]
 #' env <- gym_make("CartPole-v1", num_envs = played$num_envs)
-#' env$reset(seed = second$seed)[second$lane, ]
+#' env$reset(seed = second$seed)[second$sub-environment, ]
 #' env$close()
 #'
 #' # Where each episode has a seed of its own, a single environment will do.
@@ -122,16 +122,16 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   with_random_seed(seed, {
     # A policy that is made in the call draws its weights under the seed, too.
     check_policy(policy)
-    play <- function(lanes) {
-      warn_of_own_limit(max_steps, lanes, call)
-      policy <- policy_bind(policy, lanes, call = call)
+    play <- function(vector_env) {
+      warn_of_own_limit(max_steps, vector_env, call)
+      policy <- policy_bind(policy, vector_env, call = call)
       record <- new_record(episodes)
-      seeds <- draw_block_seeds(lanes, episodes)
+      seeds <- draw_block_seeds(vector_env, episodes)
       begin <- function(block, episodes) list(seeds = seeds[[block]], policy = policy)
-      play_episodes(lanes, record, begin, max_steps, keep_steps = steps)
-      new_rollout(record, policy, lanes, seed, steps)
+      play_episodes(vector_env, record, begin, max_steps, keep_steps = steps)
+      new_rollout(record, policy, vector_env, seed, steps)
     }
-    with_lanes(env, episodes, client, play, frames)
+    with_vector_env(env, episodes, client, play, frames)
   })
 }
 
@@ -152,22 +152,22 @@ is_playable <- function(x) {
 
 # All beforehand, so that policies which draw are played in the same episodes as those
 # which do not.
-draw_block_seeds <- function(lanes, episodes) {
-  replicate(ceiling(episodes / lanes$block), lanes$draw_seeds(), simplify = FALSE)
+draw_block_seeds <- function(vector_env, episodes) {
+  replicate(ceiling(episodes / vector_env$block), vector_env$draw_seeds(), simplify = FALSE)
 }
 
 # Tables --------------------------------------------------------------------------
 
-new_rollout <- function(record, policy, lanes, seed, keep_steps) {
+new_rollout <- function(record, policy, vector_env, seed, keep_steps) {
   episodes <- episodes_table(record)
   structure(
     list(
       episodes = episodes,
-      steps = if (keep_steps) steps_table(record, episodes, lanes),
-      frames = if (!is.null(lanes$frame)) frames_of(record, lanes),
+      steps = if (keep_steps) steps_table(record, episodes, vector_env),
+      frames = if (!is.null(vector_env$frame)) frames_of(record, vector_env),
       policy = policy,
-      env_id = environment_label(lanes),
-      num_envs = lanes$num_envs,
+      env_id = environment_label(vector_env),
+      num_envs = vector_env$num_envs,
       seed = seed
     ),
     class = "gym_rollout"

@@ -1,26 +1,26 @@
-# What is played on: the lanes of an environment, whatever its kind. Each kind offers
+# What is played on: the sub-environments of an environment, whatever its kind. Each kind offers
 # the same: its spaces, how many episodes it plays at once, and reset and step on rows,
-# one for each lane that plays.
+# one for each sub-environment that plays.
 
 # How many episodes a block has, where an environment is made for the purpose. They must
 # not depend on how many episodes are asked for: which seeds and weights are drawn for
 # an episode would depend on it, too.
-entry_point_lanes <- 256L
-sync_lanes <- 16L
+entry_point_sub_envs <- 256L
+sync_sub_envs <- 16L
 
-#' Call a function with the lanes of an environment
+#' Call a function with the sub-environments of an environment
 #'
 #' One that is named by its id is made first and closed when `use` is left.
-#' @param episodes How many episodes are played at most: no more lanes are made.
-#' @param frames Whether the lanes must draw: then there is a single one.
-#' @param make,block Makes the lanes of one that is named, given its id, `episodes` and the
-#'   client; how many episodes of these make a block, see [lanes_of()].
+#' @param episodes How many episodes are played at most: no more sub-environments are made.
+#' @param frames Whether the sub-environments must draw: then there is a single one.
+#' @param make,block Makes the sub-environments of one that is named, given its id, `episodes` and
+#'   the client; how many episodes of these make a block, see [vector_env_of()].
 #' @noRd
-with_lanes <- function(env, episodes, client, use, frames = FALSE, make = make_lanes,
-                       block = sync_lanes) {
+with_vector_env <- function(env, episodes, client, use, frames = FALSE, make = make_vector_env,
+                       block = sync_sub_envs) {
   call <- rlang::caller_env()
   if (!is.character(env) && !inherits(env, "gym_wrapped")) {
-    return(use(lanes_of(env, call = call, frames = frames)))
+    return(use(vector_env_of(env, call = call, frames = frames)))
   }
   env <- if (frames) gym_make(env, client = client) else make(env, episodes, client)
   finished <- FALSE
@@ -28,7 +28,7 @@ with_lanes <- function(env, episodes, client, use, frames = FALSE, make = make_l
   on.exit({
     if (finished) close_made(env, finished) else abandon_instance(env$client, env$instance_id)
   })
-  value <- use(lanes_of(env, block, call, frames))
+  value <- use(vector_env_of(env, block, call, frames))
   finished <- TRUE
   value
 }
@@ -36,7 +36,7 @@ with_lanes <- function(env, episodes, client, use, frames = FALSE, make = make_l
 #' Ask what is observed and done in an environment
 #'
 #' One that is named by its id is made for the question and closed.
-#' @return A list: `observation_space` and `action_space` of a lane, and `spec`, as
+#' @return A list: `observation_space` and `action_space` of a sub-environment, and `spec`, as
 #'   [policy_bind()] takes them.
 #' @noRd
 known_spaces <- function(env, client, call = rlang::caller_env()) {
@@ -68,29 +68,31 @@ close_made <- function(env, finished) {
   )
 }
 
-make_lanes <- function(env_id, episodes, client) {
-  own <- if (has_own_lanes(env_id, client)) {
-    make_if_can(env_id, entry_point_lanes, "vector_entry_point", NULL, client)
+make_vector_env <- function(env_id, episodes, client) {
+  own <- if (has_own_sub_envs(env_id, client)) {
+    make_if_can(env_id, entry_point_sub_envs, "vector_entry_point", NULL, client)
   }
-  own %||% make_if_can(env_id, min(episodes, sync_lanes), "sync", "Disabled", client) %||%
+  own %||% make_if_can(env_id, min(episodes, sync_sub_envs), "sync", "Disabled", client) %||%
     gym_make(env_id, client = client)
 }
 
 # Does the server take the environment's own vector implementation where it may choose?
-# Asked with one lane, as others are dear to make.
-has_own_lanes <- function(env_id, client) {
-  lane <- make_if_can(env_id, 1L, NULL, NULL, client)
-  if (is.null(lane)) {
+# Asked with one sub-environment, as others are dear to make.
+has_own_sub_envs <- function(env_id, client) {
+  sub_env <- make_if_can(env_id, 1L, NULL, NULL, client)
+  if (is.null(sub_env)) {
     return(FALSE)
   }
-  on.exit(close_made(lane, finished = FALSE))
-  identical(lane$vectorization_mode, "vector_entry_point")
+  on.exit(close_made(sub_env, finished = FALSE))
+  identical(sub_env$vectorization_mode, "vector_entry_point")
 }
 
-# By which the server says that fewer lanes, or none, may do.
-fewer_lanes_codes <- c("not_supported", "too_many_lanes", "too_much_memory", "unsupported_space")
+# By which the server says that fewer sub-environments, or none, may do.
+fewer_sub_envs_codes <- c(
+  "not_supported", "too_many_sub_envs", "too_much_memory", "unsupported_space"
+)
 
-# NULL where the server cannot make such lanes, or not that many.
+# NULL where the server cannot make such sub-environments, or not that many.
 make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, client) {
   tryCatch(
     gym_make(
@@ -98,64 +100,64 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
       autoreset_mode = autoreset_mode, client = client
     ),
     gym_error_http = function(cnd) {
-      if (!isTRUE(cnd$code %in% fewer_lanes_codes)) {
+      if (!isTRUE(cnd$code %in% fewer_sub_envs_codes)) {
         rlang::cnd_signal(cnd)
       }
     }
   )
 }
 
-#' Find out how an environment's lanes are played
+#' Find out how an environment's sub-environments are played
 #'
-#' @param block How many episodes make a block where each lane has a seed of its own;
-#'   `NULL` for as many as there are lanes.
-#' @return A list: the spaces of a lane, `spec` and `client`, as an environment has them,
+#' @param block How many episodes make a block where each sub-environment has a seed of its own;
+#'   `NULL` for as many as there are sub-environments.
+#' @return A list: the spaces of a sub-environment, `spec` and `client`, as an environment has them,
 #'   for [policy_bind()]; `call`, of which errors while they play are told; `block`, how
 #'   many episodes are played at once; `draw_seeds()`, which draws the seeds of a block,
-#'   one for each episode; `reset(seeds)`, which gives the observations of all lanes;
-#'   `step(action, playing)`, which takes and gives one row for each of the lanes
-#'   `playing`; `num_envs`, with how many lanes an episode has to be begun again, `NULL`
+#'   one for each episode; `reset(seeds)`, which gives the observations of all sub-environments;
+#'   `step(action, playing)`, which takes and gives one row for each of the sub-environments
+#'   `playing`; `num_envs`, with how many sub-environments an episode has to be begun again, `NULL`
 #'   where its seed is enough; `frame()`, which gives the current frame as the bytes of a
 #'   PNG file, `NULL` where none are wanted.
 #' @noRd
-lanes_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
+sub_envs_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
   if (is.null(env$num_envs)) {
-    lanes <- single_lane(env, call)
+    vector_env <- single_sub_env(env, call)
   } else if (identical(env$vectorization_mode, "sync")) {
-    lanes <- lanes_apart(env, block %||% env$num_envs, call)
+    vector_env <- sub_envs_apart(env, block %||% env$num_envs, call)
   } else {
-    check_ended_lanes_step(env, call)
-    lanes <- lanes_together(env, call)
+    check_ended_sub_envs_step(env, call)
+    vector_env <- sub_envs_together(env, call)
   }
-  lanes$spec <- env$spec
-  lanes$client <- env$client
-  lanes$call <- call
+  vector_env$spec <- env$spec
+  vector_env$client <- env$client
+  vector_env$call <- call
   if (frames) {
     check_draws(env, call)
-    lanes$frame <- function() png_frame(env$client, env$instance_id, call)
+    vector_env$frame <- function() png_frame(env$client, env$instance_id, call)
   }
-  lanes
+  vector_env
 }
 
-# Without lanes: one episode after the other.
-single_lane <- function(env, call) {
+# Without sub-environments: one episode after the other.
+single_sub_env <- function(env, call) {
   observed <- env$observation_space
   actions <- env$action_space
   list(
     observation_space = observed, action_space = actions, block = 1L,
     draw_seeds = function() draw_environment_seeds(1L),
-    reset = function(seeds) lanes_from(observed, list(env$reset(seed = seeds))),
+    reset = function(seeds) sub_envs_from(observed, list(env$reset(seed = seeds))),
     step = function(action, playing) {
-      out <- take_step(env, 1L, call, lane_value(actions, action, 1L))
-      out$observation <- lanes_from(observed, list(out$observation))
+      out <- take_step(env, 1L, call, sub_env_value(actions, action, 1L))
+      out$observation <- sub_envs_from(observed, list(out$observation))
       out
     }
   )
 }
 
-# Each lane is an environment of its own, with a seed of its own, and only those that
+# Each sub-environment is an environment of its own, with a seed of its own, and only those that
 # play are stepped.
-lanes_apart <- function(env, block, call) {
+sub_envs_apart <- function(env, block, call) {
   n <- env$num_envs
   list(
     observation_space = env$single_observation_space,
@@ -166,15 +168,15 @@ lanes_apart <- function(env, block, call) {
       if (length(playing) == n) {
         take_step(env, n, call, action)
       } else {
-        take_step(env, length(playing), call, action, lanes = playing)
+        take_step(env, length(playing), call, action, which = playing)
       }
     }
   )
 }
 
-# All lanes are always stepped, those whose episode has ended too: what they do then is
+# All sub-environments are always stepped, those whose episode has ended too: what they do then is
 # of no interest. Where one generator serves them all, there is one seed.
-lanes_together <- function(env, call) {
+sub_envs_together <- function(env, call) {
   n <- env$num_envs
   observed <- env$single_observation_space
   actions <- env$single_action_space
@@ -190,9 +192,9 @@ lanes_together <- function(env, call) {
       }
       row <- rep(1L, n)
       row[playing] <- seq_along(playing)
-      out <- take_step(env, n, call, lane_rows(actions, action, row))
+      out <- take_step(env, n, call, sub_env_rows(actions, action, row))
       list(
-        observation = lane_rows(observed, out$observation, playing),
+        observation = sub_env_rows(observed, out$observation, playing),
         reward = out$reward[playing],
         terminated = out$terminated[playing],
         truncated = out$truncated[playing]
@@ -202,11 +204,11 @@ lanes_together <- function(env, call) {
 }
 
 # A limit of the environment's own holds whatever is asked for here.
-warn_of_own_limit <- function(max_steps, lanes, call) {
-  own <- lanes$spec$max_episode_steps
+warn_of_own_limit <- function(max_steps, vector_env, call) {
+  own <- vector_env$spec$max_episode_steps
   if (!is.null(max_steps) && !is.null(own) && own < max_steps) {
     wanted <- format(max_steps, scientific = FALSE)
-    id <- environment_label(lanes)
+    id <- environment_label(vector_env)
     rlang::warn(
       c(paste0("`max_steps = ", wanted, "` makes no episode longer: ", id,
                " has a limit of its own, ", count_of(own, "step"), "."),
@@ -217,13 +219,14 @@ warn_of_own_limit <- function(max_steps, lanes, call) {
   }
 }
 
-check_ended_lanes_step <- function(env, call) {
+check_ended_sub_envs_step <- function(env, call) {
   if (identical(env$autoreset_mode, "Disabled")) {
     gym_abort(
       c(
         paste0("Episodes of different length cannot be played in ", environment_label(env),
                " made with vectorization_mode \"", env$vectorization_mode,
-               "\" and autoreset_mode \"Disabled\": all of its lanes are stepped together, ",
+               "\" and autoreset_mode \"Disabled\": all of its sub-environments are stepped ",
+               "together, ",
                "and one that has ended takes no step."),
         i = "Make it with autoreset_mode \"NextStep\", or with vectorization_mode \"sync\"."
       ),

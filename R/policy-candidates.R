@@ -1,10 +1,10 @@
-# Networks of the same sizes that play side by side, each in lanes of its own.
+# Networks of the same sizes that play side by side, each in sub-environments of its own.
 
-#' Let several networks play in the same lanes
+#' Let several networks play in the same sub-environments
 #'
 #' @param policies A list of networks that differ only in their weights.
-#' @param candidate Which of them plays in each lane, its place in the list.
-#' @return What [act_lanes()] asks for actions: the network itself where it is one.
+#' @param candidate Which of them plays in each sub-environment, its place in the list.
+#' @return What [act_sub_envs()] asks for actions: the network itself where it is one.
 #' @noRd
 candidates_of <- function(policies, candidate) {
   if (length(policies) == 1L) {
@@ -21,9 +21,9 @@ candidates_of <- function(policies, candidate) {
 }
 
 #' @exportS3Method
-act_lanes.gym_policy_candidates <- function(policy, observation, playing, lanes) {
+act_sub_envs.gym_policy_candidates <- function(policy, observation, playing, vector_env) {
   network <- policy$policy
-  signal <- network_inputs(network$observation_space, lane_numbers(observation))
+  signal <- network_inputs(network$observation_space, sub_env_numbers(observation))
   everyone <- length(playing) == nrow(policy$layers[[1L]])
   for (layer in seq_along(policy$layers)) {
     weights <- policy$layers[[layer]]

@@ -18,26 +18,26 @@ check_takes_observations <- function(policy, arg, call) {
 #'
 #' One that fails when a single episode is left would otherwise do so when most has been played.
 #' Where a single episode is played, the first step asks this anyway.
-#' @param observation What is observed first, one row for each of the lanes `playing`.
+#' @param observation What is observed first, one row for each of the sub-environments `playing`.
 #' @noRd
-ask_beforehand <- function(policy, observation, playing, lanes) {
+ask_beforehand <- function(policy, observation, playing, vector_env) {
   if (!is.function(policy) || length(playing) == 1L) {
     return(invisible())
   }
-  one <- lane_rows(lanes$observation_space, observation, 1L)
+  one <- sub_env_rows(vector_env$observation_space, observation, 1L)
   tryCatch(
-    keep_random_state(act_lanes(policy, one, playing[[1L]], lanes)),
+    keep_random_state(act_sub_envs(policy, one, playing[[1L]], vector_env)),
     gym_error = function(cnd) rlang::cnd_signal(cnd),
     error = function(cnd) {
       gym_abort(
         c("The policy failed when it was asked about one observation, before the first step.",
-          i = asked_text(lanes$observation_space),
+          i = asked_text(vector_env$observation_space),
           i = paste("There may be only one, as when all episodes but one have ended;",
                     "`drop = FALSE` keeps one row of a matrix a matrix.")),
         # Those of the policy's own error stay, for whoever catches it.
         class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
                   "gym_error_argument"),
-        argument = "policy", value = policy, call = lanes$call,
+        argument = "policy", value = policy, call = vector_env$call,
         parent = cnd
       )
     }
@@ -45,25 +45,26 @@ ask_beforehand <- function(policy, observation, playing, lanes) {
   invisible()
 }
 
-#' Check that there is one action for each lane, and bring them in the form of lanes
+#' Check that there is one action for each sub-environment, and bring them in the form of
+#' sub-environments
 #'
 #' Whether each is an action of the space is for the environment to say.
 #' @noRd
-lane_actions <- function(actions, n, lanes) {
-  actions <- as_lanes(lanes$action_space, actions)
-  given <- lanes_given(lanes$action_space, actions)
+sub_env_actions <- function(actions, n, vector_env) {
+  actions <- as_sub_envs(vector_env$action_space, actions)
+  given <- sub_envs_given(vector_env$action_space, actions)
   if (is.na(given) || given != n) {
-    abort_action_count(actions, given, n, lanes)
+    abort_action_count(actions, given, n, vector_env)
   }
   actions
 }
 
-as_lanes <- function(space, actions) {
+as_sub_envs <- function(space, actions) {
   if (has_parts(space)) {
     complete <- is.list(actions) && length(actions) == length(space$spaces)
-    if (complete) map_parts(space, as_lanes, in_order(space, actions)) else actions
+    if (complete) map_parts(space, as_sub_envs, in_order(space, actions)) else actions
   } else if (is_stackable(space) && prod(space$shape) == 1 && is_column(actions)) {
-    column_as_lanes(space, actions)
+    column_as_sub_envs(space, actions)
   } else {
     actions
   }
@@ -74,7 +75,7 @@ is_column <- function(x) {
   is.atomic(x) && length(x) > 0L && length(x) == stack_length(x)
 }
 
-column_as_lanes <- function(space, actions) {
+column_as_sub_envs <- function(space, actions) {
   if (is.logical(actions) && !identical(space$dtype, "bool")) {
     actions <- as.integer(actions)
   }
@@ -82,7 +83,7 @@ column_as_lanes <- function(space, actions) {
   actions
 }
 
-abort_action_count <- function(actions, given, n, lanes) {
+abort_action_count <- function(actions, given, n, vector_env) {
   gave <- if (is.na(given)) describe_argument(actions) else count_of(given, "action")
   gym_abort(
     c(
@@ -91,10 +92,10 @@ abort_action_count <- function(actions, given, n, lanes) {
         if (n == 1L) "the one observation" else paste("each of", n, "observations"),
         ", not ", gave, "."
       ),
-      i = asked_text(lanes$observation_space),
-      i = answered_text(lanes$action_space)
+      i = asked_text(vector_env$observation_space),
+      i = answered_text(vector_env$action_space)
     ),
-    class = "gym_error_argument", argument = "policy", value = actions, call = lanes$call
+    class = "gym_error_argument", argument = "policy", value = actions, call = vector_env$call
   )
 }
 

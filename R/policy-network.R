@@ -147,14 +147,14 @@ check_weights <- function(weights, sizes, name = "weights", call = rlang::caller
 act.gym_policy_network <- function(policy, observation, ...) {
   # They may have been changed by hand.
   check_weights(policy$weights, policy$sizes, "policy$weights")
-  lanes <- observation_lanes(observation, policy$observation_space)
-  outputs <- network_outputs(policy, lanes$values)
-  network_action(policy$action_space, outputs, policy, lanes$one)
+  vector_env <- observation_sub_envs(observation, policy$observation_space)
+  outputs <- network_outputs(policy, vector_env$values)
+  network_action(policy$action_space, outputs, policy, vector_env$one)
 }
 
 #' @exportS3Method
-act_lanes.gym_policy_network <- function(policy, observation, playing, lanes) {
-  outputs <- network_outputs(policy, lane_numbers(observation))
+act_sub_envs.gym_policy_network <- function(policy, observation, playing, vector_env) {
+  outputs <- network_outputs(policy, sub_env_numbers(observation))
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
 

@@ -59,23 +59,23 @@ act.gym_policy_random <- function(policy, observation, ...) {
   }
   # What is observed matters only for how many there are, and observations that
   # are lists (of an environment with several parts) come one at a time.
-  observed <- if (counts_lanes(observation, policy$observation_space)) {
-    observation_lanes(observation, policy$observation_space)
+  observed <- if (counts_sub_envs(observation, policy$observation_space)) {
+    observation_sub_envs(observation, policy$observation_space)
   }
   if (is.null(observed) || observed$one) {
     space_sample(space)
   } else {
-    sample_lanes(space, nrow(observed$values))
+    sample_sub_envs(space, nrow(observed$values))
   }
 }
 
 #' @exportS3Method
-act_lanes.gym_policy_random <- function(policy, observation, playing, lanes) {
-  sample_lanes(policy$action_space, length(playing))
+act_sub_envs.gym_policy_random <- function(policy, observation, playing, vector_env) {
+  sample_sub_envs(policy$action_space, length(playing))
 }
 
 # Only of numbers can it be said how many observations there are.
-counts_lanes <- function(observation, space) {
+counts_sub_envs <- function(observation, space) {
   !is.list(observation) && (is.null(space) || is_stackable(space))
 }
 

@@ -168,21 +168,21 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
   )
 }
 
-#' Choose an action for each lane that plays
+#' Choose an action for each sub-environment that plays
 #'
-#' @param policy A policy that is bound to the lanes.
-#' @param observation What is observed, one row for each of the lanes `playing`.
-#' @param playing The numbers of these lanes.
-#' @param lanes As [lanes_of()] returns them.
-#' @return The actions, in the form in which lanes take them.
+#' @param policy A policy that is bound to the sub-environments.
+#' @param observation What is observed, one row for each of the sub-environments `playing`.
+#' @param playing The numbers of these sub-environments.
+#' @param sub-environments As [vector_env_of()] returns them.
+#' @return The actions, in the form in which sub-environments take them.
 #' @noRd
-act_lanes <- function(policy, observation, playing, lanes) UseMethod("act_lanes")
+act_sub_envs <- function(policy, observation, playing, vector_env) UseMethod("act_sub_envs")
 
 #' @exportS3Method
-act_lanes.default <- function(policy, observation, playing, lanes) {
+act_sub_envs.default <- function(policy, observation, playing, vector_env) {
   plain <- is.function(policy) && !has_act_method(policy)
   actions <- if (plain) policy(observation) else act(policy, observation)
-  lane_actions(actions, length(playing), lanes)
+  sub_env_actions(actions, length(playing), vector_env)
 }
 
 # Observations as rows of numbers -------------------------------------------------
@@ -195,7 +195,7 @@ act_lanes.default <- function(policy, observation, playing, lanes) {
 #'   in row-major order, as Gymnasium flattens them; `one`, whether what came was
 #'   a single observation rather than a number of them.
 #' @noRd
-observation_lanes <- function(observation, space) {
+observation_sub_envs <- function(observation, space) {
   axes <- dim(observation)
   rank <- observation_rank(space)
   if (is.null(axes) && rank == 1L) {

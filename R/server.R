@@ -80,7 +80,7 @@ is_running <- function(base) {
 #'   its `--monitor-dir runs`. `log_level = "info"` logs what is made and closed,
 #'   `allow_module = c("a", "b")` names Python modules whose environments may be
 #'   made. Limits for all clients together are `max_instances` (environments, 1,000),
-#'   `max_num_envs` (lanes of one, 16,384), `max_total_lanes` (four times as many),
+#'   `max_num_envs` (sub-environments of one, 16,384), `max_total_sub_envs` (four times as many),
 #'   `max_processes` (of their own that environments have, 128), `max_memory_mb` (of all
 #'   environments, estimated before they are made, 4,096), `max_watchers` (100),
 #'   `max_body_mb` (of a request, 16), `max_call_seconds` (that a call may take before its

@@ -156,7 +156,7 @@ wanted_shape <- function(shape) {
 }
 
 # A vector without dim is one-dimensional; where the space is one, a scalar or a column,
-# which is one number for each lane.
+# which is one number for each sub-environment.
 value_shape <- function(value, space) {
   if (!is.null(dim(value))) {
     dim(value)

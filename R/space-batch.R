@@ -1,5 +1,5 @@
 # Spaces whose values hold any number of elements of another space: Sequence and
-# Graph. Elements that are numbers are stacked as those of lanes are, others are a list.
+# Graph. Elements that are numbers are stacked as those of sub-environments are, others are a list.
 
 is_stackable <- function(space) {
   inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")

@@ -1,6 +1,6 @@
-# Several values of a space at once: one for each lane of a vector environment, or for
+# Several values of a space at once: one for each sub-environment of a vector environment, or for
 # each element of a Sequence or Graph. Numbers are stacked into one array, with the
-# lanes along its first dimension; Tuple and Dict are stacked part by part, texts are a
+# sub-environments along its first dimension; Tuple and Dict are stacked part by part, texts are a
 # character vector, what has no fixed form is a list.
 
 #' Make the space of several values of a space
@@ -121,7 +121,7 @@ to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") 
 
 #' @exportS3Method
 decode_value.gym_space_texts <- function(space, json) {
-  check_list(json, length(space$spaces), "Text in all lanes")
+  check_list(json, length(space$spaces), "Text in all sub-environments")
   vapply(json, check_text, "", USE.NAMES = FALSE)
 }
 
@@ -147,71 +147,72 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
   stats::setNames(as.list(enc2utf8(as.character(value))), part_names(space, name))
 }
 
-# Lanes -------------------------------------------------------------------------------
+# Sub-environments -------------------------------------------------------------------------------
 
-#' Check a value for each lane
+#' Check a value for each sub-environment
 #'
-#' All lanes at once, as nearly always they all fit; if not, one after the other, so that
-#' the error tells which lane it is and shows that lane's value.
-#' @param space The space of one lane, `batch` that of all `n`.
-#' @param lanes Their numbers; `NULL` for 1 to `n`.
+#' All sub-environments at once, as nearly always they all fit; if not, one after the other, so that
+#' the error tells which sub-environment it is and shows that sub-environment's value.
+#' @param space The space of one sub-environment, `batch` that of all `n`.
+#' @param sub-environments Their numbers; `NULL` for 1 to `n`.
 #' @noRd
-check_lanes <- function(space, batch, values, n, call, lanes = NULL) {
+check_sub_envs <- function(space, batch, values, n, call, sub_envs = NULL) {
   if (fits_space(batch, values)) {
     return(invisible())
   }
-  given <- lanes_given(space, values)
+  given <- sub_envs_given(space, values)
   if (!is.na(given) && given != n) {
-    problem <- paste0("One value for each of the lanes is needed: ", n, ", not ", given)
+    problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
     abort_space(batch, values, problem, call)
   }
   if (!is.na(given)) {
     for (i in seq_len(n)) {
-      check_lane(space, lane_value(space, values, i), if (is.null(lanes)) i else lanes[[i]], call)
+      sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
+      check_sub_env(space, sub_env_value(space, values, i), sub_env, call)
     }
   }
   check_value(batch, values, "", call)
 }
 
-check_lane <- function(space, value, lane, call) {
+check_sub_env <- function(space, value, sub_env, call) {
   tryCatch(
     check_value(space, value, "", call),
     gym_error_space = function(cnd) {
-      cnd$message <- paste0("Lane ", lane, ": ", cnd$message)
-      cnd$lane <- lane
+      cnd$message <- paste0("Sub-environment ", sub_env, ": ", cnd$message)
+      cnd$sub_env <- sub_env
       rlang::cnd_signal(cnd)
     }
   )
 }
 
-#' Count the lanes in what was given for all of them
+#' Count the sub-environments in what was given for all of them
 #' @return A number; `NA` for what has not the form of several values of the space.
 #' @noRd
-lanes_given <- function(space, values) UseMethod("lanes_given")
+sub_envs_given <- function(space, values) UseMethod("sub_envs_given")
 
 #' @exportS3Method
-lanes_given.default <- function(space, values) {
+sub_envs_given.default <- function(space, values) {
   if (is.list(values)) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-lanes_given.gym_space_text <- function(space, values) {
+sub_envs_given.gym_space_text <- function(space, values) {
   if (is.character(values) || is.list(values)) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-lanes_given.gym_space_discrete <- function(space, values) {
+sub_envs_given.gym_space_discrete <- function(space, values) {
   if (is.atomic(values) && is.null(dim(values))) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-lanes_given.gym_space_array <- function(space, values) {
+sub_envs_given.gym_space_array <- function(space, values) {
   shape <- if (is.atomic(values)) value_shape(values, batch_space(space, 1L))
   if (identical(shape[-1L], space$shape)) shape[[1L]] else NA_integer_
 }
 
 #' @exportS3Method
-lanes_given.gym_space_tuple <- function(space, values) {
+sub_envs_given.gym_space_tuple <- function(space, values) {
   keys <- names(space$spaces) %||% seq_along(space$spaces)
   if (!is.list(values) || length(values) != length(keys)) {
     return(NA_integer_)
@@ -219,15 +220,15 @@ lanes_given.gym_space_tuple <- function(space, values) {
   if (is.character(keys)) {
     values <- values[match(keys, enc2utf8(as.character(names(values))))]
   }
-  counts <- unique(unlist(Map(lanes_given, unname(space$spaces), unname(values))))
+  counts <- unique(unlist(Map(sub_envs_given, unname(space$spaces), unname(values))))
   if (length(counts) == 1L) counts else NA_integer_
 }
 
 #' @exportS3Method
-lanes_given.gym_space_dict <- lanes_given.gym_space_tuple
+sub_envs_given.gym_space_dict <- sub_envs_given.gym_space_tuple
 
-# JSON has the values lane by lane, whatever the space.
-write_lanes <- function(space, values, n) {
-  lanes <- lapply(seq_len(n), function(lane) lane_value(space, values, lane))
-  json_array(vapply(lanes, write_value, "", space = space))
+# JSON has the values sub-environment by sub-environment, whatever the space.
+write_sub_envs <- function(space, values, n) {
+  sub_envs <- lapply(seq_len(n), function(sub_env) sub_env_value(space, values, sub_env))
+  json_array(vapply(sub_envs, write_value, "", space = space))
 }

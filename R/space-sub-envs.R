@@ -1,5 +1,5 @@
-# Values of several lanes: numbers in an array with the lane as its first dimension (a
-# vector for single numbers), texts in a character vector, Tuple and Dict part by part,
+# Values of several sub-environments: numbers in an array with the sub-environment as its first
+# dimension (a vector for single numbers), texts in a character vector, Tuple and Dict part by part,
 # other values in a list.
 
 has_parts <- function(space) {
@@ -13,44 +13,44 @@ map_parts <- function(space, part, ...) {
   parts
 }
 
-#' Put single values, one for each lane, together
+#' Put single values, one for each sub-environment, together
 #' @param values A list of values of the space.
 #' @noRd
-lanes_from <- function(space, values) {
+sub_envs_from <- function(space, values) {
   if (is_stackable(space)) {
     stack_values(space, values)
   } else if (inherits(space, "gym_space_text")) {
     as.character(values)
   } else if (has_parts(space)) {
     each <- lapply(seq_along(space$spaces), function(i) lapply(values, function(v) v[[i]]))
-    map_parts(space, lanes_from, each)
+    map_parts(space, sub_envs_from, each)
   } else {
     values
   }
 }
 
-#' Take the value of one lane
+#' Take the value of one sub-environment
 #' @noRd
-lane_value <- function(space, lanes, i) {
+sub_env_value <- function(space, sub_envs, i) {
   if (has_parts(space)) {
-    map_parts(space, lane_value, in_order(space, lanes), i)
+    map_parts(space, sub_env_value, in_order(space, sub_envs), i)
   } else if (is_stackable(space)) {
-    value <- rows_of(lanes, i)
+    value <- rows_of(sub_envs, i)
     dim(value) <- if (length(space$shape) > 1L) dim(value)[-1L]
     value
   } else {
-    lanes[[i]]
+    sub_envs[[i]]
   }
 }
 
-#' Take the values of some lanes
+#' Take the values of some sub-environments
 #' @param i Their numbers; one may come more than once.
 #' @noRd
-lane_rows <- function(space, lanes, i) {
+sub_env_rows <- function(space, sub_envs, i) {
   if (has_parts(space)) {
-    map_parts(space, lane_rows, in_order(space, lanes), list(i))
+    map_parts(space, sub_env_rows, in_order(space, sub_envs), list(i))
   } else {
-    rows_of(lanes, i)
+    rows_of(sub_envs, i)
   }
 }
 
@@ -74,20 +74,20 @@ in_order <- function(space, parts) {
   if (is.null(keys) || is.null(names(parts))) parts else parts[match(keys, enc2utf8(names(parts)))]
 }
 
-#' Put the lanes of several values after each other
-#' @param each A list of values of lanes, at least one.
+#' Put the sub-environments of several values after each other
+#' @param each A list of values of sub-environments, at least one.
 #' @noRd
-bind_lanes <- function(space, each) {
+bind_sub_envs <- function(space, each) {
   if (has_parts(space)) {
     parts <- lapply(seq_along(space$spaces), function(i) {
-      lapply(each, function(lanes) in_order(space, lanes)[[i]])
+      lapply(each, function(sub_envs) in_order(space, sub_envs)[[i]])
     })
-    map_parts(space, bind_lanes, parts)
+    map_parts(space, bind_sub_envs, parts)
   } else if (!is_stackable(space)) {
     do.call(c, each)
   } else if (any(vapply(each, inherits, NA, "integer64"))) {
     # Beside those that arrived as integer or double, as they fitted.
-    digits <- unlist(lapply(each, function(lanes) whole_text(row_major(lanes))))
+    digits <- unlist(lapply(each, function(sub_envs) whole_text(row_major(sub_envs))))
     n <- length(digits) / prod(space$shape)
     shape_values(whole_from_digits(digits), c(n, space$shape))
   } else if (is.null(dim(each[[1L]]))) {
@@ -100,9 +100,9 @@ bind_lanes <- function(space, each) {
   }
 }
 
-#' Draw values for several lanes
+#' Draw values for several sub-environments
 #' @noRd
-sample_lanes <- function(space, n) {
+sample_sub_envs <- function(space, n) {
   if (inherits(space, "gym_space_discrete") && is.integer(space$n) && is.integer(space$start)) {
     space$start + sample.int(space$n, n, replace = TRUE) - 1L
   } else if (is_stackable(space)) {
@@ -111,21 +111,21 @@ sample_lanes <- function(space, n) {
       draw_numbers(space$dtype, rep(bounds$low, n), rep(bounds$high, n)), c(n, space$shape)
     )
   } else {
-    lanes_from(space, replicate(n, space_sample(space), simplify = FALSE))
+    sub_envs_from(space, replicate(n, space_sample(space), simplify = FALSE))
   }
 }
 
-#' Put the numbers of each lane into a row of a matrix
+#' Put the numbers of each sub-environment into a row of a matrix
 #' @return A matrix, in each row the numbers in row-major order, as Gymnasium flattens
 #'   them.
 #' @noRd
-lane_numbers <- function(lanes) {
-  shape <- dim(lanes)
+sub_env_numbers <- function(sub_envs) {
+  shape <- dim(sub_envs)
   if (length(shape) == 2L) {
-    lanes
+    sub_envs
   } else if (is.null(shape)) {
-    matrix(lanes, ncol = 1L)
+    matrix(sub_envs, ncol = 1L)
   } else {
-    t(matrix(row_major(lanes), ncol = shape[[1L]]))
+    t(matrix(row_major(sub_envs), ncol = shape[[1L]]))
   }
 }

@@ -102,8 +102,8 @@ encode_value <- function(space, value, call) {
 #'   0 as Python does); `edges` and `edge_links` are `NULL` where there are none.
 #' * OneOf: a list of the index of the space, counted from 0, and the value.
 #'
-#' The values of several lanes have the lane first: a vector of whole numbers or of
-#' strings, an array with a dimension more, a Tuple or Dict of such parts, otherwise a
+#' The values of several sub-environments have the sub-environment first: a vector of whole numbers
+#' or of strings, an array with a dimension more, a Tuple or Dict of such parts, otherwise a
 #' list; see [env_reset()].
 #'
 #' Whole numbers are integer where they all fit, double up to 2^53 and
@@ -118,7 +118,7 @@ encode_value <- function(space, value, call) {
 #' as `$position[2]`: the element `position`, and in it the number with index 2.
 #' Indices count from 0, as on the server and in Python, so that the same place
 #' has the same name everywhere: in R it is `value$position[3]`. Only the words
-#' "Lane 3" before a message count from 1, as the argument `lanes` of [env_step()].
+#' "Sub-environment 3" before a message count from 1, as the argument `sub_envs` of [env_step()].
 #'
 #' The distributions are Gymnasium's: uniform between two bounds, exponential
 #' from a single one, normal without any; the length of a sequence is geometric.

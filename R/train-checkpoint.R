@@ -79,21 +79,22 @@ argument_text <- function(name, value) {
   switch(
     name,
     env = paste0(value$env_id, if (!is.null(value$num_envs)) {
-      paste0(" with ", count_of(value$num_envs, "lane"))
+      paste0(" with ", count_of(value$num_envs, "sub-environment"))
     }),
     policy = policy_text(value),
     if (is.numeric(value)) number_text(value) else describe_value(value)
   )
 }
 
-# The server may offer other lanes than it did, and with them other episodes.
-check_same_lanes <- function(path, told, now, call) {
+# The server may offer other sub-environments than it did, and with them other episodes.
+check_same_sub_envs <- function(path, told, now, call) {
   differ <- Filter(function(name) !is_same(told[[name]], now[[name]]), names(now))
   if (length(differ)) {
     lines <- vapply(differ, function(name) {
       what <- switch(
         name, target = "the environment's reward threshold", env_id = "the environment",
-        block = "how many episodes are played at once", num_envs = "how many lanes share a seed"
+        block = "how many episodes are played at once",
+        num_envs = "how many sub-environments share a seed"
       )
       paste0("There ", what, " is ", describe_value(told[[name]]), ", and ",
              describe_value(now[[name]]), " on this server.")
@@ -123,8 +124,8 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
 #'
 #' R's generator too.
 #' @noRd
-resume_rounds <- function(record, saved, lanes, settings, path, call) {
-  check_same_lanes(path, saved$told, told_by_lanes(lanes, settings), call)
+resume_rounds <- function(record, saved, vector_env, settings, path, call) {
+  check_same_sub_envs(path, saved$told, told_by_sub_envs(vector_env, settings), call)
   restore_rounds(record, saved)
   finished <- count_finished(record)
   inform_resumed("Going on from {.path {path}}, with {finished} of {settings$rounds} round{?s}.")
@@ -135,10 +136,10 @@ resume_rounds <- function(record, saved, lanes, settings, path, call) {
 }
 
 # What the environment itself adds to the arguments.
-told_by_lanes <- function(lanes, settings) {
+told_by_sub_envs <- function(vector_env, settings) {
   list(
     target = settings$target, env_id = settings$env_id, num_envs = settings$num_envs,
-    block = lanes$block
+    block = vector_env$block
   )
 }
 
@@ -196,10 +197,10 @@ rest_per_writing <- 9
 #' @param record As [new_rounds()] returns it.
 #' @param started When the search began, less what it took before.
 #' @noRd
-keep_rounds <- function(record, checkpoint, lanes, settings, started, call) {
+keep_rounds <- function(record, checkpoint, vector_env, settings, started, call) {
   write <- function(record) {
     state <- list(
-      arguments = checkpoint$arguments, told = told_by_lanes(lanes, settings),
+      arguments = checkpoint$arguments, told = told_by_sub_envs(vector_env, settings),
       template = settings$policy, record = kept_record(record),
       generator = globalenv()$.Random.seed, elapsed = proc.time()[["elapsed"]] - started,
       finished = record$begun >= record$wanted
@@ -218,7 +219,7 @@ keep_rounds <- function(record, checkpoint, lanes, settings, started, call) {
   failed <- FALSE
   record$after_block <- function(record) {
     began <- proc.time()[["elapsed"]]
-    if (lanes$block == 1L && began < rest_until && record$begun < record$wanted) {
+    if (vector_env$block == 1L && began < rest_until && record$begun < record$wanted) {
       return()
     }
     tryCatch(
@@ -249,7 +250,7 @@ kept_record <- function(record) {
   policies <- record$policies
   needless <- setdiff(seq_len(finished), which.max(record$means[seq_len(finished)]))
   policies[needless] <- list(NULL)
-  columns <- c("seed", "lane", "return", "length", "terminated", "truncated")
+  columns <- c("seed", "sub_env", "return", "length", "terminated", "truncated")
   episodes <- lapply(stats::setNames(nm = columns), function(name) {
     unlist(lapply(record$blocks, function(block) block[[name]]))
   })

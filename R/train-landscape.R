@@ -18,9 +18,9 @@
 #' # The same episodes
 #'
 #' All networks play episodes of the same seeds, so that neighbours differ by their
-#' weights and not by luck. For that each lane must have a seed of its own: an environment
-#' named by its id is made so. One that is given with lanes that share a seed (`"CartPole-v1"`
-#' with `num_envs`, made with its own vector implementation) begins each block of
+#' weights and not by luck. For that each sub-environment must have a seed of its own: an
+#' environment named by its id is made so. One that is given with sub-environments that share a seed
+#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) begins each block of
 #' episodes in the same way, but the networks of a block play different ones; the
 #' element `common` of the result is `FALSE` then.
 #'
@@ -76,15 +76,15 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   check_seed(seed)
   check_flag(progress)
   env <- search$env %||% search$env_id
-  play <- function(lanes) {
+  play <- function(vector_env) {
     with_random_seed(seed, {
       directions <- draw_directions(search$policy$weights)
       plane <- new_plane(search$policy, directions, size, span)
-      play_plane(lanes, plane, search, as.integer(episodes), progress)
+      play_plane(vector_env, plane, search, as.integer(episodes), progress)
     })
   }
-  with_lanes(
-    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_lanes, block = NULL
+  with_vector_env(
+    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_vector_env, block = NULL
   )
 }
 
@@ -143,36 +143,40 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-# So many that playing takes seconds; more gain little, as each lane is stepped alone.
-landscape_lanes <- 128L
+# So many that playing takes seconds; more gain little, as each sub-environment is stepped alone.
+landscape_sub_envs <- 128L
 
 # Each with seeds of its own, so that all networks can play the same episodes.
-make_seeded_lanes <- function(env_id, episodes, client) {
-  n <- as.integer(min(episodes, landscape_lanes))
+make_seeded_vector_env <- function(env_id, episodes, client) {
+  n <- as.integer(min(episodes, landscape_sub_envs))
   make_if_can(env_id, n, "sync", "Disabled", client) %||% gym_make(env_id, client = client)
 }
 
 #' Play the episodes of all points, side by side
 #' @return As [search_landscape()].
 #' @noRd
-play_plane <- function(lanes, plane, search, episodes, progress) {
+play_plane <- function(vector_env, plane, search, episodes, progress) {
   started <- proc.time()[["elapsed"]]
   points <- nrow(plane$grid)
   show <- if (progress) plane_bar(points) else function(finished, best) NULL
   record <- new_rounds(points, episodes, target = NULL, on_round = show)
   record$open <- rep(episodes, points)
-  common <- is.null(lanes$num_envs)
-  seeds <- if (common) draw_environment_seeds(episodes) else lanes$draw_seeds()
+  common <- is.null(vector_env$num_envs)
+  seeds <- if (common) draw_environment_seeds(episodes) else vector_env$draw_seeds()
   begin <- function(block, numbers) {
     point <- round_of(record, numbers)
     list(
-      seeds = if (common) rep_len(seeds[(numbers - 1L) %% episodes + 1L], lanes$block) else seeds,
+      seeds = if (common) {
+        rep_len(seeds[(numbers - 1L) %% episodes + 1L], vector_env$block)
+      } else {
+        seeds
+      },
       policy = candidates_of(plane$policies[unique(point)], match(point, unique(point)))
     )
   }
   interrupted <- FALSE
   tryCatch(
-    play_episodes(lanes, record, begin, search$max_steps),
+    play_episodes(vector_env, record, begin, search$max_steps),
     interrupt = function(cnd) {
       interrupted <<- TRUE
       inform_plane_interrupted(count_finished(record), points)

@@ -66,7 +66,7 @@ count_finished <- function(record) {
 reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
 
 #' Draw the policies of the rounds that begin among some episodes
-#' @return What plays these episodes, for [act_lanes()].
+#' @return What plays these episodes, for [act_sub_envs()].
 #' @noRd
 draw_policies <- function(record, template, episodes) {
   round <- round_of(record, episodes)

@@ -71,7 +71,7 @@ rounds_table <- function(record, episodes, n) {
 #' @param seed A whole number that fixes the fresh episodes and leaves the session's
 #'   generator as it was, or `NULL`, the default, to draw from the session's generator.
 #' @return `as.data.frame()`: a data frame with one row for each episode of the search, in
-#'   their order: `round`, `episode`, `seed`, `lane` (integers),
+#'   their order: `round`, `episode`, `seed`, `sub_env` (integers),
 #'   `return` (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
 #'
 #'   `predict()`: for `n` observations the actions, an integer vector of length `n` (a
@@ -174,7 +174,7 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
   if (type == "action") {
     return(act(policy, observation))
   }
-  values <- observation_lanes(observation, policy$observation_space)$values
+  values <- observation_sub_envs(observation, policy$observation_space)$values
   outputs <- network_outputs(policy, values, call)
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
 }

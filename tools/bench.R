@@ -6,7 +6,8 @@
 #                           and man/figures/bench.png
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
-# tools/in-env Rscript tools/bench.R [quick] [single] [lanes] [search] [memory] runs parts.
+# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [search] [memory] runs
+# parts.
 
 library(gym)
 for (file in c("turns", "workers", "classic", "contenders", "search", "results", "table",
@@ -19,10 +20,10 @@ progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 # `searches`: how often search_random() plays the rounds that the tutorial's way plays once.
 settings <- function(quick) {
   if (quick) {
-    list(turns = 3L, seconds = 0.3, lanes = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,
+    list(turns = 3L, seconds = 0.3, num_envs = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,
          fresh = 1L, steps = 1e5)
   } else {
-    list(turns = 7L, seconds = 0.7, lanes = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
+    list(turns = 7L, seconds = 0.7, num_envs = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
          rounds = 50, fresh = 5L, steps = 1e6)
   }
 }
@@ -35,8 +36,8 @@ bench <- function(parts, quick) {
   started <- now()
   contenders <- c(
     if ("single" %in% parts) single_contenders(setup),
-    if ("lanes" %in% parts) {
-      unlist(lapply(scale$lanes, function(n) lanes_contenders(setup, n)), recursive = FALSE)
+    if ("vector" %in% parts) {
+      unlist(lapply(scale$num_envs, function(n) vector_contenders(setup, n)), recursive = FALSE)
     }
   )
   rows <- rbind(
@@ -97,14 +98,14 @@ report <- function(result, csv, text, figure) {
   lines <- c(table_lines(result$rows), "", goal_lines(result$rows), "", run_lines(result$run))
   writeLines(lines, text)
   cat(lines, sep = "\n")
-  if (all(c("single", "lanes") %in% result$rows$part)) {
+  if (all(c("single", "vector") %in% result$rows$part)) {
     draw_figure(result$rows, result$run, figure)
   }
 }
 
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
-all_parts <- c("single", "lanes", "search", "memory")
+all_parts <- c("single", "vector", "search", "memory")
 parts <- intersect(all_parts, arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts

@@ -34,7 +34,7 @@ def _manylinux(machine: str) -> list[str]:
     ]
 
 
-# By its name in R (see system_name() in R/install-requirements.R): the markers' values, the wheels' tags.
+# By its name in R (system_name()): the markers' values, the wheels' tags.
 # macOS 14 is the oldest that opencv-python-headless still has wheels for.
 SYSTEMS = {
     "linux-x86_64": ("linux", "x86_64", _manylinux("x86_64")),

@@ -56,11 +56,11 @@ fake_observation <- function(space, seed, at) {
   if (length(space$shape) > 1L) array(values, space$shape) else values
 }
 
-# The same with lanes, strict as the server is: only with "sync" may some lanes be stepped
-# and each have a seed, a lane that is done takes no step in mode "Disabled", and starts
-# again otherwise. With "vector_entry_point" a lane's seed follows from the only one and
-# its number.
-fake_lanes <- function(num_envs, mode = "sync",
+# The same with sub-environments, strict as the server is: only with "sync" may some
+# sub-environments be stepped and each have a seed, a sub-environment that is done takes no step in
+# mode "Disabled", and starts again otherwise. With "vector_entry_point" a sub-environment's seed
+# follows from the only one and its number.
+fake_vector_env <- function(num_envs, mode = "sync",
                        autoreset = if (mode == "sync") "Disabled" else "NextStep",
                        reward = function(seed, step, action) 1,
                        ends = function(seed, step, action) step == 3L,
@@ -75,10 +75,10 @@ fake_lanes <- function(num_envs, mode = "sync",
   env$single_observation_space <- observation_space
   env$single_action_space <- action_space
   env$resets <- list()
-  env$lane_steps <- 0L
+  env$sub_env_steps <- 0L
   env$closed <- 0L
-  observe <- function(lanes) {
-    lanes_from(observation_space, lapply(lanes, function(i) {
+  observe <- function(sub_envs) {
+    sub_envs_from(observation_space, lapply(sub_envs, function(i) {
       fake_observation(observation_space, env$seed[[i]], env$at[[i]])
     }))
   }
@@ -90,21 +90,21 @@ fake_lanes <- function(num_envs, mode = "sync",
     env$done <- logical(num_envs)
     observe(seq_len(num_envs))
   }
-  env$step <- function(action, lanes = NULL) {
-    stopifnot(is.null(lanes) || mode == "sync")
-    lanes <- lanes %||% seq_len(num_envs)
-    stopifnot(autoreset != "Disabled" || !any(env$done[lanes]))
-    stopifnot(lanes_given(action_space, action) == length(lanes))
-    env$lane_steps <- env$lane_steps + length(lanes)
-    again <- env$done[lanes]
-    env$at[lanes] <- ifelse(again, 0L, env$at[lanes] + 1L)
-    actions <- lapply(seq_along(lanes), lane_value, space = action_space, lanes = action)
-    each <- function(f) mapply(f, env$seed[lanes], env$at[lanes], actions)
+  env$step <- function(action, which = NULL) {
+    stopifnot(is.null(which) || mode == "sync")
+    sub_envs <- which %||% seq_len(num_envs)
+    stopifnot(autoreset != "Disabled" || !any(env$done[sub_envs]))
+    stopifnot(sub_envs_given(action_space, action) == length(sub_envs))
+    env$sub_env_steps <- env$sub_env_steps + length(sub_envs)
+    again <- env$done[sub_envs]
+    env$at[sub_envs] <- ifelse(again, 0L, env$at[sub_envs] + 1L)
+    actions <- lapply(seq_along(sub_envs), sub_env_value, space = action_space, sub_envs = action)
+    each <- function(f) mapply(f, env$seed[sub_envs], env$at[sub_envs], actions)
     ended <- each(ends) & !again
-    env$done[lanes] <- ended
+    env$done[sub_envs] <- ended
     list(
-      observation = observe(lanes), reward = ifelse(again, 0, each(reward)), done = ended,
-      info = list(), terminated = ended, truncated = logical(length(lanes))
+      observation = observe(sub_envs), reward = ifelse(again, 0, each(reward)), done = ended,
+      info = list(), terminated = ended, truncated = logical(length(sub_envs))
     )
   }
   env$close <- function() {
@@ -127,13 +127,13 @@ scripted_environment <- function(returns, ...) {
   )
 }
 
-# Lanes whose episodes have these returns and lengths, in the order in which they begin,
+# Sub-environments whose episodes have these returns and lengths, in the order in which they begin,
 # block after block. The return comes with the last step.
-scripted_lanes <- function(num_envs, returns, lengths, mode = "sync", ...) {
+scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) {
   block <- -1L
   at <- function(seed) block * num_envs + match(seed, current)
   current <- NULL
-  env <- fake_lanes(
+  env <- fake_vector_env(
     num_envs, mode,
     reward = function(seed, step, action) {
       if (step == lengths[[at(seed)]]) returns[[at(seed)]] else 0
@@ -148,7 +148,7 @@ scripted_lanes <- function(num_envs, returns, lengths, mode = "sync", ...) {
     current <<- env$seed
     observation
   }
-  # Lanes beyond the last episode play along in some modes.
+  # Sub-environments beyond the last episode play along in some modes.
   beyond <- 10L * num_envs
   returns <- c(returns, numeric(beyond))
   lengths <- c(lengths, rep(1L, beyond))

@@ -38,19 +38,19 @@ test_that("a step that was cut at any byte is taken once, as JSON and as tensors
   server <- local_server(allow_module = "odd_environments")
   cutter <- local_cutter(server)
   places <- c(request = 0, answer = 0)
-  for (lanes in list(NULL, 3L)) {
-    env <- local_env("CartPole-v1", seed = 7, num_envs = lanes, client = cutter$client)
-    twin <- local_env("CartPole-v1", seed = 7, num_envs = lanes, client = server)
+  for (sub_envs in list(NULL, 3L)) {
+    env <- local_env("CartPole-v1", seed = 7, num_envs = sub_envs, client = cutter$client)
+    twin <- local_env("CartPole-v1", seed = 7, num_envs = sub_envs, client = server)
     env$reset()
     twin$reset()
     steps <- 0
     play <- function(where, after = "") {
       before <- cutter$tell(where, after)
-      action <- rep(steps %% 2, max(lanes, 1L))
+      action <- rep(steps %% 2, max(sub_envs, 1L))
       out <- env$step(action)
       expect_identical(out, twin$step(action), info = paste(where, after))
       steps <<- steps + 1
-      if (is.null(lanes) && (out$terminated || out$truncated)) {
+      if (is.null(sub_envs) && (out$terminated || out$truncated)) {
         env$reset()
         twin$reset()
       }
@@ -66,7 +66,7 @@ test_that("a step that was cut at any byte is taken once, as JSON and as tensors
       }
     }
     counted <- get_request(server, paste0("/v1/envs/", env$instance_id, "/"))$steps
-    expect_equal(counted, steps * max(lanes, 1L))
+    expect_equal(counted, steps * max(sub_envs, 1L))
   }
   if (nzchar(Sys.getenv("GYM_TEST_CUTS"))) {
     cat(sprintf("\ncuts-r: at %.0f bytes of requests and %.0f of answers, lost or doubled 0\n",

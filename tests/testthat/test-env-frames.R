@@ -81,9 +81,9 @@ test_that("an environment that cannot be drawn is refused before anything is pla
   expect_length(fake$seeds, 0)
 })
 
-test_that("an environment with lanes is refused, and a flag must be one", {
+test_that("an environment with sub-environments is refused, and a flag must be one", {
   env <- local_env("CartPole-v1", num_envs = 2)
-  expect_error(rollout(env, policy_random(), frames = TRUE), "has 2 lanes",
+  expect_error(rollout(env, policy_random(), frames = TRUE), "has 2 sub-environments",
                class = "gym_error_argument")
   expect_error(rollout("CartPole-v1", policy_random(), frames = 1, client = no_client()),
                "`frames` must be TRUE or FALSE", class = "gym_error_argument")

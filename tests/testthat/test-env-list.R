@@ -8,13 +8,13 @@ test_that("who has which environment is a data frame, the oldest first", {
   )
   expect_identical(nrow(none), 0L)
   first <- env_create(server, "CartPole-v1", name = "J\u00fcrgen's \"pole\"")
-  lanes <- gym_make("CartPole-v1", num_envs = 3, name = "three", client = server)
+  sub_envs <- gym_make("CartPole-v1", num_envs = 3, name = "three", client = server)
   third <- gym_make("Pendulum-v1", client = server)
-  lanes$reset()
-  lanes$step(c(0, 0, 1))
+  sub_envs$reset()
+  sub_envs$step(c(0, 0, 1))
   listed <- env_list(server)
   expect_identical(vapply(listed, typeof, ""), vapply(none, typeof, ""))
-  expect_identical(listed$instance_id, c(first, lanes$instance_id, third$instance_id))
+  expect_identical(listed$instance_id, c(first, sub_envs$instance_id, third$instance_id))
   expect_identical(listed$name, c("J\u00fcrgen's \"pole\"", "three", NA))
   expect_identical(listed$env_id, c("CartPole-v1", "CartPole-v1", "Pendulum-v1"))
   expect_identical(listed$num_envs, c(NA, 3L, NA))
@@ -38,23 +38,23 @@ test_that("a name is a short string", {
 })
 
 test_that("a server's limits say what to do about them", {
-  server <- local_server(max_instances = 2, max_num_envs = 4, max_total_lanes = 5)
+  server <- local_server(max_instances = 2, max_num_envs = 4, max_total_sub_envs = 5)
   env <- gym_make("CartPole-v1", num_envs = 4, client = server)
-  error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server), "max-total-lanes",
+  error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server), "max-total-sub-envs",
                         class = "gym_error_http_429")
-  expect_identical(error$code, "too_many_lanes")
+  expect_identical(error$code, "too_many_sub_envs")
   gym_make("CartPole-v1", client = server)
   error <- expect_error(gym_make("CartPole-v1", client = server), "max-instances",
                         class = "gym_error_http_429")
   expect_identical(error$code, "too_many_instances")
   expect_match(conditionMessage(error), "env_list()", fixed = TRUE)
-  # Lanes for a rollout are taken where there is room for them only.
+  # Sub-environments for a rollout are taken where there is room for them only.
   env$close()
   expect_s3_class(rollout("CartPole-v1", policy_random(), episodes = 2, client = server),
                   "gym_rollout")
 })
 
-test_that("a rollout takes one environment where the memory is too little for lanes", {
+test_that("a rollout takes one environment where the memory is too little for sub-environments", {
   server <- local_server(max_memory_mb = 100)
   stacked <- gym_wrap("CartPole-v1", "FrameStackObservation", stack_size = 900) |>
     gym_wrap("FrameStackObservation", stack_size = 80)
@@ -90,7 +90,7 @@ test_that("a call that takes too long fails in time, and the others go on", {
   other <- gym_make("CartPole-v1", client = server)
   many <- gym_make("CartPole-v1", num_envs = 65, vectorization_mode = "async", client = server) |>
     expect_error(class = "gym_error_http_429")
-  expect_identical(many$code, "too_many_lanes")
+  expect_identical(many$code, "too_many_sub_envs")
   slow <- expect_error(
     gym_make("odd_environments:SlowToMake-v0", seconds = 30, client = server),
     class = "gym_error_http_504"

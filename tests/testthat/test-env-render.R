@@ -20,11 +20,11 @@ test_that("a frame follows the environment", {
   expect_false(identical(env$render(), before))
 })
 
-test_that("a frame is that of the lane asked for", {
+test_that("a frame is that of the sub-environment asked for", {
   for (mode in c("sync", "vector_entry_point")) {
     env <- local_env(num_envs = 3, vectorization_mode = mode, seed = 1)
     env$reset()
-    # The carts of the lanes go apart.
+    # The carts of the sub-environments go apart.
     for (i in 1:8) env$step(c(0, 1, 1))
     frames <- lapply(1:3, env$render)
     expect_identical(env$render(), frames[[1]])

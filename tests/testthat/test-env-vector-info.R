@@ -1,7 +1,7 @@
-by_lane <- function(json, n) info_by_lane(from_json(json), n)
+by_sub_env <- function(json, n) info_by_sub_env(from_json(json), n)
 
-test_that("each key has an entry a lane, missing where the lane said nothing", {
-  info <- by_lane('{"x":[0,2,0],"_x":[false,true,false],"ok":[true,false,false],
+test_that("each key has an entry a sub-environment, missing where the sub-environment said nothing", {
+  info <- by_sub_env('{"x":[0,2,0],"_x":[false,true,false],"ok":[true,false,false],
     "_ok":[true,true,false],"word":[null,"b",null],"_word":[false,true,false],
     "half":[0.5,0.0,"NaN"],"_half":[true,false,true]}', 3)
   expect_identical(
@@ -10,8 +10,8 @@ test_that("each key has an entry a lane, missing where the lane said nothing", {
   )
 })
 
-test_that("arrays have the lane first, other values are in a list", {
-  info <- by_lane('{"place":[[0,0],[1,2]],"_place":[false,true],
+test_that("arrays have the sub-environment first, other values are in a list", {
+  info <- by_sub_env('{"place":[[0,0],[1,2]],"_place":[false,true],
     "grid":[[[1,2],[3,4]],[[5,6],[7,8]]],"_grid":[true,true],
     "mixed":[null,{"a":1}],"_mixed":[false,true]}', 2)
   expect_identical(info$place, rbind(c(NA, NA), 1:2))
@@ -19,8 +19,8 @@ test_that("arrays have the lane first, other values are in a list", {
   expect_identical(info$mixed, list(NULL, list(a = 1L)))
 })
 
-test_that("infos inside of infos are by lane too", {
-  info <- by_lane('{"episode":{"r":[9,0],"_r":[true,false],"l":[9,0],"_l":[true,false]},
+test_that("infos inside of infos are by sub-environment too", {
+  info <- by_sub_env('{"episode":{"r":[9,0],"_r":[true,false],"l":[9,0],"_l":[true,false]},
     "_episode":[true,false],"final_info":{"lives":[0,3],"_lives":[false,true]},
     "_final_info":[false,true]}', 2)
   expect_identical(info$episode, list(r = c(9L, NA), l = c(9L, NA)))
@@ -28,8 +28,8 @@ test_that("infos inside of infos are by lane too", {
   expect_named(info, c("episode", "final_info"))
 })
 
-test_that("one lane is still a lane, and what has no mask is told as it is", {
-  info <- by_lane('{"x":[5],"_x":[true],"gone":[null],"_gone":[false],"seed":[1,2],"_free":7}', 1)
+test_that("one sub-environment is still a sub-environment, and what has no mask is told as it is", {
+  info <- by_sub_env('{"x":[5],"_x":[true],"gone":[null],"_gone":[false],"seed":[1,2],"_free":7}', 1)
   expect_identical(info, list(x = 5L, gone = list(NULL), seed = 1:2, `_free` = 7L))
-  expect_identical(by_lane("{}", 3), structure(list(), names = character()))
+  expect_identical(by_sub_env("{}", 3), structure(list(), names = character()))
 })

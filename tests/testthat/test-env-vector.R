@@ -1,6 +1,6 @@
 # Vector environments through a real server.
 
-test_that("lanes through R are the lanes in Python, however they are run", {
+test_that("sub-environments through R are the sub-environments in Python, however they are run", {
   client <- test_client()
   python <- the_session$servers[[client$remote_base]]$python
   cases <- list(
@@ -19,7 +19,7 @@ test_that("lanes through R are the lanes in Python, however they are run", {
     file <- withr::local_tempfile()
     writeLines(vapply(actions, function(a) paste(sprintf("%.17g", a), collapse = " "), ""), lines)
     processx::run(
-      python, c(test_path("reference_lanes.py"), case$id, case$n, case$mode, case$autoreset,
+      python, c(test_path("reference_sub_envs.py"), case$id, case$n, case$mode, case$autoreset,
                 length(actions), file),
       stdin = lines, env = c("current", PYTHONWARNINGS = "ignore")
     )
@@ -41,12 +41,12 @@ test_that("lanes through R are the lanes in Python, however they are run", {
 
 test_that("what was chosen is told, and printed in one line", {
   env <- local_env("CartPole-v1", num_envs = 256)
-  expect_output(print(env), "<gym_env: CartPole-v1, 256 lanes (vector_entry_point, NextStep)>",
+  expect_output(print(env), "<gym_env: CartPole-v1, 256 sub-environments (vector_entry_point, NextStep)>",
                 fixed = TRUE)
   expect_output(print(env), "<Box float32 [256, 4]>", fixed = TRUE)
   expect_equal(env$num_envs, 256)
   one <- local_env("CartPole-v1", num_envs = 1, autoreset_mode = "Disabled")
-  expect_output(print(one), "1 lane (sync, Disabled)", fixed = TRUE)
+  expect_output(print(one), "1 sub-environment (sync, Disabled)", fixed = TRUE)
   one$close()
   expect_output(print(one), "Disabled), closed>", fixed = TRUE)
   single <- local_env("CartPole-v1")
@@ -56,7 +56,7 @@ test_that("what was chosen is told, and printed in one line", {
   expect_output(print(single), "<gym_env: CartPole-v1>", fixed = TRUE)
 })
 
-test_that("the spaces have the lanes first, as the server describes them", {
+test_that("the spaces have the sub-environments first, as the server describes them", {
   env <- local_env("CartPole-v1", num_envs = 3)
   asked <- function(which) {
     new_space(get_request(env$client, paste0("/v1/envs/", env$instance_id, "/", which, "/"))$info)
@@ -78,7 +78,7 @@ test_that("the spaces have the lanes first, as the server describes them", {
   expect_false(observed(env$reset()[1:2, ]))
 })
 
-test_that("each part of a result has a row a lane, with one lane too", {
+test_that("each part of a result has a row a sub-environment, with one sub-environment too", {
   for (n in c(1L, 3L)) {
     env <- local_env("CartPole-v1", num_envs = n, seed = 1)
     expect_identical(dim(env$reset()), c(n, 4L))
@@ -94,7 +94,7 @@ test_that("each part of a result has a row a lane, with one lane too", {
   }
 })
 
-test_that("a seed for each lane is that lane's seed, NA leaves the lane its generator", {
+test_that("a seed for each sub-environment is that sub-environment's seed, NA leaves the sub-environment its generator", {
   seeds <- c(11, 12, 13)
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = seeds)
   single <- local_env("CartPole-v1")
@@ -110,21 +110,21 @@ test_that("a seed for each lane is that lane's seed, NA leaves the lane its gene
   expect_identical(chosen$vectorization_mode, "sync")
 })
 
-test_that("only the lanes that are asked for step, and have rows", {
+test_that("only the sub-environments that are asked for step, and have rows", {
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   twin <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   env$reset()
   twin$reset()
-  some <- env$step(c(1, 0), lanes = c(1, 3))
+  some <- env$step(c(1, 0), which = c(1, 3))
   all <- twin$step(c(1, 1, 0))
   expect_identical(some$observation, all$observation[c(1, 3), ])
   expect_identical(some$reward, c(1, 1))
   expect_identical(some$done, c(FALSE, FALSE))
-  expect_identical(env$step(1, lanes = 2)$observation, all$observation[2, , drop = FALSE])
-  expect_identical(env$step(c(0, 0, 0), lanes = 1:3), twin$step(c(0, 0, 0)))
+  expect_identical(env$step(1, which = 2)$observation, all$observation[2, , drop = FALSE])
+  expect_identical(env$step(c(0, 0, 0), which = 1:3), twin$step(c(0, 0, 0)))
 })
 
-test_that("a mask resets only its lanes", {
+test_that("a mask resets only its sub-environments", {
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   env$reset()
   before <- env$step(c(1, 1, 1))$observation
@@ -133,14 +133,14 @@ test_that("a mask resets only its lanes", {
   expect_false(identical(after[2, ], before[2, ]))
 })
 
-test_that("a lane that ends begins again in the same step, and its last observation is kept", {
+test_that("a sub-environment that ends begins again in the same step, and its last observation is kept", {
   env <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "SameStep", seed = 1)
   single <- local_env("CartPole-v1")
   env$reset(seed = c(1, 2, 3))
   single$reset(seed = 1)
-  # The first lane falls soon, the others are held up longer.
+  # The first sub-environment falls soon, the others are held up longer.
   repeat {
-    out <- env$step(c(1, 0, 1), lanes = 1:3)
+    out <- env$step(c(1, 0, 1), which = 1:3)
     last <- single$step(1)
     if (any(out$done)) break
     expect_null(out$info$final_obs)
@@ -154,7 +154,7 @@ test_that("a lane that ends begins again in the same step, and its last observat
   expect_false(any(startsWith(names(out$info), "_")))
 })
 
-test_that("with autoreset disabled a lane that is done wants a reset before it steps", {
+test_that("with autoreset disabled a sub-environment that is done wants a reset before it steps", {
   env <- local_env("CartPole-v1", num_envs = 2, autoreset_mode = "Disabled")
   twin <- local_env("CartPole-v1", num_envs = 2, autoreset_mode = "Disabled")
   env$reset(seed = c(1, 2))
@@ -168,9 +168,9 @@ test_that("with autoreset disabled a lane that is done wants a reset before it s
     if (any(out$done)) break
   }
   expect_identical(out$done, c(TRUE, FALSE))
-  error <- expect_error(env$step(c(0, 0)), "lane 0 ended", class = "gym_error_http_400")
+  error <- expect_error(env$step(c(0, 0)), "sub-environment 0 ended", class = "gym_error_http_400")
   expect_identical(error$code, "reset_needed")
-  expect_identical(env$step(0, lanes = 2), twin$step(0, lanes = 2))
+  expect_identical(env$step(0, which = 2), twin$step(0, which = 2))
   env$reset(mask = out$done)
   expect_equal(env$step(c(0, 0))$reward, c(1, 1))
 })
@@ -185,7 +185,7 @@ test_that("with autoreset in the next step no warning comes of stepping on", {
   expect_true(0 %in% out$reward)
 })
 
-test_that("lanes in processes of their own give what lanes in one process give", {
+test_that("sub-environments in processes of their own give what sub-environments in one process give", {
   sync <- local_env("CartPole-v1", num_envs = 2, vectorization_mode = "sync")
   async <- local_env("CartPole-v1", num_envs = 2, vectorization_mode = "async")
   expect_identical(async$vectorization_mode, "async")
@@ -193,7 +193,7 @@ test_that("lanes in processes of their own give what lanes in one process give",
   for (i in 1:30) expect_identical(async$step(c(1, 0)), sync$step(c(1, 0)))
 })
 
-test_that("a number of lanes that is none is refused before anything is made", {
+test_that("a number of sub-environments that is none is refused before anything is made", {
   client <- test_client()
   before <- length(env_list_all(client))
   for (bad in list(0, -1, 2.5, NA, NaN, Inf, "2", c(2, 3), TRUE, list(2))) {
@@ -204,11 +204,11 @@ test_that("a number of lanes that is none is refused before anything is made", {
   }
   error <- expect_error(gym_make("CartPole-v1", num_envs = 1e6, client = client), "1000000",
                         class = "gym_error_http_429")
-  expect_identical(error$code, "too_many_lanes")
+  expect_identical(error$code, "too_many_sub_envs")
   expect_length(env_list_all(client), before)
 })
 
-test_that("modes that are none, or are for lanes that are not there, are refused", {
+test_that("modes that are none, or are for sub-environments that are not there, are refused", {
   client <- test_client()
   make <- function(...) gym_make("CartPole-v1", ..., client = client)
   for (bad in list("fast", "Sync", NA, 1, c("sync", "async"))) {
@@ -230,7 +230,7 @@ test_that("modes that are none, or are for lanes that are not there, are refused
   expect_match(error$hint, "sync")
 })
 
-test_that("seeds, masks and lanes that do not fit the lanes are refused, and no lane moves", {
+test_that("seeds, masks and sub-environments that do not fit the sub-environments are refused, and no sub-environment moves", {
   make <- function() {
     env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1,
                      frame = parent.frame(2))
@@ -248,16 +248,16 @@ test_that("seeds, masks and lanes that do not fit the lanes are refused, and no 
     expect_error(env$reset(mask = bad), "mask", class = "gym_error_argument")
   }
   for (bad in list(0, 4, c(1, 1), c(2, 1), 1.5, NA, "1", integer(), c(TRUE, FALSE, TRUE), Inf)) {
-    expect_error(env$step(1, lanes = bad), "lanes", class = "gym_error_argument")
+    expect_error(env$step(1, which = bad), "which", class = "gym_error_argument")
   }
   expect_identical(env$step(c(1, 0, 1)), twin$step(c(1, 0, 1)))
   single <- local_env("CartPole-v1")
   single$reset()
   expect_error(single$reset(mask = TRUE), "num_envs", class = "gym_error_argument")
-  expect_error(single$step(1, lanes = 1), "num_envs", class = "gym_error_argument")
+  expect_error(single$step(1, which = 1), "which", class = "gym_error_argument")
 })
 
-test_that("actions that do not fit the lanes are refused with the lane, and no lane moves", {
+test_that("actions that do not fit the sub-environments are refused with the sub-environment, and no sub-environment moves", {
   make <- function(id, mode, frame) {
     env <- local_env(id, num_envs = 4, vectorization_mode = mode, frame = frame)
     env$reset(seed = 1)
@@ -268,7 +268,7 @@ test_that("actions that do not fit the lanes are refused with the lane, and no l
     env <- make("CartPole-v1", mode, frame)
     twin <- make("CartPole-v1", mode, frame)
     for (bad in list(c(0, 1, NA, 0), c(0, 1, 0.5, 0))) {
-      expect_error(env$step(bad), "Lane 3: .*<Discrete 2>", class = "gym_error_space")
+      expect_error(env$step(bad), "Sub-environment 3: .*<Discrete 2>", class = "gym_error_space")
     }
     for (bad in list(1, c(0, 1, 1), rep(1, 5))) {
       expect_error(env$step(bad), paste("4, not", length(bad)), class = "gym_error_space")
@@ -276,7 +276,7 @@ test_that("actions that do not fit the lanes are refused with the lane, and no l
     for (bad in list(NULL, data.frame(a = rep(1, 4)), matrix(1, 4, 1), list(1, 1, 1, 1))) {
       expect_error(env$step(bad), class = "gym_error_space")
     }
-    # Bounds are the server's, which counts lanes from 0.
+    # Bounds are the server's, which counts sub-environments from 0.
     expect_error(env$step(c(0, 1, 2, 0)), "2 at [2]", fixed = TRUE, class = "gym_error_space")
     expect_identical(env$step(c(1, 0, 1, 0)), twin$step(c(1, 0, 1, 0)))
   }
@@ -284,7 +284,7 @@ test_that("actions that do not fit the lanes are refused with the lane, and no l
   twin <- make("Pendulum-v1", "sync", frame)
   expect_error(env$step(matrix(0, 3, 1)), "4, not 3", class = "gym_error_space")
   expect_error(env$step(matrix(0, 4, 2)), "4 x 1", class = "gym_error_space")
-  expect_error(env$step(c(0, 0, NA, 0)), "Lane 3", class = "gym_error_space")
+  expect_error(env$step(c(0, 0, NA, 0)), "Sub-environment 3", class = "gym_error_space")
   expect_error(env$step(c(0, 0, 0, NaN)), "[3]", fixed = TRUE, class = "gym_error_space")
   expect_identical(env$step(c(0.5, 1, -1, 0)), twin$step(matrix(c(0.5, 1, -1, 0))))
   expect_identical(env$step(c(-3, 3, 0, 2)), twin$step(c(-2, 2, 0, 2)))
@@ -295,7 +295,7 @@ test_that("what an implementation cannot do is refused, and says what can", {
   env$reset(seed = 1)
   for (call in list(
     function() env$reset(seed = 1:2), function() env$reset(mask = c(TRUE, FALSE)),
-    function() env$step(1, lanes = 2)
+    function() env$step(1, which = 2)
   )) {
     error <- expect_error(call(), class = "gym_error_http_400")
     expect_identical(error$code, "not_supported")
@@ -312,7 +312,7 @@ test_that("a step before the first reset is an error, and a closed environment s
   expect_error(env$step(c(0, 1)), "was closed", class = "gym_error_argument")
 })
 
-test_that("lanes travel as tensors where their space has them", {
+test_that("sub-environments travel as tensors where their space has them", {
   env <- local_env("CartPole-v1", num_envs = 2)
   instance <- known_instance(env$client, env$instance_id)
   expect_true(instance$takes_tensors)
@@ -322,26 +322,26 @@ test_that("lanes travel as tensors where their space has them", {
   expect_false(travels_as_tensors(new_space(list(name = "Tuple", spaces = list())), 2))
 })
 
-test_that("the info of a reset is by lane", {
+test_that("the info of a reset is by sub-environment", {
   skip_if_not(env_registry(test_client(), "FrozenLake-v1")$available[1], "the extra toy-text")
   env <- local_env("FrozenLake-v1", num_envs = 2)
   both <- env$reset(return_info = TRUE)
   expect_identical(both, list(observation = c(0L, 0L), info = list(prob = c(1L, 1L))))
 })
 
-test_that("the classic calls play lanes", {
+test_that("the classic calls play sub-environments", {
   client <- test_client()
   id <- env_create(client, "CartPole-v1", seed = 1, num_envs = 2, vectorization_mode = "sync")
   withr::defer(env_close(client, id))
   expect_identical(env_list_all(client)[[id]], "CartPole-v1")
   expect_identical(dim(env_reset(client, id)), c(2L, 4L))
   expect_length(env_step(client, id, c(1, 0))$reward, 2)
-  expect_length(env_step(client, id, 1, lanes = 2)$reward, 1)
+  expect_length(env_step(client, id, 1, which = 2)$reward, 1)
   expect_identical(dim(env_reset(client, id, mask = c(TRUE, FALSE))), c(2L, 4L))
   expect_identical(env_action_space_info(client, id)$nvec, c(2L, 2L))
 })
 
-test_that("kwargs and wrappers reach every lane", {
+test_that("kwargs and wrappers reach every sub-environment", {
   env <- local_env("CartPole-v1", num_envs = 2, sutton_barto_reward = TRUE)
   env$reset()
   expect_identical(env$step(c(1, 1))$reward, c(0, 0))
@@ -354,11 +354,11 @@ test_that("kwargs and wrappers reach every lane", {
   expect_identical(short$vectorization_mode, "sync")
 })
 
-test_that("a wrong action of some lanes is named by its lane", {
+test_that("a wrong action of some sub-environments is named by its sub-environment", {
   env <- local_env("FrozenLake-v1", num_envs = 5, autoreset_mode = "Disabled")
   env$reset()
-  error <- expect_error(env$step(c(0, NA), lanes = c(2, 4)), "Lane 4", class = "gym_error_space")
-  expect_identical(error$lane, 4)
+  error <- expect_error(env$step(c(0, NA), which = c(2, 4)), "Sub-environment 4", class = "gym_error_space")
+  expect_identical(error$sub_env, 4)
 })
 
 test_that("by default the step after an end begins the next episode, without reward or end", {

@@ -63,7 +63,7 @@ test_that("an environment made for people opens its page when it is made", {
   expect_match(seen$addresses, env$instance_id)
   env$reset()
   env_step(env$client, env$instance_id, 1, render = TRUE)
-  lanes <- local_env(render_mode = "human", num_envs = 2)
+  sub_envs <- local_env(render_mode = "human", num_envs = 2)
   expect_length(seen$addresses, 2)
   local_env(render_mode = "rgb_array")
   expect_length(seen$addresses, 2)

@@ -105,7 +105,7 @@ test_that("a step's answer of a vector environment has an element for each", {
   )
   for (field in wrong) expect_wrong(step(field), names(field))
   for (final in c("[2]", "[-1]", "[0,0]", '["a"]', "[0.5]")) {
-    expect_wrong(step(final_lanes = final, final_obs = '["a"]'), "final_lanes")
+    expect_wrong(step(final_sub_envs = final, final_obs = '["a"]'), "final_sub_envs")
   }
 })
 

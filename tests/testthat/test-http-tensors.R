@@ -159,17 +159,17 @@ test_that("metadata are left unread only where they are what was expected", {
   others <- c(
     paste0('{"info":"{}",', sprintf(echo, 8)),
     paste0('{"info":"{\\"a\\":1}",', sprintf(echo, 7)),
-    paste0('{"info":"{}","final_lanes":"[0]",', sprintf(echo, 7))
+    paste0('{"info":"{}","final_sub_envs":"[0]",', sprintf(echo, 7))
   )
   for (metadata in others) {
     expect_type(read_tensors(file_with(metadata), expected = bare_metadata(sent))$metadata, "list")
   }
   expect_equal(tensors_answer(file_with(others[[1]]), NULL, sent)$request$number, 8)
   expect_equal(tensors_answer(file_with(others[[2]]), NULL, sent)$info, list(a = 1))
-  expect_equal(tensors_answer(file_with(others[[3]]), NULL, sent)$final_lanes, list(0))
+  expect_equal(tensors_answer(file_with(others[[3]]), NULL, sent)$final_sub_envs, list(0))
 })
 
-test_that("the server's answer to a step of lanes is what is expected", {
+test_that("the server's answer to a step of sub-environments is what is expected", {
   env <- local_env(num_envs = 2)
   env$reset()
   line <- free_line(env$client)

@@ -13,14 +13,14 @@ expect_known_returns <- function(returns) {
   expect_true(all(abs(share - known$share) < 3.5 * sqrt(known$share * (1 - known$share) / n)))
 }
 
-test_that("CartPole: returns in lanes are distributed as those of one episode after the other", {
+test_that("CartPole: returns in sub-environments are distributed as those of one episode after the other", {
   skip_unless_all()
   client <- test_client()
   play <- function(env, episodes, seed) {
     rollout(env, policy_random(), episodes, seed = seed, client = client)$episodes$return
   }
   many <- play("CartPole-v0", 2000, 1)
-  # As few as there are lanes, where favouring short episodes would show most.
+  # As few as there are sub-environments, where favouring short episodes would show most.
   few <- unlist(lapply(1:8, function(seed) play("CartPole-v0", 250, seed)))
   apart <- play(
     local_env("CartPole-v0", num_envs = 16, vectorization_mode = "sync", client = client), 500, 1

@@ -5,8 +5,8 @@ by_action <- function(seed, step, action) seed %% 3 + 10 * action
 
 every_kind <- function(num_envs, ...) {
   list(
-    fake_lanes(num_envs, "sync", ...), fake_lanes(num_envs, "sync", "NextStep", ...),
-    fake_lanes(num_envs, "async", ...), fake_lanes(num_envs, "vector_entry_point", ...)
+    fake_vector_env(num_envs, "sync", ...), fake_vector_env(num_envs, "sync", "NextStep", ...),
+    fake_vector_env(num_envs, "async", ...), fake_vector_env(num_envs, "vector_entry_point", ...)
   )
 }
 
@@ -30,14 +30,14 @@ one_by_one <- function(seeds, policy, ...) {
   )
 }
 
-test_that("each lane plays one episode of a block, from its reset to its end", {
+test_that("each sub-environment plays one episode of a block, from its reset to its end", {
   for (env in every_kind(4, ends = of_some_length)) {
     episodes <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
-    expect_identical(episodes$lane, c(1:4, 1:4, 1:2))
+    expect_identical(episodes$sub_env, c(1:4, 1:4, 1:2))
     expect_length(env$resets, 3)
     expect_true(all(episodes$terminated))
     seeds <- if (env$vectorization_mode == "vector_entry_point") {
-      episodes$seed %% 1e8 + 17L * episodes$lane
+      episodes$seed %% 1e8 + 17L * episodes$sub_env
     } else {
       episodes$seed
     }
@@ -45,19 +45,19 @@ test_that("each lane plays one episode of a block, from its reset to its end", {
   }
 })
 
-test_that("an episode is the same in a lane and alone", {
+test_that("an episode is the same in a sub-environment and alone", {
   set.seed(1)
   policy <- policy_network()
-  env <- fake_lanes(5, ends = of_some_length, reward = by_action)
+  env <- fake_vector_env(5, ends = of_some_length, reward = by_action)
   episodes <- rollout(env, policy, episodes = 23, seed = 2)$episodes
   alone <- one_by_one(episodes$seed, policy, ends = of_some_length, reward = by_action)
   expect_identical(episodes$return, alone$return)
   expect_identical(episodes$length, alone$length)
 })
 
-test_that("lanes of every kind play the same episodes from the same seeds", {
+test_that("sub-environments of every kind play the same episodes from the same seeds", {
   play <- function(mode, autoreset) {
-    env <- fake_lanes(5, mode, autoreset, ends = of_some_length, reward = by_action)
+    env <- fake_vector_env(5, mode, autoreset, ends = of_some_length, reward = by_action)
     rollout(env, policy_random(), episodes = 23, seed = 2, steps = TRUE)
   }
   wanted <- play("sync", "Disabled")
@@ -66,23 +66,23 @@ test_that("lanes of every kind play the same episodes from the same seeds", {
   expect_identical(play("async", "SameStep"), wanted)
 })
 
-test_that("a lane that has ended takes no further step where it need not", {
-  env <- fake_lanes(4, ends = of_some_length)
+test_that("a sub-environment that has ended takes no further step where it need not", {
+  env <- fake_vector_env(4, ends = of_some_length)
   played <- rollout(env, policy_random(), episodes = 10, seed = 1)
-  expect_identical(env$lane_steps, sum(played$episodes$length))
+  expect_identical(env$sub_env_steps, sum(played$episodes$length))
 })
 
-test_that("an episode in lanes with a single seed can be begun again by seed and lane", {
-  env <- fake_lanes(4, "vector_entry_point", ends = of_some_length)
+test_that("an episode in sub-environments with a single seed can be begun again by seed and sub-environment", {
+  env <- fake_vector_env(4, "vector_entry_point", ends = of_some_length)
   played <- rollout(env, policy_random(), episodes = 10, seed = 1, steps = TRUE)
   expect_identical(played$num_envs, 4L)
   first <- played$steps[played$steps$step == 1, 3:6]
   for (i in 1:10) {
     observation <- env$reset(seed = played$episodes$seed[i])
-    expect_identical(observation[played$episodes$lane[i], ], unlist(first[i, ], use.names = FALSE))
+    expect_identical(observation[played$episodes$sub_env[i], ], unlist(first[i, ], use.names = FALSE))
   }
   # Elsewhere the seed is enough.
-  expect_null(rollout(fake_lanes(4), policy_random())$num_envs)
+  expect_null(rollout(fake_vector_env(4), policy_random())$num_envs)
 })
 
 test_that("the steps are those of one episode after the other", {
@@ -96,13 +96,13 @@ test_that("the steps are those of one episode after the other", {
     expect_identical(steps$action, act(played$policy, unname(as.matrix(steps[3:6]))))
     seed <- played$episodes$seed[steps$episode]
     if (env$vectorization_mode == "vector_entry_point") {
-      seed <- seed %% 1e8 + 17L * played$episodes$lane[steps$episode]
+      seed <- seed %% 1e8 + 17L * played$episodes$sub_env[steps$episode]
     }
     expect_identical(steps$obs_1, sin(seed %% 1000 + steps$step))
   }
 })
 
-test_that("max_steps cuts all lanes short that still play", {
+test_that("max_steps cuts all sub-environments short that still play", {
   for (env in every_kind(4, ends = of_some_length)) {
     whole <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
     cut <- rollout(env, policy_random(), episodes = 10, seed = 1, max_steps = 3, steps = TRUE)
@@ -129,7 +129,7 @@ test_that("a seed begins the same episodes whatever policy plays them", {
   }
 })
 
-test_that("observations and actions of every shape have a row for each lane that plays", {
+test_that("observations and actions of every shape have a row for each sub-environment that plays", {
   array_space <- box_space(rep(-1, 6), rep(1, 6), shape = c(2L, 3L))
   for (env in every_kind(4, ends = of_some_length, observation_space = array_space,
                          action_space = array_space)) {
@@ -154,14 +154,14 @@ test_that("observations and actions of every shape have a row for each lane that
   }
 })
 
-test_that("ended lanes that cannot be left alone and take no step are refused", {
-  env <- fake_lanes(2, "async", "Disabled")
+test_that("ended sub-environments that cannot be left alone and take no step are refused", {
+  env <- fake_vector_env(2, "async", "Disabled")
   expect_error(rollout(env, policy_random()), "\"Disabled\".*NextStep",
                class = "gym_error_argument")
   expect_length(env$resets, 0)
 })
 
 test_that("an error in the middle is the error", {
-  env <- fake_lanes(4)
+  env <- fake_vector_env(4)
   expect_error(rollout(env, function(observation) stop("no idea")), "no idea")
 })

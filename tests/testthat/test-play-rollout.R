@@ -12,7 +12,7 @@ test_that("the table of episodes has the promised columns and types", {
   expect_s3_class(played, "gym_rollout")
   expect_identical(
     vapply(played$episodes, typeof, ""),
-    c(episode = "integer", seed = "integer", lane = "integer", return = "double",
+    c(episode = "integer", seed = "integer", sub_env = "integer", return = "double",
       length = "integer", terminated = "logical", truncated = "logical")
   )
   expect_identical(played$episodes$episode, 1:2)
@@ -98,7 +98,7 @@ test_that("a function is asked about the episodes that still play", {
     rows <<- c(rows, nrow(observation))
     rep(0L, nrow(observation))
   }
-  rollout(scripted_lanes(3, c(1, 1, 1), c(1L, 3L, 2L)), count_rows, episodes = 3)
+  rollout(scripted_vector_env(3, c(1, 1, 1), c(1L, 3L, 2L)), count_rows, episodes = 3)
   expect_identical(utils::tail(rows, 3), 3:1)
 })
 
@@ -231,7 +231,7 @@ first_observations <- function(played) {
   unname(as.matrix(played$steps[played$steps$step == 1, 3:6]))
 }
 
-test_that("CartPole: an episode can be begun again by its seed, in lanes by its lane, too", {
+test_that("CartPole: an episode can be begun again by its seed, in sub-environments by its sub-environment, too", {
   env <- local_env("CartPole-v1")
   played <- rollout(env, policy_random(), 3, seed = 1, steps = TRUE)
   expect_identical(env$reset(seed = played$episodes$seed[2]), first_observations(played)[2, ])
@@ -242,30 +242,30 @@ test_that("CartPole: an episode can be begun again by its seed, in lanes by its 
   for (i in c(2, 299)) {
     episode <- played$episodes[i, ]
     expect_identical(
-      env$reset(seed = episode$seed)[episode$lane, ], first_observations(played)[i, ]
+      env$reset(seed = episode$seed)[episode$sub_env, ], first_observations(played)[i, ]
     )
   }
 })
 
-test_that("where lanes have seeds of their own, a single environment plays an episode again", {
+test_that("where sub-environments have seeds of their own, a single environment plays an episode again", {
   client <- test_client()
   skip_if_not(env_registry(client, "LunarLander-v3")$available, "the extra box2d")
   set.seed(1)
   policy <- policy_network(c(8, 4, 4))
   played <- rollout("LunarLander-v3", policy, 20, seed = 1, client = client)
   expect_null(played$num_envs)
-  expect_identical(played$episodes$lane, c(1:16, 1:4))
+  expect_identical(played$episodes$sub_env, c(1:16, 1:4))
   env <- local_env("LunarLander-v3")
   alone <- rollout(env, policy, 20, seed = 1)
   expect_identical(alone$episodes$seed, played$episodes$seed)
   expect_identical(alone$episodes$return, played$episodes$return)
 })
 
-test_that("environments of every implementation given with lanes are played as they are", {
+test_that("environments of every implementation given with sub-environments are played as they are", {
   for (mode in c("vector_entry_point", "sync", "async")) {
     env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = mode)
     played <- rollout(env, policy_random(), 7, seed = 1)
-    expect_identical(played$episodes$lane, c(1:3, 1:3, 1L), info = mode)
+    expect_identical(played$episodes$sub_env, c(1:3, 1:3, 1L), info = mode)
     expect_identical(played$num_envs, if (mode == "vector_entry_point") 3L, info = mode)
   }
   same <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "SameStep")
@@ -277,10 +277,10 @@ test_that("environments of every implementation given with lanes are played as t
 test_that("a vector implementation that plays another game is not taken for an id", {
   client <- test_client()
   skip_if_not(isTRUE(env_registry(client, "ALE/Pong-v5")$available[1]), "the extra atari")
-  lanes <- make_lanes("ALE/Pong-v5", 1, client)
-  withr::defer(lanes$close())
-  expect_identical(lanes$vectorization_mode, "sync")
-  expect_identical(lanes$single_observation_space$shape, c(210L, 160L, 3L))
+  sub_envs <- make_vector_env("ALE/Pong-v5", 1, client)
+  withr::defer(sub_envs$close())
+  expect_identical(sub_envs$vectorization_mode, "sync")
+  expect_identical(sub_envs$single_observation_space$shape, c(210L, 160L, 3L))
 })
 
 test_that("an environment that was made is closed, a given one is not, also after an error", {
@@ -331,13 +331,13 @@ test_that("Blackjack: observations with several parts have named columns", {
                "cannot observe <Tuple", class = "gym_error_argument")
 })
 
-test_that("a server that allows fewer lanes plays one episode after the other", {
+test_that("a server that allows fewer sub-environments plays one episode after the other", {
   server <- local_server(max_num_envs = 8)
   played <- rollout("CartPole-v1", policy_random(), 9, seed = 1, client = server)
-  expect_identical(played$episodes$lane, rep(1L, 9))
+  expect_identical(played$episodes$sub_env, rep(1L, 9))
   expect_null(played$num_envs)
   few <- rollout("CartPole-v1", policy_random(), 5, seed = 1, client = server)
-  expect_identical(few$episodes$lane, 1:5)
+  expect_identical(few$episodes$sub_env, 1:5)
   expect_length(env_list_all(server), 0)
 })
 
@@ -374,13 +374,13 @@ test_that("an environment of one's own whose step lacks something is refused at 
   expect_match(refusal(with(reward = numeric())), "`reward` .* must be a number")
 })
 
-test_that("an environment of one's own with lanes says how each of its episodes stands", {
+test_that("an environment of one's own with sub-environments says how each of its episodes stands", {
   for (mode in c("sync", "vector_entry_point")) {
-    env <- fake_lanes(3, mode)
+    env <- fake_vector_env(3, mode)
     step <- env$step
     env$step <- function(...) utils::modifyList(step(...), list(truncated = FALSE))
     expect_error(rollout(env, policy_random(), 3),
-                 "`truncated` .* must be TRUE or FALSE for each of 3 lanes, not FALSE",
+                 "`truncated` .* must be TRUE or FALSE for each of 3 sub-environments, not FALSE",
                  class = "gym_error_argument")
   }
 })

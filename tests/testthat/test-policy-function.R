@@ -11,14 +11,14 @@ test_that("a function is asked about a matrix, also when there is one observatio
                "one action for the one observation, not 2 actions", class = "gym_error_argument")
 })
 
-test_that("a rollout asks for all lanes that play at once", {
+test_that("a rollout asks for all sub-environments that play at once", {
   rows <- integer()
   count <- function(observation) {
     rows <<- c(rows, nrow(observation))
     follow_pole(observation)
   }
   lengths <- function(seed, step, action) step == 1L + seed %% 3L
-  played <- rollout(fake_lanes(5, ends = lengths), count, episodes = 5, seed = 1)
+  played <- rollout(fake_vector_env(5, ends = lengths), count, episodes = 5, seed = 1)
   # First about one, to see whether it can.
   expect_identical(rows, c(1L, vapply(seq_len(max(played$episodes$length)), function(step) {
     sum(played$episodes$length >= step)
@@ -35,7 +35,7 @@ test_that("actions of one number may be a vector, a column or logical", {
     function(observation) as.numeric(observation[, 3] > 0)
   )
   play <- function(policy, ...) {
-    rollout(fake_lanes(3, ...), policy, episodes = 5, seed = 1, steps = TRUE)$steps
+    rollout(fake_vector_env(3, ...), policy, episodes = 5, seed = 1, steps = TRUE)$steps
   }
   wanted <- play(follow_pole)
   for (policy in discrete) {
@@ -52,7 +52,7 @@ test_that("actions of one number may be a vector, a column or logical", {
 
 test_that("one action for many observations is refused, saying what came and how to write it", {
   for_one <- function(observation) as.integer(observation[3] > 0)
-  cnd <- expect_error(rollout(fake_lanes(5), for_one, 5), class = "gym_error_argument")
+  cnd <- expect_error(rollout(fake_vector_env(5), for_one, 5), class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "for each of 5 observations, not 1 action.", fixed = TRUE)
   expect_match(conditionMessage(cnd), "`observation[, 3]`", fixed = TRUE)
   expect_identical(as.character(cnd$call[[1]]), "rollout")
@@ -70,16 +70,16 @@ test_that("observations and actions with parts have them batched, in any order o
   space <- new_space(describe_dict(
     a = describe_box(c(-1, -1), c(1, 1)), b = list(name = "Discrete", n = 3L, dtype = "int64")
   ))
-  lanes <- list(action_space = space, observation_space = space)
+  sub_envs <- list(action_space = space, observation_space = space)
   actions <- list(b = c(1, 2), a = rbind(1:2, 3:4))
-  expect_identical(lane_actions(actions, 2L, lanes), list(a = rbind(1:2, 3:4), b = c(1, 2)))
-  expect_error(lane_actions(actions["a"], 2L, lanes),
+  expect_identical(sub_env_actions(actions, 2L, sub_envs), list(a = rbind(1:2, 3:4), b = c(1, 2)))
+  expect_error(sub_env_actions(actions["a"], 2L, sub_envs),
                "each of 2 observations, not a list of length 1", class = "gym_error_argument")
-  expect_error(lane_actions(actions, 3L, lanes), "each of 3 observations, not 2 actions",
+  expect_error(sub_env_actions(actions, 3L, sub_envs), "each of 3 observations, not 2 actions",
                class = "gym_error_argument")
 })
 
-test_that("policies of other classes are asked by their own method, in lanes too", {
+test_that("policies of other classes are asked by their own method, in sub-environments too", {
   registerS3method("act", "follower", function(policy, observation, ...) follow_pole(observation),
                    envir = asNamespace("gym"))
   for (follower in list(
@@ -88,7 +88,7 @@ test_that("policies of other classes are asked by their own method, in lanes too
     # One that is a function as well is not called as one.
     structure(function(observation) stop(), class = c("follower", "function"))
   )) {
-    played <- rollout(fake_lanes(3), follower, episodes = 5, steps = TRUE)
+    played <- rollout(fake_vector_env(3), follower, episodes = 5, steps = TRUE)
     expect_identical(played$steps$action, as.integer(played$steps$obs_3 > 0))
   }
   follower <- structure(list(), class = "follower")
@@ -104,8 +104,8 @@ test_that("policies of other classes are asked by their own method, in lanes too
 
 test_that("a function of a class without a method of its own is a function", {
   kept <- structure(follow_pole, class = c("kept", "function"))
-  expect_identical(rollout(fake_lanes(3), kept, 5, seed = 1)$episodes,
-                   rollout(fake_lanes(3), follow_pole, 5, seed = 1)$episodes)
+  expect_identical(rollout(fake_vector_env(3), kept, 5, seed = 1)$episodes,
+                   rollout(fake_vector_env(3), follow_pole, 5, seed = 1)$episodes)
 })
 
 test_that("a function without an argument is refused before anything is made", {
@@ -121,17 +121,17 @@ test_that("a function that cannot be asked about one observation fails before th
   drops <- function(observation) {
     as.integer(observation[seq_len(nrow(observation)), ][, 3] > 0)
   }
-  env <- fake_lanes(3, ends = function(seed, step, action) step == 1L + seed %% 3L)
+  env <- fake_vector_env(3, ends = function(seed, step, action) step == 1L + seed %% 3L)
   cnd <- expect_error(rollout(env, drops, 3, seed = 1), class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "asked about one observation, before the first step")
   expect_match(conditionMessage(cnd$parent), "number of dimensions")
   own <- function(observation) rlang::abort("no", class = "my_stop")
   expect_error(rollout(env, own, 3), class = "my_stop")
-  expect_identical(env$lane_steps, 0L)
+  expect_identical(env$sub_env_steps, 0L)
   all_same <- function(observation) rep(1L, max(nrow(observation), 2L))
   expect_error(rollout(env, all_same, 3), "for the one observation, not 2 actions",
                class = "gym_error_argument")
-  expect_identical(env$lane_steps, 0L)
+  expect_identical(env$sub_env_steps, 0L)
 })
 
 test_that("asking a function beforehand moves no generator and is done once a rollout", {
@@ -140,7 +140,7 @@ test_that("asking a function beforehand moves no generator and is done once a ro
     sample(0:1, nrow(observation), replace = TRUE)
   }
   asked <- 0L
-  played <- rollout(fake_lanes(2), draws, 6, seed = 1, steps = TRUE)
+  played <- rollout(fake_vector_env(2), draws, 6, seed = 1, steps = TRUE)
   expect_identical(asked, 3L * 3L + 1L)
   set.seed(1)
   replicate(3, draw_environment_seeds(2L))

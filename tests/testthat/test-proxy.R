@@ -12,7 +12,7 @@ test_that("by nginx and TLS a client plays as it does without", {
     list(first, env$step(action), env$step(action), if (is.null(env$num_envs)) env$render())
   }
   expect_identical(play(client), play(server))
-  # Lanes travel as tensors, and 4,000 of them in more than one piece.
+  # Sub-environments travel as tensors, and 4,000 of them in more than one piece.
   expect_identical(play(client, num_envs = 4000), play(server, num_envs = 4000))
 
   # The name and the certificate, the token, pages from elsewhere.
@@ -66,7 +66,7 @@ test_that("by nginx the watch page waits for what is new, and no log has its key
   # A question that waits: answered when somebody has stepped, in another process.
   waiting <- step_soon(server, env$instance_id)
   later <- from_json(rawToChar(
-    look(paste0("state/?lane=0&after=", seen$number, "&key=", key))$content
+    look(paste0("state/?sub_env=0&after=", seen$number, "&key=", key))$content
   ))
   expect_gt(later$number, seen$number)
   waiting$wait(10000)

@@ -7,9 +7,9 @@ test_that("an action that is none is told which there are", {
                       class = "gym_error_space")
   expect_match(conditionMessage(cnd), "Actions are 0 and 1, counted from 0.", fixed = TRUE)
   expect_identical(cnd$code, "action_not_in_space")
-  lanes <- local_env(num_envs = 3)
-  lanes$reset()
-  expect_error(lanes$step(c(0, 2, 1)), "Actions are 0 and 1, counted from 0.", fixed = TRUE,
+  sub_envs <- local_env(num_envs = 3)
+  sub_envs$reset()
+  expect_error(sub_envs$step(c(0, 2, 1)), "Actions are 0 and 1, counted from 0.", fixed = TRUE,
                class = "gym_error_space")
 })
 

@@ -1,6 +1,6 @@
-# Values of lanes, as Gymnasium batches them: the lane comes first.
+# Values of sub-environments, as Gymnasium batches them: the sub-environment comes first.
 
-lanes_of_spaces <- function() {
+sub_envs_of_spaces <- function() {
   list(
     discrete = new_space(list(name = "Discrete", n = 3L, start = 5L, dtype = "int64")),
     box = new_space(describe_box(c(-1, 0), c(1, 9), dtype = "float32")),
@@ -20,22 +20,22 @@ tensor_for <- function(dtype, shape, x) {
 
 tuple_of <- function(...) new_space(list(name = "Tuple", spaces = list(...)))
 
-test_that("the space of the lanes has the lane as its first dimension", {
+test_that("the space of the sub-environments has the sub-environment as its first dimension", {
   lines <- c(
     discrete = "<MultiDiscrete [3, 3, 3, 3] from [5, 5, 5, 5]>", box = "<Box float32 [4, 2]>",
     picture = "<Box uint8 [4, 2, 3]>", scalar = "<Box float64 [4]>",
     column = "<Box float64 [4, 1]>", dials = "<MultiDiscrete of shape [4, 2]>",
     bits = "<MultiBinary [4, 2]>"
   )
-  spaces <- lanes_of_spaces()
+  spaces <- sub_envs_of_spaces()
   for (kind in names(lines)) {
     expect_identical(format(batch_space(spaces[[kind]], 4)), lines[[kind]])
   }
   expect_match(format(batch_space(spaces$text, 4)), "^<Tuple \\(Text of 1 to 3 characters, Text")
 })
 
-test_that("each number of the lanes has its bounds", {
-  spaces <- lanes_of_spaces()
+test_that("each number of the sub-environments has its bounds", {
+  spaces <- sub_envs_of_spaces()
   box <- spread_bounds(batch_space(spaces$box, 3))
   expect_identical(box$low, c(-1, 0, -1, 0, -1, 0))
   expect_identical(box$high, c(1, 9, 1, 9, 1, 9))
@@ -48,21 +48,21 @@ test_that("each number of the lanes has its bounds", {
   expect_identical(nested$spaces$a$low, c(0, 0))
 })
 
-test_that("a value for each lane belongs, drawn from each kind of space", {
+test_that("a value for each sub-environment belongs, drawn from each kind of space", {
   withr::local_seed(1)
-  for (space in lanes_of_spaces()) {
+  for (space in sub_envs_of_spaces()) {
     for (n in c(1L, 3L)) {
       batch <- spread_bounds(batch_space(space, n))
       values <- space_sample(batch)
       expect_true(space_contains(batch, values))
-      expect_no_error(check_lanes(space, batch_space(space, n), values, n, NULL))
-      for (lane in seq_len(n)) expect_true(space_contains(space, lane_value(space, values, lane)))
+      expect_no_error(check_sub_envs(space, batch_space(space, n), values, n, NULL))
+      for (sub_env in seq_len(n)) expect_true(space_contains(space, sub_env_value(space, values, sub_env)))
     }
   }
-  expect_type(space_sample(batch_space(lanes_of_spaces()$text, 3)), "character")
+  expect_type(space_sample(batch_space(sub_envs_of_spaces()$text, 3)), "character")
 })
 
-test_that("values of lanes of 200 random spaces belong, and come back through tensors", {
+test_that("values of sub-environments of 200 random spaces belong, and come back through tensors", {
   skip_unless_all()
   skip_if_not_installed("bit64")
   withr::local_seed(6)
@@ -72,12 +72,12 @@ test_that("values of lanes of 200 random spaces belong, and come back through te
     n <- sample(1:4, 1)
     batch <- batch_space(space, n)
     singles <- lapply(seq_len(n), function(i) space_sample(space))
-    values <- lanes_from(space, singles)
-    expect_no_error(check_lanes(space, batch, values, n, NULL))
-    # An empty Tuple has no lanes.
+    values <- sub_envs_from(space, singles)
+    expect_no_error(check_sub_envs(space, batch, values, n, NULL))
+    # An empty Tuple has no sub-environments.
     if (!length(unlist(lapply(singles, unlist)))) next
-    back <- from_json(write_lanes(space, values, n))
-    expect_identical(lanes_from(space, lapply(back, decode_value, space = space)), values)
+    back <- from_json(write_sub_envs(space, values, n))
+    expect_identical(sub_envs_from(space, lapply(back, decode_value, space = space)), values)
     if (!has_tensors(space)) next
     parts <- to_tensors(batch, values, "action", NULL)
     texts <- Filter(is.character, parts)
@@ -90,20 +90,20 @@ test_that("values of lanes of 200 random spaces belong, and come back through te
 
 refused <- function(space, values, n, ...) {
   error <- expect_error(
-    check_lanes(space, batch_space(space, n), values, n, NULL), class = "gym_error_space"
+    check_sub_envs(space, batch_space(space, n), values, n, NULL), class = "gym_error_space"
   )
   for (part in c(...)) expect_match(conditionMessage(error), part, fixed = TRUE)
   error
 }
 
-test_that("a wrong number of lanes is told with both numbers", {
-  spaces <- lanes_of_spaces()
+test_that("a wrong number of sub-environments is told with both numbers", {
+  spaces <- sub_envs_of_spaces()
   wrong <- list(
     discrete = 5:7, box = matrix(0, 3, 2), picture = array(0, c(3, 2, 3)), scalar = c(0, 0, 0),
     column = c(0, 0, 0), dials = matrix(4, 3, 2), bits = matrix(0, 3, 2), text = c("a", "b", "c")
   )
   for (kind in names(wrong)) {
-    refused(spaces[[kind]], wrong[[kind]], 4L, "each of the lanes", "4, not 3")
+    refused(spaces[[kind]], wrong[[kind]], 4L, "each of the sub-environments", "4, not 3")
   }
   pair <- tuple_of(describe_box(0, 1), list(name = "Discrete", n = 2L))
   refused(pair, list(c(0, 0), c(1, 1)), 3L, "3, not 2")
@@ -111,26 +111,26 @@ test_that("a wrong number of lanes is told with both numbers", {
   refused(new_space(list(name = "Sequence", space = describe_box(0, 1))), list(), 2L, "2, not 0")
 })
 
-test_that("the lane whose value does not fit is named, counted from 1, with its value", {
-  spaces <- lanes_of_spaces()
-  error <- refused(spaces$discrete, c(5, 6, NA, 7), 4L, "Lane 3: ", "value NA_real_ ",
+test_that("the sub-environment whose value does not fit is named, counted from 1, with its value", {
+  spaces <- sub_envs_of_spaces()
+  error <- refused(spaces$discrete, c(5, 6, NA, 7), 4L, "Sub-environment 3: ", "value NA_real_ ",
                    "<Discrete 3 from 5>")
-  expect_identical(error$lane, 3L)
-  refused(spaces$discrete, c(5, 6.5), 2L, "Lane 2: ", "6.5")
-  refused(spaces$discrete, c(5, Inf), 2L, "Lane 2: ")
-  refused(spaces$discrete, c("left", "right"), 2L, "Lane 1: ", "\"left\"")
-  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Lane 2: ", "`$[1]`", "<Box float32 [2]>")
-  refused(spaces$dials, rbind(c(0, 4), c(0.5, 4)), 2L, "Lane 2: ", "not whole")
-  refused(spaces$text, c("a", NA), 2L, "Lane 2: ", "one string")
+  expect_identical(error$sub_env, 3L)
+  refused(spaces$discrete, c(5, 6.5), 2L, "Sub-environment 2: ", "6.5")
+  refused(spaces$discrete, c(5, Inf), 2L, "Sub-environment 2: ")
+  refused(spaces$discrete, c("left", "right"), 2L, "Sub-environment 1: ", "\"left\"")
+  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Sub-environment 2: ", "`$[1]`", "<Box float32 [2]>")
+  refused(spaces$dials, rbind(c(0, 4), c(0.5, 4)), 2L, "Sub-environment 2: ", "not whole")
+  refused(spaces$text, c("a", NA), 2L, "Sub-environment 2: ", "one string")
   both <- new_space(describe_dict(x = describe_box(c(0, 0), c(1, 1)),
                                   y = list(name = "Discrete", n = 2L)))
-  refused(both, list(x = matrix(0, 3, 2), y = c(0, 1, NA)), 3L, "Lane 3: ", "`$y`")
+  refused(both, list(x = matrix(0, 3, 2), y = c(0, 1, NA)), 3L, "Sub-environment 3: ", "`$y`")
   many <- new_space(list(name = "Sequence", space = list(name = "Discrete", n = 2L)))
-  refused(many, list(list(0), list(1, "a")), 2L, "Lane 2: ", "`$[1]`")
+  refused(many, list(list(0), list(1, "a")), 2L, "Sub-environment 2: ", "`$[1]`")
 })
 
-test_that("what has not the form of lanes is refused", {
-  spaces <- lanes_of_spaces()
+test_that("what has not the form of sub-environments is refused", {
+  spaces <- sub_envs_of_spaces()
   refused(spaces$discrete, data.frame(a = 5:6), 2L, "MultiDiscrete")
   refused(spaces$discrete, matrix(5, 2, 1), 2L, "length 2")
   refused(spaces$discrete, list(5, 6), 2L, "numeric")
@@ -142,17 +142,17 @@ test_that("what has not the form of lanes is refused", {
   refused(both, list(x = c(0, 0), y = 0), 2L, "`$y`")
 })
 
-test_that("logicals are actions of lanes that are Discrete, a vector those of one number", {
-  spaces <- lanes_of_spaces()
+test_that("logicals are actions of sub-environments that are Discrete, a vector those of one number", {
+  spaces <- sub_envs_of_spaces()
   moves <- discrete_space(2L)
-  expect_no_error(check_lanes(moves, batch_space(moves, 2), c(TRUE, FALSE), 2L, NULL))
-  expect_identical(write_lanes(moves, c(TRUE, FALSE), 2L), "[1,0]")
+  expect_no_error(check_sub_envs(moves, batch_space(moves, 2), c(TRUE, FALSE), 2L, NULL))
+  expect_identical(write_sub_envs(moves, c(TRUE, FALSE), 2L), "[1,0]")
   parts <- to_tensors(batch_space(moves, 2), c(TRUE, FALSE), "action", NULL)
   expect_identical(read_int32(parts$action$bytes, 2L, 2L), 1:0)
   as_vector <- to_tensors(batch_space(spaces$column, 2), c(1, 2), "action", NULL)
   as_column <- to_tensors(batch_space(spaces$column, 2), matrix(c(1, 2)), "action", NULL)
   expect_identical(as_vector, as_column)
-  expect_no_error(check_lanes(spaces$column, batch_space(spaces$column, 2), 1:2, 2L, NULL))
+  expect_no_error(check_sub_envs(spaces$column, batch_space(spaces$column, 2), 1:2, 2L, NULL))
 })
 
 test_that("actions beyond R's integers travel as 64 bits", {
@@ -165,7 +165,7 @@ test_that("actions beyond R's integers travel as 64 bits", {
   expect_identical(narrow$action$dtype, "I32")
 })
 
-test_that("thousands of lanes are read row by row", {
+test_that("thousands of sub-environments are read row by row", {
   n <- 5000L
   values <- matrix(seq_len(4 * n), n, byrow = TRUE)
   space <- new_space(describe_box(rep(0, 4), rep(1, 4), dtype = "float32"))

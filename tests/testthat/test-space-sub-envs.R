@@ -11,31 +11,31 @@ spaces <- list(
 spaces$tuple <- list(name = "Tuple", spaces = unname(spaces))
 spaces$dict <- do.call(describe_dict, spaces)
 
-test_that("what was put together comes apart again, lane by lane and in any choice", {
+test_that("what was put together comes apart again, sub-environment by sub-environment and in any choice", {
   for (name in names(spaces)) {
     space <- new_space(spaces[[name]])
     set.seed(1)
     values <- replicate(4, space_sample(space), simplify = FALSE)
-    lanes <- lanes_from(space, values)
+    sub_envs <- sub_envs_from(space, values)
     for (i in 1:4) {
-      expect_identical(lane_value(space, lanes, i), values[[i]], info = name)
+      expect_identical(sub_env_value(space, sub_envs, i), values[[i]], info = name)
     }
     chosen <- c(4L, 1L, 4L)
-    expect_identical(lane_rows(space, lanes, chosen), lanes_from(space, values[chosen]),
+    expect_identical(sub_env_rows(space, sub_envs, chosen), sub_envs_from(space, values[chosen]),
                      info = name)
-    one <- lanes_from(space, values[1])
-    expect_identical(lane_value(space, one, 1L), values[[1]], info = name)
-    expect_identical(bind_lanes(space, list(one, lane_rows(space, lanes, 2:4))), lanes, info = name)
+    one <- sub_envs_from(space, values[1])
+    expect_identical(sub_env_value(space, one, 1L), values[[1]], info = name)
+    expect_identical(bind_sub_envs(space, list(one, sub_env_rows(space, sub_envs, 2:4))), sub_envs, info = name)
   }
 })
 
-test_that("values for several lanes are drawn as single ones are, one after the other", {
+test_that("values for several sub-environments are drawn as single ones are, one after the other", {
   for (name in c("discrete", "flat", "array", "binary", "text", "sequence")) {
     space <- new_space(spaces[[name]])
     set.seed(1)
     values <- replicate(4, space_sample(space), simplify = FALSE)
     set.seed(1)
-    expect_equal(sample_lanes(space, 4L), lanes_from(space, values), info = name)
+    expect_equal(sample_sub_envs(space, 4L), sub_envs_from(space, values), info = name)
   }
 })
 
@@ -46,9 +46,9 @@ test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
     high = list(1e18, 1e18)
   ))
   large <- bit64::as.integer64(c("900719925474099301", "3"))
-  lanes <- lanes_from(space, list(large, c(1L, 2L)))
-  expect_identical(format(lane_value(space, lanes, 1L)), format(large))
-  bound <- bind_lanes(space, list(lanes, lanes_from(space, list(5:6))))
+  sub_envs <- sub_envs_from(space, list(large, c(1L, 2L)))
+  expect_identical(format(sub_env_value(space, sub_envs, 1L)), format(large))
+  bound <- bind_sub_envs(space, list(sub_envs, sub_envs_from(space, list(5:6))))
   expect_identical(dim(bound), 3:2)
   columns <- value_columns(space, bound, "obs")
   expect_identical(as.character(columns$obs_1), c("900719925474099301", "1", "5"))

@@ -32,8 +32,8 @@ local_checkpoint <- function(bytes = NULL, frame = parent.frame()) {
 
 environments <- list(
   single = function() fake_environment(reward = first_action),
-  sync = function() fake_lanes(7, "sync", reward = first_action),
-  together = function() fake_lanes(7, "vector_entry_point", reward = first_action)
+  sync = function() fake_vector_env(7, "sync", reward = first_action),
+  together = function() fake_vector_env(7, "vector_entry_point", reward = first_action)
 )
 
 test_that("a search goes on from the file of any block to the result of an undisturbed one", {
@@ -57,7 +57,7 @@ test_that("a search goes on from the file of any block to the result of an undis
 test_that("without a seed the generator goes on as well, and ends where it would have", {
   kept <- local_kept_files()
   play <- function(checkpoint) {
-    quiet_search(fake_lanes(4, reward = first_action), rounds = 9, target = Inf,
+    quiet_search(fake_vector_env(4, reward = first_action), rounds = 9, target = Inf,
                   checkpoint = checkpoint)
   }
   set.seed(3)
@@ -157,7 +157,7 @@ test_that("arguments that differ from the file's are named, with both values", {
   refused(policy = policy_network(c(4, 1)), argument = "policy", message = "`policy` is network")
   refused(env = fake_environment(id = "Other-v0"), argument = "env",
           message = "`env` is Fake-v0 there, and Other-v0 here.")
-  refused(env = fake_lanes(3), argument = "env", message = "Fake-v0 with 3 lanes here")
+  refused(env = fake_vector_env(3), argument = "env", message = "Fake-v0 with 3 sub-environments here")
   refused(env = gym_wrap("Fake-v0", "TimeLimit", max_episode_steps = 5), argument = "env",
           message = "`env` is another there.")
   refused(seed = 2, rounds = 4, argument = c("rounds", "seed"), message = "`seed`")
@@ -316,7 +316,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
 
-test_that("with lanes each block is kept, however long writing takes", {
+test_that("with sub-environments each block is kept, however long writing takes", {
   written <- function(env) {
     kept <- local_kept_files()
     local_functions(rest_per_writing = 1e6)
@@ -325,6 +325,6 @@ test_that("with lanes each block is kept, however long writing takes", {
     length(kept$list)
   }
   # One before the first block.
-  expect_identical(written(fake_lanes(8, "sync", reward = first_action)), 4L)
+  expect_identical(written(fake_vector_env(8, "sync", reward = first_action)), 4L)
   expect_lt(written(fake_environment(reward = first_action)), 25L)
 })

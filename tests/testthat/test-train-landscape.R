@@ -94,18 +94,18 @@ test_that("the seed fixes it and leaves R's generator alone", {
   expect_false(identical(other$directions, seeded$directions))
 })
 
-test_that("in lanes with seeds of their own it is the same landscape", {
+test_that("in sub-environments with seeds of their own it is the same landscape", {
   alone <- fake_environment(reward = weights_matter)
   search <- found(alone)
   single <- search_landscape(search, size = 5, episodes = 3, seed = 1)
-  search$env <- fake_lanes(7, "sync", reward = weights_matter)
-  lanes <- search_landscape(search, size = 5, episodes = 3, seed = 1)
-  expect_identical(lanes$grid, single$grid)
-  expect_identical(lanes$seeds, single$seeds)
+  search$env <- fake_vector_env(7, "sync", reward = weights_matter)
+  sub_envs <- search_landscape(search, size = 5, episodes = 3, seed = 1)
+  expect_identical(sub_envs$grid, single$grid)
+  expect_identical(sub_envs$seeds, single$seeds)
 })
 
-test_that("lanes that share a seed say that the episodes differ", {
-  search <- found(fake_lanes(6, "vector_entry_point", reward = weights_matter))
+test_that("sub-environments that share a seed say that the episodes differ", {
+  search <- found(fake_vector_env(6, "vector_entry_point", reward = weights_matter))
   landscape <- search_landscape(search, size = 3, episodes = 2, seed = 1)
   expect_false(landscape$common)
   resets <- search$env$resets

@@ -5,7 +5,7 @@ figures <- function(search) search[c("policy", "solved", "round", "rounds", "epi
 
 test_that("of rounds played at once the first in order wins, not the first in time", {
   for (mode in modes) {
-    env <- scripted_lanes(
+    env <- scripted_vector_env(
       8, returns = c(1, 2, 10, 30, 50, 50, 90, 90), lengths = c(4, 2, 9, 3, 1, 1, 20, 2), mode
     )
     search <- search_random(env, rounds = 4, episodes = 2, target = 20, seed = 1)
@@ -23,40 +23,40 @@ test_that("of rounds played at once the first in order wins, not the first in ti
 })
 
 test_that("an earlier round that fails after a later one has reached the target counts", {
-  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(9, 9, 1, 1, 1, 1))
+  env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(9, 9, 1, 1, 1, 1))
   search <- search_random(env, rounds = 3, episodes = 2, target = 20)
   expect_identical(search$round, 2L)
   expect_identical(search$rounds$mean_return, c(1, 50))
 })
 
 test_that("once the search is decided nothing more is played", {
-  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(1, 1, 2, 2, 40, 40))
+  env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(1, 1, 2, 2, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
   # Two steps of all that play, and no second block.
-  expect_identical(env$lane_steps, 6L + 4L)
+  expect_identical(env$sub_env_steps, 6L + 4L)
   expect_length(env$resets, 1)
 })
 
-test_that("lanes of rounds after one that has reached the target are not waited for", {
-  env <- scripted_lanes(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(5, 5, 1, 1, 40, 40))
+test_that("sub-environments of rounds after one that has reached the target are not waited for", {
+  env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(5, 5, 1, 1, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
   # After the first step only the first round plays, of which it is not yet known.
-  expect_identical(env$lane_steps, 6L + 4L * 2L)
+  expect_identical(env$sub_env_steps, 6L + 4L * 2L)
 })
 
 test_that("a round may begin in one block and end in another", {
   for (mode in modes) {
     returns <- c(1, 2, 3, 4, 5, 21, 20, 20, 19, 20, 90)
-    env <- scripted_lanes(4, returns, lengths = rep(c(3L, 1L), length.out = 11), mode)
+    env <- scripted_vector_env(4, returns, lengths = rep(c(3L, 1L), length.out = 11), mode)
     search <- search_random(env, rounds = 4, episodes = 5, target = 20)
     expect_identical(search$rounds$mean_return, c(3, 20))
     expect_identical(search$episodes$return, returns[1:10])
-    expect_identical(search$episodes$lane, c(1:4, 1:4, 1:2))
+    expect_identical(search$episodes$sub_env, c(1:4, 1:4, 1:2))
   }
 })
 
 test_that("without a target all rounds are played", {
-  env <- scripted_lanes(4, returns = 1:9, lengths = rep(1:3, 3))
+  env <- scripted_vector_env(4, returns = 1:9, lengths = rep(1:3, 3))
   search <- search_random(env, rounds = 3, episodes = 3)
   expect_identical(search$rounds$mean_return, c(2, 5, 8))
   expect_false(search$solved)
@@ -66,7 +66,7 @@ test_that("without a target all rounds are played", {
 test_that("a shorter search is the beginning of a longer one, with the same policies", {
   for (mode in modes) {
     play <- function(rounds) {
-      env <- fake_lanes(16, mode, reward = first_action)
+      env <- fake_vector_env(16, mode, reward = first_action)
       search_random(env, rounds = rounds, target = Inf, seed = 1)
     }
     short <- play(20)
@@ -79,7 +79,7 @@ test_that("a shorter search is the beginning of a longer one, with the same poli
 })
 
 test_that("the policy returned is the one that was played in its round", {
-  env <- fake_lanes(16, reward = first_action)
+  env <- fake_vector_env(16, reward = first_action)
   search <- search_random(env, rounds = 10, episodes = 3, target = Inf, seed = 1)
   played <- search$episodes[search$episodes$round == search$round, ]
   alone <- fake_environment(reward = first_action)
@@ -90,9 +90,9 @@ test_that("the policy returned is the one that was played in its round", {
   expect_identical(again, played$return)
 })
 
-test_that("set.seed() alone fixes a search in lanes, and seed = gives the same", {
+test_that("set.seed() alone fixes a search in sub-environments, and seed = gives the same", {
   play <- function(...) {
-    figures(search_random(fake_lanes(8, "vector_entry_point", reward = first_action), ...))
+    figures(search_random(fake_vector_env(8, "vector_entry_point", reward = first_action), ...))
   }
   set.seed(5)
   beforehand <- play(rounds = 4)
@@ -105,7 +105,7 @@ test_that("set.seed() alone fixes a search in lanes, and seed = gives the same",
 
 test_that("an interrupt keeps the finished rounds up to the first unfinished one", {
   play <- function(lengths, at) {
-    env <- scripted_lanes(8, returns = 1:8, lengths = lengths)
+    env <- scripted_vector_env(8, returns = 1:8, lengths = lengths)
     step <- env$step
     env$step <- function(...) {
       at <<- at - 1L
@@ -125,19 +125,19 @@ test_that("an interrupt keeps the finished rounds up to the first unfinished one
 })
 
 test_that("a target reached behind an unfinished round does not solve an interrupted search", {
-  env <- scripted_lanes(4, returns = c(1, 1, 50, 50), lengths = c(9, 9, 1, 1))
+  env <- scripted_vector_env(4, returns = c(1, 1, 50, 50), lengths = c(9, 9, 1, 1))
   step <- env$step
-  env$step <- function(...) if (env$lane_steps > 8L) rlang::interrupt() else step(...)
+  env$step <- function(...) if (env$sub_env_steps > 8L) rlang::interrupt() else step(...)
   suppressMessages(search <- search_random(env, rounds = 9, episodes = 2, target = 20))
   expect_false(search$solved)
   expect_identical(nrow(search$rounds), 0L)
 })
 
 test_that("an error in the middle carries the rounds that were finished", {
-  env <- scripted_lanes(8, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
+  env <- scripted_vector_env(8, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
   step <- env$step
   env$step <- function(...) {
-    if (env$lane_steps > 10L) gym_abort("lost", class = "gym_error_connection")
+    if (env$sub_env_steps > 10L) gym_abort("lost", class = "gym_error_connection")
     step(...)
   }
   cnd <- tryCatch(search_random(env, episodes = 2, target = Inf), gym_error_search = identity)
@@ -147,16 +147,16 @@ test_that("an error in the middle carries the rounds that were finished", {
 })
 
 test_that("the progress bar counts the rounds in their order", {
-  env <- scripted_lanes(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
+  env <- scripted_vector_env(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
   shown <- list()
   record <- new_rounds(4L, 2L, NULL, function(finished, best) {
     shown[[length(shown) + 1L]] <<- c(finished, best)
   })
-  template <- policy_bind(policy_network(), lanes_of(env))
+  template <- policy_bind(policy_network(), vector_env_of(env))
   begin <- function(block, episodes) {
     list(seeds = draw_environment_seeds(4L), policy = draw_policies(record, template, episodes))
   }
-  play_episodes(lanes_of(env), record, begin)
+  play_episodes(vector_env_of(env), record, begin)
   expect_identical(shown, list(c(2, 3.5), c(4, 7.5)))
 })
 

@@ -1,16 +1,16 @@
-# Values of lanes from Python to R and back, of every kind of space; see
-# mirror_environments.py. The lanes begin with different values, so that none can be
+# Values of sub-environments from Python to R and back, of every kind of space; see
+# mirror_environments.py. The sub-environments begin with different values, so that none can be
 # taken for another.
 
-local_mirror_lanes <- function(frame = parent.frame()) {
+local_mirror_sub_envs <- function(frame = parent.frame()) {
   withr::local_envvar(
     PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
   )
   local_server(allow_module = "mirror_environments", frame = frame)
 }
 
-# Sends back what the lanes show. Returns that, and what a mirror found different.
-play_lanes <- function(env, values, tensors) {
+# Sends back what the sub-environments show. Returns that, and what a mirror found different.
+play_sub_envs <- function(env, values, tensors) {
   instance <- known_instance(env$client, env$instance_id)
   instance$takes_tensors <- instance$takes_tensors && tensors
   instance$sends_tensors <- instance$sends_tensors && tensors
@@ -25,14 +25,14 @@ play_lanes <- function(env, values, tensors) {
     observation <- out$observation
   }
   # Only some of them, the last step of an episode.
-  lanes <- which(seq_len(n) != 2L)
-  some <- env$step(lane_rows(env$single_action_space, observation, lanes), lanes = lanes)
-  expect_identical(some$terminated, rep(TRUE, length(lanes)))
+  sub_envs <- which(seq_len(n) != 2L)
+  some <- env$step(sub_env_rows(env$single_action_space, observation, sub_envs), which = sub_envs)
+  expect_identical(some$terminated, rep(TRUE, length(sub_envs)))
   list(seen = c(seen, list(some$observation)), problems = c(problems, some$info$problem))
 }
 
-# NULL where there is an empty Tuple or Dict in the space: Gymnasium cannot take its lanes
-# apart, and the server says so.
+# NULL where there is an empty Tuple or Dict in the space: Gymnasium cannot take its
+# sub-environments apart, and the server says so.
 make_mirrors <- function(server, ...) {
   tryCatch(
     gym_make("mirror_environments:Mirror-v0", ..., client = server),
@@ -40,10 +40,10 @@ make_mirrors <- function(server, ...) {
   )
 }
 
-test_that("values of random spaces come back to Python from their own lanes", {
+test_that("values of random spaces come back to Python from their own sub-environments", {
   skip_unless_all()
   skip_if_not_installed("bit64")
-  server <- local_mirror_lanes()
+  server <- local_mirror_sub_envs()
   kinds <- character()
   problems <- character()
   played <- tensors <- 0L
@@ -53,26 +53,26 @@ test_that("values of random spaces come back to Python from their own lanes", {
     if (is.null(env)) next
     played <- played + 1L
     kinds <- union(kinds, all_kinds(env$single_observation_space))
-    by_json <- play_lanes(env, 4L, tensors = FALSE)
-    by_tensors <- play_lanes(env, 4L, tensors = TRUE)
+    by_json <- play_sub_envs(env, 4L, tensors = FALSE)
+    by_tensors <- play_sub_envs(env, 4L, tensors = TRUE)
     tensors <- tensors + has_tensors(env$single_observation_space)
     expect_identical(by_tensors, by_json, info = number)
     problems <- c(problems, by_json$problems)
-    # Each lane shows what a single environment shows that begins there.
+    # Each sub-environment shows what a single environment shows that begins there.
     single <- gym_make("mirror_environments:Mirror-v0", number = number, values = 4,
                        client = server)
     space <- env$single_observation_space
-    for (lane in 1:3) {
-      # As text: an integer is a double where other lanes need one.
+    for (sub_env in 1:3) {
+      # As text: an integer is a double where other sub-environments need one.
       expect_identical(
-        write_value(space, lane_value(space, by_json$seen[[1L]], lane)),
-        write_value(space, single$reset(seed = lane)), info = number
+        write_value(space, sub_env_value(space, by_json$seen[[1L]], sub_env)),
+        write_value(space, single$reset(seed = sub_env)), info = number
       )
     }
     single$close()
     env$close()
   }
-  # Gymnasium's vector environments hand a lane a NumPy scalar for an array of shape ().
+  # Gymnasium's vector environments hand a sub-environment a NumPy scalar for an array of shape ().
   problems <- grep("^ndarray became [a-z0-9]+$", problems[!is.na(problems)], value = TRUE,
                    invert = TRUE)
   expect_identical(problems, character())
@@ -82,9 +82,9 @@ test_that("values of random spaces come back to Python from their own lanes", {
                            "Dict", "Sequence", "Graph", "OneOf"))
 })
 
-test_that("the last observation of a lane is kept for every kind of space", {
+test_that("the last observation of a sub-environment is kept for every kind of space", {
   skip_if_not_installed("bit64")
-  server <- local_mirror_lanes()
+  server <- local_mirror_sub_envs()
   for (number in 1:40) {
     env <- make_mirrors(server, number = number, values = 2, num_envs = 2,
                         autoreset_mode = "SameStep")
@@ -92,22 +92,22 @@ test_that("the last observation of a lane is kept for every kind of space", {
     space <- env$single_observation_space
     first <- env$reset(seed = 0:1)
     second <- env$step(first)$observation
-    # The first lane ends, the second does not step.
-    out <- env$step(lane_rows(space, second, 1L), lanes = 1)
+    # The first sub-environment ends, the second does not step.
+    out <- env$step(sub_env_rows(space, second, 1L), which = 1)
     expect_length(out$info$final_obs, 1)
     # After its last value a mirror shows its first again.
-    expect_identical(out$info$final_obs[[1L]], lane_value(space, first, 1L), info = number)
-    out <- env$step(lanes_from(space, list(
-      lane_value(space, out$observation, 1L), lane_value(space, second, 2L)
+    expect_identical(out$info$final_obs[[1L]], sub_env_value(space, first, 1L), info = number)
+    out <- env$step(sub_envs_from(space, list(
+      sub_env_value(space, out$observation, 1L), sub_env_value(space, second, 2L)
     )))
     expect_identical(out$terminated, c(FALSE, TRUE))
     expect_null(out$info$final_obs[[1L]])
-    expect_identical(out$info$final_obs[[2L]], lane_value(space, first, 2L), info = number)
+    expect_identical(out$info$final_obs[[2L]], sub_env_value(space, first, 2L), info = number)
     env$close()
   }
 })
 
-test_that("infos of lanes arrive by lane, pictures with the lane first", {
+test_that("infos of sub-environments arrive by sub-environment, pictures with the sub-environment first", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Telling-v0", num_envs = 2, client = server)
   env$reset()
@@ -118,7 +118,7 @@ test_that("infos of lanes arrive by lane, pictures with the lane first", {
   expect_identical(out$info$nested$x, c(0.5, 0.5))
   expect_identical(out$info$nan, c(NaN, NaN))
   expect_identical(dim(out$info$grid), c(2L, 2L, 3L))
-  some <- env$step(0, lanes = 2)
+  some <- env$step(0, which = 2)
   expect_length(some$reward, 1)
   picture <- gym_make("odd_environments:Image-v0", num_envs = 2, client = server)
   observation <- picture$reset()
@@ -126,7 +126,7 @@ test_that("infos of lanes arrive by lane, pictures with the lane first", {
   expect_identical(observation[2, , , ], aperm(array(0:23, c(4, 3, 2))))
 })
 
-test_that("numbers of lanes keep their types, and what R cannot hold is an error", {
+test_that("numbers of sub-environments keep their types, and what R cannot hold is an error", {
   skip_if_not_installed("bit64")
   server <- local_odd_server()
   make <- function(name) {
@@ -144,7 +144,7 @@ test_that("numbers of lanes keep their types, and what R cannot hold is an error
   expect_error(make("LargestNatural")$reset(), class = "gym_error_space")
 })
 
-test_that("actions of lanes are drawn by the server in the form in which it takes them", {
+test_that("actions of sub-environments are drawn by the server in the form in which it takes them", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -157,7 +157,7 @@ test_that("actions of lanes are drawn by the server in the form in which it take
   expect_false(env_action_space_contains(server, env$instance_id, drawn))
 })
 
-test_that("a nested action of a lane that does not fit is named with its lane", {
+test_that("a nested action of a sub-environment that does not fit is named with its sub-environment", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -165,14 +165,14 @@ test_that("a nested action of a lane that does not fit is named with its lane", 
   expect_identical(env$step(good)$reward, c(1, 1, 1))
   bad <- good
   bad$position[3, 2] <- NA
-  expect_error(env$step(bad), "Lane 3: .*\\$position\\[1\\]", class = "gym_error_space")
+  expect_error(env$step(bad), "Sub-environment 3: .*\\$position\\[1\\]", class = "gym_error_space")
   bad$position[3, 2] <- Inf
   expect_error(env$step(bad), "position", class = "gym_error_space")
   expect_error(env$step(list(position = matrix(0, 3, 3), "a.b" = c(1, 0))), "\\$a.b",
                class = "gym_error_space")
 })
 
-test_that("an exception in one lane is told, and the others' server goes on", {
+test_that("an exception in one sub-environment is told, and the others' server goes on", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()

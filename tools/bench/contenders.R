@@ -1,8 +1,8 @@
 # The contenders in steps a second: for each what it is, how it is called, and a function
 # that plays a turn. Environments are made at once and kept for all turns.
 
-contender <- function(part, lanes, name, called, play) {
-  list(part = part, lanes = lanes, name = name, called = called, play = play)
+contender <- function(part, num_envs, name, called, play) {
+  list(part = part, num_envs = num_envs, name = name, called = called, play = play)
 }
 
 # How reticulate is named with the NumPy of the server, and with one that it converts.
@@ -52,33 +52,33 @@ reticulate_single <- function(worker) {
   })
 }
 
-lanes_contenders <- function(setup, lanes) {
-  env <- gym_make("CartPole-v1", num_envs = lanes, seed = 1, client = setup$client)
+vector_contenders <- function(setup, num_envs) {
+  env <- gym_make("CartPole-v1", num_envs = num_envs, seed = 1, client = setup$client)
   env$reset()
-  actions <- alternating(lanes)
+  actions <- alternating(num_envs)
   mode <- env$vectorization_mode
   c(
     list(
-      contender("lanes", lanes, own[["lanes"]], paste0("env$step(a), ", mode), function(seconds) {
-        play_lanes(lanes, actions, env$step, seconds)
+      contender("vector", num_envs, own[["vector"]], paste("env$step(a),", mode), function(seconds) {
+        play_vector(num_envs, actions, env$step, seconds)
       }),
-      contender("lanes", lanes, "Python", paste0("envs.step(a), ", mode), function(seconds) {
-        ask(setup$python, "lanes", seconds, lanes, mode)
+      contender("vector", num_envs, "Python", paste0("envs.step(a), ", mode), function(seconds) {
+        ask(setup$python, "vector", seconds, num_envs, mode)
       })
     ),
-    lapply(setup$reticulate, reticulate_lanes, lanes, mode)
+    lapply(setup$reticulate, reticulate_vector, num_envs, mode)
   )
 }
 
 # Of the ways to call it the fastest: the best of some tries, in which they take turns.
-reticulate_lanes <- function(worker, lanes, mode) {
-  forms <- ask(worker, "forms lanes")
+reticulate_vector <- function(worker, num_envs, mode) {
+  forms <- ask(worker, "forms vector")
   tries <- replicate(5L, vapply(seq_along(forms), function(form) {
-    ask(worker, "lanes", form, 0.1, lanes, mode)
+    ask(worker, "vector", form, 0.1, num_envs, mode)
   }, 0))
   best <- which.max(apply(tries, 1L, max))
-  contender("lanes", lanes, reticulate_name(worker), forms[[best]], function(seconds) {
-    ask(worker, "lanes", best, seconds, lanes, mode)
+  contender("vector", num_envs, reticulate_name(worker), forms[[best]], function(seconds) {
+    ask(worker, "vector", best, seconds, num_envs, mode)
   })
 }
 
@@ -91,7 +91,7 @@ play_turns <- function(contenders, turns, seconds) {
   rows <- lapply(seq_len(turns), function(turn) {
     progress("turn ", turn, " of ", turns, ": ", length(contenders), " contenders")
     do.call(rbind, lapply(contenders[orders[[turn]]], function(one) {
-      measured(one$part, one$lanes, one$name, one$called, turn, one$play(seconds), "steps/s")
+      measured(one$part, one$num_envs, one$name, one$called, turn, one$play(seconds), "steps/s")
     }))
   })
   do.call(rbind, rows)

@@ -1,10 +1,10 @@
-# Env steps a second against lanes: the contenders, the limit and what a single environment
-# gives.
+# Env steps a second against sub-environments: the contenders, the limit and what a single
+# environment gives.
 
 # Okabe and Ito's colours, and how each contender is drawn.
 figure_styles <- function(reticulates) {
   data.frame(
-    name = c(own[["lanes"]], "Python", reticulates),
+    name = c(own[["vector"]], "Python", reticulates),
     label = c("gym, over HTTP", "Python in process (the limit)",
               sub(",", " in process,", reticulates)),
     colour = c("#D55E00", "#000000", "#0072B2", "#56B4E9")[seq_len(2L + length(reticulates))],
@@ -15,14 +15,14 @@ figure_styles <- function(reticulates) {
 
 draw_figure <- function(rows, run, file) {
   summary <- summarise(rows)
-  curves <- summary[summary$part == "lanes", ]
+  curves <- summary[summary$part == "vector", ]
   single <- summary[summary$part == "single", ]
   styles <- figure_styles(reticulates(rows))
   grDevices::png(file, width = 1500, height = 1050, res = 190)
   on.exit(grDevices::dev.off())
   graphics::par(mar = c(4, 5.5, 2.5, 1), las = 1, mgp = c(3.2, 0.7, 0))
-  sizes <- sort(unique(curves$lanes))
-  # Single environments stand to the left of one lane.
+  sizes <- sort(unique(curves$num_envs))
+  # Single environments stand to the left of one sub-environment.
   single_at <- 0.3
   graphics::plot(
     NA, log = "xy", xlim = c(single_at, max(sizes)), ylim = range(summary_range(curves, single)),
@@ -40,13 +40,13 @@ draw_figure <- function(rows, run, file) {
     bty = "n", cex = 0.85, inset = 0.01
   )
   graphics::title("CartPole-v1 from R: env steps a second", line = 1, adj = 0)
-  graphics::title(xlab = "lanes", line = 2.4)
+  graphics::title(xlab = "num_envs", line = 2.4)
   graphics::mtext(figure_note(rows, run), side = 1L, adj = 1, cex = 0.7, line = 2.8,
                   col = "grey40")
 }
 
 figure_note <- function(rows, run) {
-  sprintf("medians and ranges of %.0f turns, %s cores, %s", max(rows$turn[rows$part == "lanes"]),
+  sprintf("medians and ranges of %.0f turns, %s cores, %s", max(rows$turn[rows$part == "vector"]),
           run[["cores"]], run[["date"]])
 }
 
@@ -76,9 +76,9 @@ constant_line <- function(single, left, name, label) {
 draw_contender <- function(style, curves, single, single_at) {
   curve <- curves[curves$contender == style$name, ]
   alone <- single[single$contender == style$name, ]
-  graphics::lines(curve$lanes, curve$median, col = style$colour, lwd = style$width)
+  graphics::lines(curve$num_envs, curve$median, col = style$colour, lwd = style$width)
   points <- rbind(
-    data.frame(x = curve$lanes, curve[c("median", "low", "high")]),
+    data.frame(x = curve$num_envs, curve[c("median", "low", "high")]),
     data.frame(x = rep(single_at, nrow(alone)), alone[c("median", "low", "high")])
   )
   graphics::segments(points$x, points$low, points$x, points$high, col = style$colour)

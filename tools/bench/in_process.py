@@ -4,7 +4,7 @@ Reads one line a turn and answers with one, env steps a second (or what was aske
 
     versions                       as JSON
     single SECONDS
-    lanes SECONDS LANES MODE       MODE is Gymnasium's vectorization_mode
+    vector SECONDS NUM_ENVS MODE   MODE is Gymnasium's vectorization_mode
 """
 
 import json
@@ -37,7 +37,7 @@ def single(seconds: str) -> float:
             return steps / elapsed
 
 
-def lanes(seconds: str, number: str, mode: str) -> float:
+def vector(seconds: str, number: str, mode: str) -> float:
     """Play a vector of environments."""
     envs = _vector_env(int(number), mode)
     actions = [(np.arange(int(number)) + i) % 2 for i in range(2)]
@@ -85,5 +85,5 @@ def versions() -> dict:
 
 for line in sys.stdin:
     command, *arguments = line.split()
-    answer = {"versions": versions, "single": single, "lanes": lanes}[command](*arguments)
+    answer = {"versions": versions, "single": single, "vector": vector}[command](*arguments)
     print(json.dumps(answer), flush=True)

@@ -1,5 +1,5 @@
-# What a client's million env steps leave behind in R and in its server, and what many lanes
-# cost the server. A process of its own; prints a line "WHAT: MB" each.
+# What a client's million env steps leave behind in R and in its server, and what many
+# sub-environments cost the server. A process of its own; prints a line "WHAT: MB" each.
 
 library(gym)
 
@@ -18,12 +18,12 @@ tell <- function(what, value) {
   cat(what, ": ", format(value), "\n", sep = "")
 }
 
-# A hundred single steps and nine of a hundred lanes.
-play_thousand <- function(env, lanes, actions) {
+# A hundred single steps and nine of a hundred sub-environments.
+play_thousand <- function(env, vector_env, actions) {
   for (action in rep_len(0:1, 100L)) {
     if (env$step(action)$done) env$reset()
   }
-  for (i in seq_len(9L)) lanes$step(actions[[1L + i %% 2L]])
+  for (i in seq_len(9L)) vector_env$step(actions[[1L + i %% 2L]])
 }
 
 # Of R also what lives.
@@ -45,13 +45,13 @@ million <- as.numeric(commandArgs(trailingOnly = TRUE)[1L])
 client <- gym_server_start()
 server_pid <- get_request(client, "/v1/health/")$pid
 env <- gym_make("CartPole-v1", seed = 1, client = client)
-lanes <- gym_make("CartPole-v1", num_envs = 100, seed = 1, client = client)
+vector_env <- gym_make("CartPole-v1", num_envs = 100, seed = 1, client = client)
 invisible(env$reset())
-invisible(lanes$reset())
+invisible(vector_env$reset())
 actions <- list(rep_len(0:1, 100L), rep_len(1:0, 100L))
 told <- unique(pmin(c(10, 100, 1000), million / 1000))
 for (thousand in seq_len(million / 1000)) {
-  play_thousand(env, lanes, actions)
+  play_thousand(env, vector_env, actions)
   # What lives too long for R's small collections, and no longer, would count as growth.
   if (thousand %% 100 == 0) gc()
   if (thousand %in% told) tell_sizes(server_pid, thousand * 1000)
@@ -61,4 +61,4 @@ before <- megabytes(server_pid)
 many <- gym_make("CartPole-v1", num_envs = 8192, seed = 1, client = client)
 invisible(many$reset())
 for (i in seq_len(10L)) many$step(rep_len(0:1, 8192L))
-tell("server for 8192 lanes", megabytes(server_pid) - before)
+tell("server for 8192 sub-environments", megabytes(server_pid) - before)

@@ -1,9 +1,9 @@
 # The data that the bench makes, its summary, and the goals that it is held against.
 
 # One value that was measured: a row of the data.
-measured <- function(part, lanes, contender, called, turn, value, unit) {
+measured <- function(part, num_envs, contender, called, turn, value, unit) {
   data.frame(
-    part = part, lanes = lanes, contender = contender, called = called, turn = turn,
+    part = part, num_envs = num_envs, contender = contender, called = called, turn = turn,
     value = value, unit = unit
   )
 }
@@ -26,8 +26,8 @@ read_results <- function(file) {
   )
 }
 
-values_of <- function(rows, part, contender, lanes = 0, unit = NULL) {
-  found <- rows[rows$part == part & rows$contender == contender & rows$lanes == lanes, ]
+values_of <- function(rows, part, contender, num_envs = 0, unit = NULL) {
+  found <- rows[rows$part == part & rows$contender == contender & rows$num_envs == num_envs, ]
   if (!is.null(unit)) found <- found[found$unit == unit, ]
   found$value[order(found$turn)]
 }
@@ -37,24 +37,24 @@ ratios <- function(gym, other, unit) {
   if (unit == "s") other / gym else gym / other
 }
 
-own <- c(single = "gym, env$step()", lanes = "gym, env$step()", search = "gym, search_random()")
+own <- c(single = "gym, env$step()", vector = "gym, env$step()", search = "gym, search_random()")
 
-# One row for each contender and number of lanes.
+# One row for each contender and number of sub-environments.
 summarise <- function(rows) {
-  what <- rows[c("part", "lanes", "contender", "unit")]
+  what <- rows[c("part", "num_envs", "contender", "unit")]
   keys <- what[!duplicated(what), ]
-  keys <- keys[order(match(keys$part, unique(keys$part)), keys$lanes), ]
+  keys <- keys[order(match(keys$part, unique(keys$part)), keys$num_envs), ]
   do.call(rbind, lapply(seq_len(nrow(keys)), function(i) {
     key <- keys[i, ]
-    values <- values_of(rows, key$part, key$contender, key$lanes, key$unit)
+    values <- values_of(rows, key$part, key$contender, key$num_envs, key$unit)
     reference <- own[key$part]
     ratio <- NA
     if (!is.na(reference) && reference != key$contender && key$unit != "steps") {
-      gym <- values_of(rows, key$part, reference, key$lanes, key$unit)
+      gym <- values_of(rows, key$part, reference, key$num_envs, key$unit)
       ratio <- stats::median(ratios(gym, values, key$unit))
     }
     called <- rows$called[rows$part == key$part & rows$contender == key$contender &
-                            rows$lanes == key$lanes][1L]
+                            rows$num_envs == key$num_envs][1L]
     data.frame(
       key, called = called, median = stats::median(values), low = min(values),
       high = max(values), turns = length(values), ratio = ratio, row.names = NULL
@@ -71,17 +71,18 @@ goal <- function(text, value, at_least = NULL, at_most = NULL, digits = 3) {
   )
 }
 
-times <- function(rows, other, lanes = 0, part = if (lanes) "lanes" else "single",
+times <- function(rows, other, num_envs = 0, part = if (num_envs) "vector" else "single",
                   other_part = part) {
-  gym <- values_of(rows, part, own[[part]], lanes)
-  stats::median(gym / values_of(rows, other_part, other, if (other_part == "lanes") lanes else 0))
+  gym <- values_of(rows, part, own[[part]], num_envs)
+  num_envs <- if (other_part == "vector") num_envs else 0
+  stats::median(gym / values_of(rows, other_part, other, num_envs))
 }
 
 check_goals <- function(rows) {
   parts <- unique(rows$part)
   do.call(rbind, c(
     if ("single" %in% parts) single_goals(rows),
-    if ("lanes" %in% parts) lanes_goals(rows),
+    if ("vector" %in% parts) vector_goals(rows),
     if ("search" %in% parts) search_goals(rows),
     if ("memory" %in% parts) memory_goals(rows)
   ))
@@ -102,23 +103,23 @@ single_goals <- function(rows) {
   )
 }
 
-lanes_goals <- function(rows) {
-  sizes <- sort(unique(rows$lanes[rows$part == "lanes"]))
+vector_goals <- function(rows) {
+  sizes <- sort(unique(rows$num_envs[rows$part == "vector"]))
   against <- lapply(reticulates(rows), function(name) {
-    lapply(sizes[sizes >= 32], function(lanes) {
-      wanted <- if (lanes == 1024) 1.5 else 1
-      goal(sprintf("%.0f lanes: at least %s times %s", lanes, wanted, name),
-           times(rows, name, lanes), at_least = wanted)
+    lapply(sizes[sizes >= 32], function(num_envs) {
+      wanted <- if (num_envs == 1024) 1.5 else 1
+      goal(sprintf("%.0f sub-environments: at least %s times %s", num_envs, wanted, name),
+           times(rows, name, num_envs), at_least = wanted)
     })
   })
   c(
     unlist(against, recursive = FALSE),
     if (8192 %in% sizes) {
-      list(goal("8192 lanes: at least 0.4 of Python in process",
+      list(goal("8192 sub-environments: at least 0.4 of Python in process",
                 times(rows, "Python", 8192), at_least = 0.4))
     },
     if (1024 %in% sizes && "single" %in% rows$part) {
-      list(goal("1024 lanes: at least 8 times Python's loop over one environment",
+      list(goal("1024 sub-environments: at least 8 times Python's loop over one environment",
                 times(rows, "Python", 1024, other_part = "single"), at_least = 8))
     }
   )
@@ -144,9 +145,9 @@ memory_goals <- function(rows) {
     goal(paste0(which, ": MB more after the last env step than after 10,000, at most ", noise),
          sizes$value[nrow(sizes)] - sizes$value[1L], at_most = noise, digits = 2)
   }
-  many <- rows$value[rows$contender == "server for 8192 lanes"]
+  many <- rows$value[rows$contender == "server for 8192 sub-environments"]
   list(
     grown("R's objects"), grown("R"), grown("server"),
-    goal("an instance of 8192 lanes: at most 100 MB of the server", many, at_most = 100)
+    goal("an instance of 8192 sub-environments: at most 100 MB of the server", many, at_most = 100)
   )
 }

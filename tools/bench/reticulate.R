@@ -2,9 +2,9 @@
 # Reads one line a turn and answers with one, env steps a second (or what was asked for):
 #
 #   versions                            as JSON
-#   forms KIND                          the ways to call it, KIND is single or lanes
+#   forms KIND                          the ways to call it, KIND is single or vector
 #   single FORM SECONDS                 FORM counts the ways from 1
-#   lanes FORM SECONDS LANES MODE       MODE is Gymnasium's vectorization_mode
+#   vector FORM SECONDS NUM_ENVS MODE   MODE is Gymnasium's vectorization_mode
 
 source("tools/bench/turns.R")
 suppressMessages(library(reticulate))
@@ -30,7 +30,7 @@ by_bytes <- function(x) {
   if (x$ndim == 2L) matrix(values, ncol = x$shape[[2L]]) else values
 }
 
-# One lane, too, has its row.
+# One sub-environment, too, has its row.
 numpy_actions <- function(actions) numpy$array(actions, dtype = "int64", ndmin = 1L)
 
 single_forms <- list(
@@ -43,18 +43,18 @@ single_forms <- list(
 
 # Of a batch of actions what is made beforehand and what in each step, and how the results
 # become R's.
-lanes_form <- function(prepare, send, read) list(prepare = prepare, send = send, read = read)
+vector_form <- function(prepare, send, read) list(prepare = prepare, send = send, read = read)
 
-lanes_forms <- if (converts) {
+vector_forms <- if (converts) {
   list(
-    "step(array(a))" = lanes_form(array, identity, identity),
-    "NumPy actions made beforehand" = lanes_form(numpy_actions, identity, identity)
+    "step(array(a))" = vector_form(array, identity, identity),
+    "NumPy actions made beforehand" = vector_form(numpy_actions, identity, identity)
   )
 } else {
   list(
-    "np$array(a), x$tolist()" = lanes_form(identity, numpy_actions, by_list),
-    "np$array(a), bytes" = lanes_form(identity, numpy_actions, by_bytes),
-    "NumPy actions made beforehand, bytes" = lanes_form(numpy_actions, identity, by_bytes)
+    "np$array(a), x$tolist()" = vector_form(identity, numpy_actions, by_list),
+    "np$array(a), bytes" = vector_form(identity, numpy_actions, by_bytes),
+    "NumPy actions made beforehand, bytes" = vector_form(numpy_actions, identity, by_bytes)
   )
 }
 
@@ -84,15 +84,15 @@ single <- function(form, seconds) {
   )
 }
 
-lanes <- function(form, seconds, lanes, mode) {
-  lanes <- as.integer(lanes)
-  env <- environment_of(paste("lanes", lanes), function() {
-    gymnasium$make_vec("CartPole-v1", num_envs = lanes, vectorization_mode = mode)
+vector <- function(form, seconds, num_envs, mode) {
+  num_envs <- as.integer(num_envs)
+  env <- environment_of(paste("num_envs", num_envs), function() {
+    gymnasium$make_vec("CartPole-v1", num_envs = num_envs, vectorization_mode = mode)
   })
-  form <- lanes_forms[[as.integer(form)]]
+  form <- vector_forms[[as.integer(form)]]
   step <- env$step
-  play_lanes(
-    lanes, lapply(alternating(lanes), form$prepare),
+  play_vector(
+    num_envs, lapply(alternating(num_envs), form$prepare),
     function(actions) lapply(step(form$send(actions))[1:4], form$read),
     as.numeric(seconds)
   )
@@ -110,9 +110,9 @@ versions <- function() {
 answer <- function(command, ...) {
   switch(command,
     versions = jsonlite::toJSON(versions(), auto_unbox = TRUE),
-    forms = jsonlite::toJSON(names(switch(..1, single = single_forms, lanes = lanes_forms))),
+    forms = jsonlite::toJSON(names(switch(..1, single = single_forms, num_envs = vector_forms))),
     single = format(single(...), digits = 15),
-    lanes = format(lanes(...), digits = 15)
+    vector = format(vector(...), digits = 15)
   )
 }
 

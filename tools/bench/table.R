@@ -5,9 +5,9 @@ number <- function(x) {
 }
 
 what_text <- function(summary) {
-  lanes <- ifelse(summary$lanes == 1, "lane", "lanes")
+  num_envs <- ifelse(summary$num_envs == 1, "sub_env", "vector")
   ifelse(
-    summary$part == "lanes", sprintf("%.0f %s", summary$lanes, lanes),
+    summary$part == "vector", sprintf("%.0f %s", summary$num_envs, num_envs),
     c(single = "single", search = "random search", fresh = "search in a fresh R",
       memory = "memory")[summary$part]
   )

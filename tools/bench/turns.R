@@ -20,14 +20,14 @@ play_single <- function(reset, step, seconds) {
   }
 }
 
-# `step(actions)` moves all lanes, which begin their next episodes by themselves; `actions`
-# are two batches made beforehand.
-play_lanes <- function(lanes, actions, step, seconds) {
+# `step(actions)` moves all sub-environments, which begin their next episodes by themselves;
+# `actions` are two batches made beforehand.
+play_vector <- function(num_envs, actions, step, seconds) {
   steps <- 0
   started <- now()
   repeat {
     for (i in rep_len(1:2, 10L)) step(actions[[i]])
-    steps <- steps + 10 * lanes
+    steps <- steps + 10 * num_envs
     elapsed <- now() - started
     if (elapsed >= seconds) {
       return(steps / elapsed)
@@ -35,4 +35,4 @@ play_lanes <- function(lanes, actions, step, seconds) {
   }
 }
 
-alternating <- function(lanes) list(rep_len(0:1, lanes), rep_len(1:0, lanes))
+alternating <- function(num_envs) list(rep_len(0:1, num_envs), rep_len(1:0, num_envs))

@@ -24,7 +24,7 @@ HERE = Path(__file__).parent
 
 SEEN = ("observation", "reward", "terminated", "truncated")
 
-# Lanes come as tensors, and so do the observations of all that R plays.
+# Sub-environments come as tensors, and so do the observations of all that R plays.
 KINDS = [
     {"env_id": "CartPole-v1"},
     {"env_id": "Pendulum-v1"},
@@ -40,16 +40,18 @@ KINDS = [
 def plan(number: int, steps: int, folder: Path) -> dict:
     """Write down what one client plays; two that follow each other play the same, R and Python."""
     kind = KINDS[number // 2 % len(KINDS)]
-    lanes = kind.get("num_envs", 1)
+    sub_envs = kind.get("num_envs", 1)
     rng = np.random.default_rng(number)
     env = gymnasium.make(kind["env_id"])
     box = isinstance(env.action_space, gymnasium.spaces.Box)
-    actions = rng.uniform(-2, 2, (steps, lanes)) if box else rng.integers(0, 2, (steps, lanes))
+    actions = (
+        rng.uniform(-2, 2, (steps, sub_envs)) if box else rng.integers(0, 2, (steps, sub_envs))
+    )
     # As the server has them, which rounds to the action space's dtype.
     actions = actions.astype(np.float32 if box else np.int64).astype(np.float64)
     env.close()
     actions.tofile(folder / f"{number}.actions")
-    told = {**kind, "lanes": lanes, "box": box, "seed": 1000 + number, "steps": steps}
+    told = {**kind, "num_envs": sub_envs, "box": box, "seed": 1000 + number, "steps": steps}
     told |= {"actions": str(folder / f"{number}.actions"), "seen": str(folder / f"{number}.seen")}
     (folder / f"{number}.json").write_text(json.dumps(told))
     return told
@@ -57,20 +59,20 @@ def plan(number: int, steps: int, folder: Path) -> dict:
 
 def play_here(told: dict) -> np.ndarray:
     """Return what is to be seen, from Gymnasium in this process."""
-    lanes, box = told["lanes"], told["box"]
+    sub_envs, box = told["num_envs"], told["box"]
     vector = "num_envs" in told
     if vector:
         # As the server chooses: the environment's own class where it has one.
         own = gymnasium.spec(told["env_id"]).vector_entry_point is not None
         mode = "vector_entry_point" if own else "sync"
-        env = gymnasium.make_vec(told["env_id"], num_envs=lanes, vectorization_mode=mode)
+        env = gymnasium.make_vec(told["env_id"], num_envs=sub_envs, vectorization_mode=mode)
     else:
         env = gymnasium.make(told["env_id"])
     seen = []
     observation, _ = env.reset(seed=told["seed"])
-    for row in np.fromfile(told["actions"]).reshape(-1, lanes):
+    for row in np.fromfile(told["actions"]).reshape(-1, sub_envs):
         if box:
-            action = row.astype(np.float32).reshape((lanes, 1) if vector else (1,))
+            action = row.astype(np.float32).reshape((sub_envs, 1) if vector else (1,))
         else:
             action = row.astype(np.int64) if vector else int(row[0])
         observation, reward, terminated, truncated, _ = env.step(action)
@@ -84,14 +86,14 @@ def play_here(told: dict) -> np.ndarray:
 
 def play_there(port: int, told: dict) -> None:
     """Play over HTTP, as this client would."""
-    lanes, box = told["lanes"], told["box"]
+    sub_envs, box = told["num_envs"], told["box"]
     client = Client(port)
     fields = {name: told[name] for name in ("env_id", "num_envs") if name in told}
     url = f"/v1/envs/{client.post('/v1/envs/', **fields)['instance_id']}"
     seen = []
     if "num_envs" in told:
         client.post(f"{url}/reset/", seed=told["seed"])
-        for row in np.fromfile(told["actions"]).reshape(-1, lanes):
+        for row in np.fromfile(told["actions"]).reshape(-1, sub_envs):
             action = [[number] for number in row] if box else [int(number) for number in row]
             answer = client.post_for_tensors(f"{url}/step/", action=action)
             seen += [_numbers(*answer[name]) for name in SEEN]

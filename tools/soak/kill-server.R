@@ -8,7 +8,7 @@ library(gym)
 moments <- as.integer(c(commandArgs(TRUE), "50")[[1]])
 path <- tempfile(fileext = ".rds")
 
-# In lanes of its own, so that a search has dozens of blocks.
+# In sub-environments of its own, so that a search has dozens of blocks.
 play <- function(server, ...) {
   env <- gym_make("CartPole-v1", num_envs = 16, client = server)
   search_random(env, rounds = 60, target = Inf, seed = 1, ...)

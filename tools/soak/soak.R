@@ -9,13 +9,13 @@ set.seed(told[[2]])
 end <- Sys.time() + told[[3]]
 options(gym.viewer = FALSE)
 while (Sys.time() < end) {
-  lanes <- sample(list(NULL, 16L), 1)[[1]]
-  env <- gym_make("CartPole-v1", num_envs = lanes, client = client)
+  sub_envs <- sample(list(NULL, 16L), 1)[[1]]
+  env <- gym_make("CartPole-v1", num_envs = sub_envs, client = client)
   env$reset(seed = sample(1000, 1))
   for (i in seq_len(sample(200, 1))) {
-    out <- env$step(sample(0:1, max(lanes, 1L), replace = TRUE))
-    stopifnot(length(out$reward) == max(lanes, 1L))
-    if (is.null(lanes) && (out$terminated || out$truncated)) env$reset()
+    out <- env$step(sample(0:1, max(sub_envs, 1L), replace = TRUE))
+    stopifnot(length(out$reward) == max(sub_envs, 1L))
+    if (is.null(sub_envs) && (out$terminated || out$truncated)) env$reset()
     if (Sys.time() > end) break
   }
   if (runif(1) < 0.3) {

@@ -54,11 +54,11 @@ def live(port: int, seed: int, seconds: float) -> None:
 
 def step(client: Client, url: str, kind: dict, rng: random.Random) -> None:
     """Step once, and again reset what has ended."""
-    lanes = kind.get("num_envs")
+    sub_envs = kind.get("num_envs")
     if "Pendulum" in kind["env_id"]:
-        action: object = [[rng.uniform(-2, 2)] for _ in range(lanes)]
+        action: object = [[rng.uniform(-2, 2)] for _ in range(sub_envs)]
     else:
-        action = [rng.randrange(2) for _ in range(lanes)] if lanes else rng.randrange(2)
+        action = [rng.randrange(2) for _ in range(sub_envs)] if sub_envs else rng.randrange(2)
     if "Raises" in kind["env_id"] and action == 1:
         refused(client, 500, f"{url}/step/", action=1)
     elif client.post(f"{url}/step/", action=action)["done"] is True:
@@ -181,7 +181,8 @@ def main(seconds: float) -> int:
         status != 0,
         reaps and grown["environments"] > 0,
         grown["threads"] > 8,
-        # The queues of lanes in processes of their own go when Python collects its garbage.
+        # The queues of sub-environments in processes of their own go when Python collects its
+        # garbage.
         grown["files"] > 32,
         grown["processes"] > 2,
         end["MB"] > 1.25 * warm["MB"] + 20,

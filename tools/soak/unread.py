@@ -22,9 +22,9 @@ from serving import Client, ServerProcess, allow_many_open_files
 
 TOKEN = "correct-horse-battery"
 HOST = "HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-# 11 KB each; the observations of so many lanes are 256 KB.
+# 11 KB each; the observations of so many sub-environments are 256 KB.
 PAGE_FILE = f"GET /v1/envs/00000000/watch/watch.js {HOST}\r\n".encode() * 100
-LANES = 16384
+SUB_ENVS = 16384
 RECEIVE_BYTES = 2048
 # Only so many come a second.
 MOST_A_SECOND = 1000
@@ -32,7 +32,7 @@ MOST_A_SECOND = 1000
 
 def observations(port: int) -> bytes:
     """Return requests whose answers are large, and cost the server nearly nothing."""
-    made = Client(port).post("/v1/envs/", env_id="CartPole-v1", num_envs=LANES)
+    made = Client(port).post("/v1/envs/", env_id="CartPole-v1", num_envs=SUB_ENVS)
     head = f"POST /v1/envs/{made['instance_id']}/reset/ {HOST}Accept: application/x-safetensors\r\n"
     return f"{head}Content-Length: 2\r\n\r\n{{}}".encode() * 5
 

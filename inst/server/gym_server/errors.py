@@ -25,7 +25,7 @@ _STATUS = {
     "body_too_large": 413,
     "too_many_instances": 429,
     "too_many_keys": 429,
-    "too_many_lanes": 429,
+    "too_many_sub_envs": 429,
     "too_many_processes": 429,
     "too_many_watchers": 429,
     "too_much_memory": 429,
@@ -145,11 +145,12 @@ def invalid_parameter(name: str, value: object, wanted: str) -> GymServerError:
     )
 
 
-def wrong_length(name: str, found: int, lanes: int, what: str) -> GymServerError:
-    """A list has not one entry for each lane."""
+def wrong_length(name: str, found: int, sub_envs: int, what: str) -> GymServerError:
+    """A list has not one entry for each sub-environment."""
     return GymServerError(
         "invalid_parameter",
-        f"The parameter '{name}' must hold one {what} for each of the {lanes} lanes, not {found}",
+        f"The parameter '{name}' must hold one {what} for each of the {sub_envs} "
+        f"sub-environments, not {found}",
     )
 
 

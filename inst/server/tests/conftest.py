@@ -57,14 +57,14 @@ def faulty(create):
 
 
 @pytest.fixture
-def lanes(create):
+def sub_envs(create):
     """Make a vector instance of the environment whose infos come and go."""
 
-    def lanes(space="Box", num_envs=3, name="Uneven", longest=4, **fields):
+    def sub_envs(space="Box", num_envs=3, name="Uneven", longest=4, **fields):
         kwargs = {"space": space, "longest": longest}
         return create(f"faulty_envs:{name}-v0", num_envs=num_envs, kwargs=kwargs, **fields)
 
-    return lanes
+    return sub_envs
 
 
 class ServerProcess:
@@ -208,9 +208,9 @@ def watch(app):
         drawn = []
         draw = instance._draw
 
-        def counting(lane):
-            drawn.append(lane)
-            return draw(lane)
+        def counting(sub_env):
+            drawn.append(sub_env)
+            return draw(sub_env)
 
         instance._draw = counting
         return instance, drawn

@@ -339,8 +339,8 @@ class CannotSaySo(Uneven):
         raise failure
 
 
-class SpoilsOneLane(Uneven):
-    """Fails in the lane whose episodes are longest."""
+class SpoilsOneSubEnv(Uneven):
+    """Fails in the sub-environment whose episodes are longest."""
 
     def step(self, action):
         if self.left == self.longest:
@@ -525,7 +525,7 @@ for _kind in (
     Rogue,
     Shifted,
     Spins,
-    SpoilsOneLane,
+    SpoilsOneSubEnv,
     Uneven,
     Variables,
 ):

@@ -3,7 +3,7 @@ import pytest
 from vector_play import (
     action_file,
     actions_of,
-    check_that_no_lane_moved,
+    check_that_no_sub_env_moved,
     post,
     refusal,
     twin,
@@ -19,8 +19,8 @@ from gym_server.spaces.stacking import stack
 @pytest.mark.parametrize(
     ("kind", "action", "words"),
     [
-        ("Discrete", [0, 0], "for each of the 3 lanes is needed, not 2"),
-        ("Discrete", 0, "for each of the 3 lanes is needed, as a list"),
+        ("Discrete", [0, 0], "for each of the 3 sub-environments is needed, not 2"),
+        ("Discrete", 0, "for each of the 3 sub-environments is needed, as a list"),
         ("Discrete", [0, 7, 0], "7 at [1] is not in Discrete(5, start=-2)"),
         ("Discrete", [0, None, 0], "null at [1] is not in Discrete"),
         ("Discrete", [0, 0, 0.5], "0.5 at [2] is not in Discrete"),
@@ -31,20 +31,24 @@ from gym_server.spaces.stacking import stack
         ("Sequence", [[], [], [[0, "x"]]], '"x" at [2][0][1] is not in'),
     ],
 )
-def test_an_action_that_is_none_is_named_with_its_lane(client, lanes, kind, action, words):
-    url = lanes(kind)
+def test_an_action_that_is_none_is_named_with_its_sub_env(client, sub_envs, kind, action, words):
+    url = sub_envs(kind)
     post(client, url, "reset", seed=1)
     code, message = refusal(client, url, "step", action=action)
     assert code == "action_not_in_space"
     assert message.startswith("The action ")
     assert words in message
-    check_that_no_lane_moved(client, url, kind, seed=1)
+    check_that_no_sub_env_moved(client, url, kind, seed=1)
 
 
 @pytest.mark.parametrize(
     ("kind", "tensor", "words"),
     [
-        ("Discrete", np.array([0, 0], np.int64), "for each of the 3 lanes is needed, not 2"),
+        (
+            "Discrete",
+            np.array([0, 0], np.int64),
+            "for each of the 3 sub-environments is needed, not 2",
+        ),
         ("Discrete", np.array([0, 0, 7], np.int32), "7 at [2] is not in Discrete"),
         ("Discrete", np.array([0, 0, -3], np.int64), "-3 at [2] is not in Discrete"),
         ("Discrete", np.array([0, 0, 0], np.int16), "I64 [3] is needed"),
@@ -55,8 +59,10 @@ def test_an_action_that_is_none_is_named_with_its_lane(client, lanes, kind, acti
         ("half", np.full((3, 1), np.inf, np.float16), '"Infinity" at [0][0]'),
     ],
 )
-def test_tensors_that_are_no_actions_are_named_with_their_lane(client, lanes, kind, tensor, words):
-    url = lanes(kind)
+def test_tensors_that_are_no_actions_are_named_with_their_sub_env(
+    client, sub_envs, kind, tensor, words
+):
+    url = sub_envs(kind)
     post(client, url, "reset", seed=1)
     answer = client.post(
         f"{url}/step/",
@@ -65,11 +71,11 @@ def test_tensors_that_are_no_actions_are_named_with_their_lane(client, lanes, ki
     )
     assert (answer.status_code, answer.json["code"]) == (400, "action_not_in_space")
     assert words in answer.json["message"]
-    check_that_no_lane_moved(client, url, kind, seed=1)
+    check_that_no_sub_env_moved(client, url, kind, seed=1)
 
 
-def test_the_lane_comes_first_in_the_path_to_what_is_wrong(client, lanes):
-    url, env = lanes("Dict"), twin("Dict")
+def test_the_sub_env_comes_first_in_the_path_to_what_is_wrong(client, sub_envs):
+    url, env = sub_envs("Dict"), twin("Dict")
     post(client, url, "reset", seed=1)
     actions, _ = actions_of(env, 0)
     wrong = [dict(action) for action in actions]
@@ -83,7 +89,7 @@ def test_the_lane_comes_first_in_the_path_to_what_is_wrong(client, lanes):
     )
     assert '"Infinity" at [2]$`a/b~`[1][0] is not in' in in_json
     assert answer.json["message"] == in_json
-    check_that_no_lane_moved(client, url, "Dict", seed=1)
+    check_that_no_sub_env_moved(client, url, "Dict", seed=1)
 
 
 def test_an_action_space_that_holds_nothing_is_refused(client):

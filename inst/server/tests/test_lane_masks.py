@@ -6,7 +6,7 @@ from vector_play import (
     action_file,
     actions_of,
     apart,
-    check_that_no_lane_moved,
+    check_that_no_sub_env_moved,
     members,
     post,
     read_tensors,
@@ -20,7 +20,7 @@ from gym_server.protocol.safetensors import TENSORS
 
 
 def row(info, index):
-    """Return what a vector info says of one lane."""
+    """Return what a vector info says of one sub-environment."""
     return {
         key: row(value, index) if isinstance(value, dict) else value[index]
         for key, value in info.items()
@@ -30,12 +30,12 @@ def row(info, index):
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Text", "Sequence"])
-def test_lanes_that_step_alone_go_on_as_if_they_were_alone(client, lanes, kind, mode):
-    url = lanes(kind, num_envs=4, autoreset_mode=mode, vectorization_mode="sync")
+def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(client, sub_envs, kind, mode):
+    url = sub_envs(kind, num_envs=4, autoreset_mode=mode, vectorization_mode="sync")
     alone = [twin(kind, num_envs=1, autoreset_mode=mode) for _ in range(4)]
     post(client, url, "reset", seed=20)
-    for lane, env in enumerate(alone):
-        env.reset(seed=20 + lane)
+    for sub_env, env in enumerate(alone):
+        env.reset(seed=20 + sub_env)
     space = alone[0].single_observation_space
     rng = np.random.default_rng(1)
     ended = np.zeros(4, dtype=bool)
@@ -46,35 +46,35 @@ def test_lanes_that_step_alone_go_on_as_if_they_were_alone(client, lanes, kind, 
         if not mask.any():
             ended[:] = False
             post(client, url, "reset", seed=step)
-            for lane, env in enumerate(alone):
-                env.reset(seed=step + lane)
+            for sub_env, env in enumerate(alone):
+                env.reset(seed=step + sub_env)
             continue
         stepping = np.flatnonzero(mask)
         expected, encoded = [], []
-        for lane in stepping:
-            actions, batch = actions_of(alone[lane], step)
-            encoded += [spaces.encode(alone[lane].single_action_space, one) for one in actions]
-            expected.append(alone[lane].step(batch))
+        for sub_env in stepping:
+            actions, batch = actions_of(alone[sub_env], step)
+            encoded += [spaces.encode(alone[sub_env].single_action_space, one) for one in actions]
+            expected.append(alone[sub_env].step(batch))
         answer = post(client, url, "step", action=plain(encoded), step_mask=mask.tolist())
         steps += len(stepping)
         observations = [members(env, one[0])[0] for env, one in zip(alone, expected, strict=False)]
         assert apart(space, answer["observation"]) == observations
         for name, index in (("reward", 1), ("terminated", 2), ("truncated", 3)):
             assert answer[name] == [one[index].item() for one in expected]
-        final_lanes = []
+        final_sub_envs = []
         for index, one in enumerate(expected):
             info = plain(one[4])
-            final_lanes += [index] if info.pop("final_obs", None) is not None else []
+            final_sub_envs += [index] if info.pop("final_obs", None) is not None else []
             info.pop("_final_obs", None)
             assert row(answer["info"], index) == row(info, 0)
-        assert answer.get("final_lanes", []) == final_lanes
+        assert answer.get("final_sub_envs", []) == final_sub_envs
         if mode == "Disabled":
             ended[stepping] = answer["done"]
     assert client.get(url).json["steps"] == steps
 
 
-def test_a_reset_by_mask_shows_the_other_lanes_where_they_are(client, lanes):
-    url = lanes("Discrete", vectorization_mode="sync")
+def test_a_reset_by_mask_shows_the_other_sub_envs_where_they_are(client, sub_envs):
+    url = sub_envs("Discrete", vectorization_mode="sync")
     before = post(client, url, "reset", seed=2)["observation"]
     stepped = post(client, url, "step", action=[0], step_mask=[False, True, False])["observation"]
     assert stepped != before[1:2]
@@ -82,16 +82,16 @@ def test_a_reset_by_mask_shows_the_other_lanes_where_they_are(client, lanes):
     assert after[1:] == [*stepped, before[2]]
 
 
-def test_a_seed_for_some_lanes_leaves_the_action_space_alone(client, lanes):
-    one, other = (lanes(seed=3, vectorization_mode="sync") for _ in range(2))
+def test_a_seed_for_some_sub_envs_leaves_the_action_space_alone(client, sub_envs):
+    one, other = (sub_envs(seed=3, vectorization_mode="sync") for _ in range(2))
     post(client, one, "reset")
     post(client, one, "reset", seed=5, reset_mask=[True, False, False])
     samples = [client.get(f"{url}/action_space/sample").json for url in (one, other)]
     assert samples[0] == samples[1]
 
 
-def test_stepping_every_lane_by_mask_is_stepping(client, lanes):
-    masked, plainly = lanes(vectorization_mode="sync"), lanes()
+def test_stepping_every_sub_env_by_mask_is_stepping(client, sub_envs):
+    masked, plainly = sub_envs(vectorization_mode="sync"), sub_envs()
     for url in (masked, plainly):
         post(client, url, "reset", seed=2)
     for step in range(8):
@@ -101,8 +101,8 @@ def test_stepping_every_lane_by_mask_is_stepping(client, lanes):
         )
 
 
-def test_a_step_mask_travels_in_the_metadata_of_tensors(client, lanes):
-    url, env = lanes("Discrete", vectorization_mode="sync"), twin("Discrete")
+def test_a_step_mask_travels_in_the_metadata_of_tensors(client, sub_envs):
+    url, env = sub_envs("Discrete", vectorization_mode="sync"), twin("Discrete")
     post(client, url, "reset", seed=2)
     file = read_tensors(
         client.post(
@@ -117,8 +117,8 @@ def test_a_step_mask_travels_in_the_metadata_of_tensors(client, lanes):
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
-def test_a_reset_by_mask_leaves_the_other_lanes_alone(client, lanes, mode):
-    url, env = lanes(vectorization_mode=mode), twin()
+def test_a_reset_by_mask_leaves_the_other_sub_envs_alone(client, sub_envs, mode):
+    url, env = sub_envs(vectorization_mode=mode), twin()
     post(client, url, "reset", seed=2)
     env.reset(seed=2)
     for seed in (None, 4, [None, 6, 8]):
@@ -132,26 +132,26 @@ def test_a_reset_by_mask_leaves_the_other_lanes_alone(client, lanes, mode):
 @pytest.mark.parametrize(
     ("mask", "wanted"),
     [
-        ([True, False], "must hold one boolean for each of the 3 lanes, not 2"),
-        ([False] * 3, "must hold true for at least one lane"),
-        ([], "must be a list of true or false for each lane, not []"),
-        ([1, 0, 1], "must be a list of true or false for each lane"),
-        ([[True]] * 3, "must be a list of true or false for each lane"),
-        ("true", "must be a list of true or false for each lane"),
+        ([True, False], "must hold one boolean for each of the 3 sub-environments, not 2"),
+        ([False] * 3, "must hold true for at least one sub-environment"),
+        ([], "must be a list of true or false for each sub-environment, not []"),
+        ([1, 0, 1], "must be a list of true or false for each sub-environment"),
+        ([[True]] * 3, "must be a list of true or false for each sub-environment"),
+        ("true", "must be a list of true or false for each sub-environment"),
     ],
 )
 @pytest.mark.parametrize("route", ["reset", "step"])
-def test_what_is_no_mask_for_these_lanes_is_refused(client, lanes, route, mask, wanted):
-    url = lanes("Discrete")
+def test_what_is_no_mask_for_these_sub_envs_is_refused(client, sub_envs, route, mask, wanted):
+    url = sub_envs("Discrete")
     post(client, url, "reset", seed=1)
     code, message = refusal(client, url, route, action=[0] * 3, **{f"{route}_mask": mask})
     assert code == "invalid_parameter"
     assert wanted in message
-    check_that_no_lane_moved(client, url, "Discrete", seed=1)
+    check_that_no_sub_env_moved(client, url, "Discrete", seed=1)
 
 
-def test_what_an_implementation_has_not_is_refused(client, create, lanes):
-    own, processes = create(num_envs=3), lanes("Discrete", vectorization_mode="async")
+def test_what_an_implementation_has_not_is_refused(client, create, sub_envs):
+    own, processes = create(num_envs=3), sub_envs("Discrete", vectorization_mode="async")
     for url in (own, processes):
         post(client, url, "reset", seed=1)
     refused = client.post(f"{own}/reset/", json={"reset_mask": [True] * 3}).json
@@ -161,16 +161,16 @@ def test_what_an_implementation_has_not_is_refused(client, create, lanes):
     for url in (own, processes):
         code, _ = refusal(client, url, "step", action=[0] * 3, step_mask=[True] * 3)
         assert code == "not_supported"
-    check_that_no_lane_moved(client, processes, "Discrete", seed=1)
+    check_that_no_sub_env_moved(client, processes, "Discrete", seed=1)
 
 
-def test_a_mask_in_the_options_is_refused(client, lanes):
-    refused = refusal(client, lanes(), "reset", options={"reset_mask": [True] * 3})
+def test_a_mask_in_the_options_is_refused(client, sub_envs):
+    refused = refusal(client, sub_envs(), "reset", options={"reset_mask": [True] * 3})
     assert refused[0] == "invalid_parameter"
 
 
-def test_a_mask_needs_lanes_that_were_reset(client, lanes):
-    assert refusal(client, lanes(), "reset", reset_mask=[True] * 3)[0] == "reset_needed"
+def test_a_mask_needs_sub_envs_that_were_reset(client, sub_envs):
+    assert refusal(client, sub_envs(), "reset", reset_mask=[True] * 3)[0] == "reset_needed"
 
 
 @pytest.mark.parametrize("name", ["reset_mask", "step_mask"])

@@ -261,7 +261,7 @@ def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, e
 
 
 @pytest.mark.slow
-def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
+def test_a_sub_env_is_chosen_on_the_page(browser, server, look, eventually):
     url = server.create("CartPole-v1", num_envs=3, vectorization_mode="sync")
     server.post(f"{url}/reset/", {"seed": 1})
     look(url)
@@ -269,13 +269,13 @@ def test_a_lane_is_chosen_on_the_page(browser, server, look, eventually):
     eventually(lambda: browser.find_element(By.ID, "picture").is_displayed())
     time.sleep(0.5)
     first = picture(browser)
-    lane = browser.find_element(By.ID, "lane")
-    lane.clear()
-    lane.send_keys("3" + Keys.ENTER)
+    sub_env = browser.find_element(By.ID, "sub_env")
+    sub_env.clear()
+    sub_env.send_keys("3" + Keys.ENTER)
     eventually(lambda: picture(browser) != first)
     label = browser.find_element(By.ID, "picture").get_attribute("aria-label")
-    assert "lane 3" in label
-    assert "of all lanes" in text(browser, "caption")
+    assert "sub-environment 3" in label
+    assert "of all sub-environments" in text(browser, "caption")
 
 
 @pytest.mark.slow
@@ -369,7 +369,7 @@ def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
     eventually(lambda: picture(browser) != first)
     assert text(browser, "env") == "CartPole-v1"
     assert complaints(browser) == []
-    # The lane's and the speed's controls ask with the key, too.
+    # The sub-environment's and the speed's controls ask with the key, too.
     browser.find_element(By.ID, "pause").click()
     eventually(lambda: text(browser, "state") == "paused")
     time.sleep(1)

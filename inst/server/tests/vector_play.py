@@ -33,14 +33,14 @@ def in_process(env_id, num_envs, autoreset_mode="NextStep", **kwargs):
 
 
 def actions_of(env, seed):
-    """Return actions for the lanes, one by one and as a batch."""
+    """Return actions for the sub-environments, one by one and as a batch."""
     env.single_action_space.seed(seed)
     actions = [env.single_action_space.sample() for _ in range(env.num_envs)]
     return actions, stack(env.single_action_space, actions)
 
 
 def members(env, batch):
-    """Return a batch's members, one a lane, as JSON values."""
+    """Return a batch's members, one a sub-environment, as JSON values."""
     return [
         plain(spaces.encode(env.single_observation_space, member))
         for member in iterate(env.observation_space, batch)
@@ -48,40 +48,41 @@ def members(env, batch):
 
 
 def apart(space, batch):
-    """Return the lanes of a batch that came as JSON."""
+    """Return the sub-environments of a batch that came as JSON."""
     match space:
         case Dict():
             parts = {key: apart(part, batch[str(key)]) for key, part in space.spaces.items()}
             return [
-                dict(zip(map(str, parts), lane, strict=True))
-                for lane in zip(*parts.values(), strict=True)
+                dict(zip(map(str, parts), sub_env, strict=True))
+                for sub_env in zip(*parts.values(), strict=True)
             ]
         case Tuple():
             parts = [apart(part, items) for part, items in zip(space.spaces, batch, strict=True)]
-            return [list(lane) for lane in zip(*parts, strict=True)]
+            return [list(sub_env) for sub_env in zip(*parts, strict=True)]
         case _:
             return batch
 
 
 def split_final(env, info):
-    """Return an info without the last observations, these as JSON values, and their lanes."""
+    """Return an info without the last observations, these as JSON values, and their
+    sub-environments."""
     info = dict(info)
     final, which = info.pop("final_obs", None), info.pop("_final_obs", None)
     if final is None:
         return plain(info), None, None
-    lanes = np.flatnonzero(which).tolist()
+    sub_envs = np.flatnonzero(which).tolist()
     space = env.single_observation_space
-    batch = create_empty_array(space, n=len(lanes))
-    batch = concatenate(space, [final[lane] for lane in lanes], batch)
-    batched = gymnasium.vector.utils.batch_space(space, len(lanes))
+    batch = create_empty_array(space, n=len(sub_envs))
+    batch = concatenate(space, [final[sub_env] for sub_env in sub_envs], batch)
+    batched = gymnasium.vector.utils.batch_space(space, len(sub_envs))
     encoded = [plain(spaces.encode(space, member)) for member in iterate(batched, batch)]
-    return plain(info), encoded, lanes
+    return plain(info), encoded, sub_envs
 
 
 def check_step(env, answer, expected):
     """Hold a step's JSON answer equal to what Gymnasium returned."""
     observation, reward, terminated, truncated, info = expected
-    info, final, lanes = split_final(env, info)
+    info, final, sub_envs = split_final(env, info)
     space = env.single_observation_space
     assert apart(space, answer["observation"]) == members(env, observation)
     assert answer["reward"] == reward.tolist()
@@ -89,7 +90,7 @@ def check_step(env, answer, expected):
     assert answer["truncated"] == truncated.tolist()
     assert answer["done"] == (terminated | truncated).tolist()
     assert answer["info"] == info
-    assert ("final_obs" in answer, answer.get("final_lanes")) == (final is not None, lanes)
+    assert ("final_obs" in answer, answer.get("final_sub_envs")) == (final is not None, sub_envs)
     if final is not None:
         assert apart(space, answer["final_obs"]) == final
 
@@ -106,7 +107,7 @@ def check_tensors(space, name, file, batch):
             for index, part in enumerate(space.spaces):
                 check_tensors(part, f"{name}/{index}", file, batch[index])
         case Text():
-            assert [texts[f"{name}/{lane}"] for lane in range(len(batch))] == list(batch)
+            assert [texts[f"{name}/{sub_env}"] for sub_env in range(len(batch))] == list(batch)
         case _:
             batch = np.asarray(batch, np.int64 if isinstance(space, Discrete) else None)
             array = file.tensors[name].array()
@@ -153,7 +154,7 @@ def action_file(env, batch, **metadata):
     return safetensors.write(parts.tensors, metadata)
 
 
-def check_that_no_lane_moved(client, url, kind, seed, mode="NextStep"):
+def check_that_no_sub_env_moved(client, url, kind, seed, mode="NextStep"):
     """Hold the next step equal to the first one after a reset."""
     env = twin(kind, autoreset_mode=mode)
     env.reset(seed=seed)

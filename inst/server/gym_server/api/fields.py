@@ -1,4 +1,4 @@
-"""What the fields of requests may hold that are about lanes."""
+"""What the fields of requests may hold that are about sub-environments."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _seed(value: object) -> int | tuple[int | None, ...]:
     try:
         return tuple(None if seed is None else _one_seed(seed) for seed in value)
     except ValueError:
-        wanted = "an integer, 0 or greater, or a list of one, or null, for each lane"
+        wanted = "an integer, 0 or greater, or a list of one, or null, for each sub-environment"
         raise invalid_parameter("seed", value, wanted) from None
 
 
@@ -42,7 +42,7 @@ def _mask(value: object) -> np.ndarray:
     return mask
 
 
-def _lane(value: object) -> int:
+def _sub_env(value: object) -> int:
     """Return a number out of a query, where everything is text."""
     if not (isinstance(value, str) and value.isascii() and value.isdecimal()):
         raise ValueError
@@ -89,10 +89,10 @@ SEED = Kind(
 )
 MASK = Kind(
     {"type": "array", "items": {"type": "boolean"}, "minItems": 1},
-    "a list of true or false for each lane",
+    "a list of true or false for each sub-environment",
     _mask,
     empty_is_absent=False,
 )
-LANE = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _lane)
+SUB_ENV = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _sub_env)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})

@@ -136,7 +136,7 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
         "seed",
         fields.SEED,
         "Seeds the action space, and the first reset without a seed; with num_envs also a list "
-        "of one a lane.",
+        "of one a sub-environment.",
     ),
     Field(
         "render_mode",
@@ -146,16 +146,19 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
     ),
     Field("kwargs", wire.OBJECT, "Handed to the environment."),
     Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
-    Field("num_envs", fields.NUM_ENVS, "How many lanes; absent for a single environment."),
+    Field(
+        "num_envs", fields.NUM_ENVS, "How many sub-environments; absent for a single environment."
+    ),
     Field(
         "vectorization_mode",
         fields.VECTORIZATION_MODE,
-        "What runs the lanes; absent for the fastest that can do what is asked.",
+        "What runs the sub-environments; absent for the fastest that can do what is asked.",
     ),
     Field(
         "autoreset_mode",
         fields.AUTORESET_MODE,
-        "What becomes of a lane whose episode ended, in Gymnasium's words; absent for NextStep.",
+        "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
+        "NextStep.",
     ),
     Field("name", wire.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
@@ -197,11 +200,12 @@ def env_about(call: Call) -> dict:
     Field(
         "seed",
         fields.SEED,
-        "Seeds the environment and its action space; with lanes also a list of one a lane.",
+        "Seeds the environment and its action space; with sub-environments also a list of one for "
+        "each.",
     ),
     Field("options", wire.OBJECT, "The environment's own."),
-    Field("reset_mask", fields.MASK, "Which lanes are reset; absent for all of them."),
-    answer="observation, info; with lanes one row a lane",
+    Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
+    answer="observation, info; with sub-environments one row a sub-environment",
     once=True,
     tensors=True,
 )
@@ -219,7 +223,8 @@ def env_reset(call: Call) -> dict:
     Field(
         "action",
         wire.ANYTHING,
-        "A member of the action space, a Box's bounds aside; with lanes one for each that steps.",
+        "A member of the action space, a Box's bounds aside; with sub-environments one for each "
+        "that steps.",
         required=True,
     ),
     Field(
@@ -228,9 +233,10 @@ def env_reset(call: Call) -> dict:
         "Whether people want to see it: while somebody watches, the step waits until real time "
         "has come so far.",
     ),
-    Field("step_mask", fields.MASK, "Which lanes step; absent for all of them."),
-    answer="observation, reward, done, terminated, truncated, info; with lanes one row for each "
-    "that stepped, and final_obs and final_lanes where lanes ended and were reset at once",
+    Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
+    answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
+    "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
+    "reset at once",
     once=True,
     tensors=True,
     tensor_body=True,
@@ -286,14 +292,14 @@ def env_observation_space_contains(call: Call) -> dict:
 @declare(
     "GET",
     INSTANCE + "render/",
-    Field("lane", fields.LANE, "Which lane, from 0; absent for the first."),
+    Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
     answer="the current frame",
     content_type="image/png",
     tensors=True,
 )
 def env_render(call: Call) -> Content:
     """Draw the current state."""
-    frame = call.instance.render(call.fields["lane"] or 0)
+    frame = call.instance.render(call.fields["sub_env"] or 0)
     if call.tensors:
         return Content(write_tensors({"frame": Tensor.of(frame)}, {}), TENSORS)
     return Content(png(frame), "image/png")

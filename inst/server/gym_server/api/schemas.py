@@ -8,7 +8,7 @@ _COUNT = {"type": "integer", "minimum": 0}
 _SECONDS = {"type": "number", "minimum": 0}
 _ANYTHING: dict = {}
 _SPACE = {"type": "object", "required": ["name"], "properties": {"name": _TEXT}}
-# One value, or with lanes one for each; what is not finite is a word.
+# One value, or with sub-environments one for each; what is not finite is a word.
 _NUMBER = {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 _NUMBERS = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
 _FLAGS = {"anyOf": [_FLAG, {"type": "array", "items": _FLAG}]}
@@ -46,7 +46,7 @@ _ABOUT = {
     "reward_threshold": _or_null(_NUMBER),
     "max_episode_steps": _or_null(_COUNT),
     "render_fps": _ANYTHING,
-    "lanes": _or_null(_COUNT),
+    "num_envs": _or_null(_COUNT),
     "vectorization_mode": _or_null(_TEXT),
     "autoreset_mode": _or_null(_TEXT),
     "render_mode": _or_null(_TEXT),

@@ -94,19 +94,19 @@ def env_watch_script(call: Call) -> Content:
 @declare(
     "GET",
     _WATCH + "state/",
-    Field("lane", fields.LANE, "Which lane, from 0; absent for the first."),
-    Field("after", fields.LANE, "The number of what was seen last; absent for the present."),
-    answer="number, state (running, ended, not_reset, busy), env_id, lane, lanes, episode, step, "
-    "return, returns (of the last 100 episodes that ended, in any lane), steps, reward_threshold, "
-    "fps (null unless it is shown in real time), frame (a PNG in Base64, or null), and without "
-    "a frame why_no_picture, hint and observation (names, values, size)",
+    Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
+    Field("after", fields.SUB_ENV, "The number of what was seen last; absent for the present."),
+    answer="number, state (running, ended, not_reset, busy), env_id, sub_env, num_envs, episode, "
+    "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "
+    "reward_threshold, fps (null unless it is shown in real time), frame (a PNG in Base64, or "
+    "null), and without a frame why_no_picture, hint and observation (names, values, size)",
 )
 def env_watch_state(call: Call) -> Content:
     """Wait for something new to see; drawing takes place only for those who wait here."""
-    lane = call.fields["lane"] or 0
-    call.instance.check_lane(lane)
+    sub_env = call.fields["sub_env"] or 0
+    call.instance.check_sub_env(sub_env)
     with call.services.watchers.one_more():
-        body = call.instance.screen.see(lane, call.fields["after"])
+        body = call.instance.screen.see(sub_env, call.fields["after"])
     return Content(body, JSON, headers=(_NOT_KEPT,))
 
 

@@ -76,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             limits=Limits(
                 options.max_instances,
                 options.max_num_envs,
-                options.max_total_lanes,
+                options.max_total_sub_envs,
                 options.max_processes,
                 options.max_memory_mb,
                 options.max_watchers,

@@ -75,20 +75,20 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "--max-num-envs",
         type=_number(1, 1_000_000),
         default=Limits.max_num_envs,
-        help="lanes of the largest vector environment (%(default)s)",
+        help="sub-environments of the largest vector environment (%(default)s)",
     )
     limits.add_argument(
-        "--max-total-lanes",
+        "--max-total-sub-envs",
         type=_number(1, 100_000_000),
-        default=Limits.max_total_lanes,
-        help="lanes of all environments together (four times --max-num-envs)",
+        default=Limits.max_total_sub_envs,
+        help="sub-environments of all environments together (four times --max-num-envs)",
     )
     limits.add_argument(
         "--max-processes",
         type=_number(1, 100_000),
         default=Limits.max_processes,
-        help="processes of all environments together: those of 'async' lanes, and of environments "
-        "that have one of their own (%(default)s)",
+        help="processes of all environments together: those of 'async' sub-environments, and of "
+        "environments that have one of their own (%(default)s)",
     )
     limits.add_argument(
         "--max-memory-mb",

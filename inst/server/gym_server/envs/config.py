@@ -15,13 +15,14 @@ class Choices:
 
     Attributes:
         env_id: what to create.
-        seed: for the first reset that has none; for a vector environment also one a lane.
+        seed: for the first reset that has none; for a vector environment also one a
+            sub-environment.
         render_mode: see ``make.make_env()``.
         kwargs: handed to the environment.
         wrappers: the first one is innermost.
-        num_envs: how many lanes; None for a single environment.
-        vectorization_mode: what runs the lanes; None leaves it to us.
-        autoreset_mode: what becomes of a lane whose episode ended; None for NEXT_STEP.
+        num_envs: how many sub-environments; None for a single environment.
+        vectorization_mode: what runs the sub-environments; None leaves it to us.
+        autoreset_mode: what becomes of a sub-environment whose episode ended; None for NEXT_STEP.
         name: what its owner calls it.
     """
 

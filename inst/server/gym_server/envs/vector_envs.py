@@ -1,4 +1,4 @@
-"""Lanes of a vector environment: how one is made, and Gymnasium's two ways to run many."""
+"""Sub-environments: how one is made, and Gymnasium's two ways to run many."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _CLOSE_SECONDS = 3.0
 _ERROR_SECONDS = 5.0
 
 
-class Lane:
-    """Makes one lane: an environment and the wrappers around it."""
+class SubEnv:
+    """Makes one sub-environment: an environment and the wrappers around it."""
 
     def __init__(
         self,
@@ -62,17 +62,17 @@ class Lane:
         return wrap(make_from_spec(*self._how), self._wrappers, self._renderer, account)
 
 
-class WorkerLane(Lane):
-    """Makes a lane in a process of its own."""
+class WorkerSubEnv(SubEnv):
+    """Makes a sub-environment in a process of its own."""
 
-    def __init__(self, lane: Lane, autoreset_mode: AutoresetMode) -> None:
+    def __init__(self, sub_env: SubEnv, autoreset_mode: AutoresetMode) -> None:
         """Make what another one makes.
 
         Args:
-            lane: the other.
-            autoreset_mode: the lane resets itself when it is NEXT_STEP.
+            sub_env: the other.
+            autoreset_mode: the sub-environment resets itself when it is NEXT_STEP.
         """
-        super().__init__(*lane._how, lane._wrappers, lane._renderer, lane._account)
+        super().__init__(*sub_env._how, sub_env._wrappers, sub_env._renderer, sub_env._account)
         self._resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
 
     def __getstate__(self) -> dict:
@@ -104,61 +104,62 @@ class _ThisThread:
         return draw(*args)
 
 
-class SyncLanes(SyncVectorEnv):
-    """Lanes one after the other in this process; also only some of them."""
+class SyncSubEnvs(SyncVectorEnv):
+    """Sub-environments one after the other in this process; also only some of them."""
 
-    def __init__(self, lane: Lane, num_envs: int, autoreset_mode: AutoresetMode) -> None:
-        """Make all lanes."""
+    def __init__(self, sub_env: SubEnv, num_envs: int, autoreset_mode: AutoresetMode) -> None:
+        """Make all sub-environments."""
         # What it returns is encoded before it moves again.
-        super().__init__([lane] * num_envs, copy=False, autoreset_mode=autoreset_mode)
+        super().__init__([sub_env] * num_envs, copy=False, autoreset_mode=autoreset_mode)
 
-    def step_lanes(self, lanes: np.ndarray, actions: Any) -> tuple:
-        """Step some of the lanes.
+    def step_sub_envs(self, sub_envs: np.ndarray, actions: Any) -> tuple:
+        """Step some of the sub-environments.
 
         Args:
-            lanes: their numbers from 0, in order.
+            sub_envs: their numbers from 0, in order.
             actions: a batch of one action for each of them.
 
         Returns:
-            What ``step()`` returns, with one row for each of these lanes.
+            What ``step()`` returns, with one row for each of these sub-environments.
         """
         some = copy.copy(self)
         # Older Gymnasiums close the environments of one that is gone.
         some.closed = True
-        some.num_envs = len(lanes)
-        some.envs = [self.envs[lane] for lane in lanes]
-        some._env_obs = [self._env_obs[lane] for lane in lanes]
-        some._observations = create_empty_array(self.single_observation_space, n=len(lanes))
+        some.num_envs = len(sub_envs)
+        some.envs = [self.envs[sub_env] for sub_env in sub_envs]
+        some._env_obs = [self._env_obs[sub_env] for sub_env in sub_envs]
+        some._observations = create_empty_array(self.single_observation_space, n=len(sub_envs))
         for name in _FLAGS:
-            setattr(some, name, getattr(self, name)[lanes])
+            setattr(some, name, getattr(self, name)[sub_envs])
         answer = SyncVectorEnv.step(some, actions)
-        for lane, observation in zip(lanes, some._env_obs, strict=True):
-            self._env_obs[lane] = observation
+        for sub_env, observation in zip(sub_envs, some._env_obs, strict=True):
+            self._env_obs[sub_env] = observation
         for name in _FLAGS:
-            getattr(self, name)[lanes] = getattr(some, name)
+            getattr(self, name)[sub_envs] = getattr(some, name)
         return answer
 
-    def render_lane(self, lane: int) -> object:
-        """Draw one lane."""
-        return self.envs[lane].render()
+    def render_sub_env(self, sub_env: int) -> object:
+        """Draw one sub-environment."""
+        return self.envs[sub_env].render()
 
-    def observation_of(self, lane: int) -> object:
-        """Return what one lane was last seen to be."""
-        return self._env_obs[lane]
+    def observation_of(self, sub_env: int) -> object:
+        """Return what one sub-environment was last seen to be."""
+        return self._env_obs[sub_env]
 
 
-# What Gymnasium keeps of each lane, beside its observation.
+# What Gymnasium keeps of each sub-environment, beside its observation.
 _FLAGS = ("_rewards", "_terminations", "_truncations", "_autoreset_envs")
 
 
-class AsyncLanes(AsyncVectorEnv):
-    """Lanes in a process each, which end when they are told to, or else are ended."""
+class AsyncSubEnvs(AsyncVectorEnv):
+    """Sub-environments in a process each, which end when they are told to, or else are ended."""
 
-    def __init__(self, lane: Lane, num_envs: int, autoreset_mode: AutoresetMode) -> None:
+    def __init__(self, sub_env: SubEnv, num_envs: int, autoreset_mode: AutoresetMode) -> None:
         """Start all processes."""
         # Observations come through the pipes: in shared memory Gymnasium has no Sequence, no
         # Graph and no half floats, and its Texts never change. Without it, its worker forgets
-        # at a reset that an episode had ended, so there the lanes see to that themselves.
+        # at a reset that an episode had ended, so there the sub-environments see to that
+        # themselves.
         resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
         self._failed = False
         # Before Gymnasium starts them.
@@ -166,7 +167,7 @@ class AsyncLanes(AsyncVectorEnv):
         try:
             self._with_workers(
                 super().__init__,
-                [WorkerLane(lane, autoreset_mode)] * num_envs,
+                [WorkerSubEnv(sub_env, autoreset_mode)] * num_envs,
                 shared_memory=False,
                 copy=False,
                 context=start.START_METHOD,
@@ -179,19 +180,19 @@ class AsyncLanes(AsyncVectorEnv):
         self.metadata["autoreset_mode"] = autoreset_mode
 
     def reset(self, **how: Any) -> tuple:
-        """Reset all lanes, or those of a mask."""
+        """Reset all sub-environments, or those of a mask."""
         return self._with_workers(super().reset, **how)
 
     def step(self, actions: Any) -> tuple:
-        """Step all lanes."""
+        """Step all sub-environments."""
         return self._with_workers(super().step, actions)
 
-    def render_lane(self, lane: int) -> object:
-        """Draw one lane."""
-        return self._with_workers(self._render_lane, lane)
+    def render_sub_env(self, sub_env: int) -> object:
+        """Draw one sub-environment."""
+        return self._with_workers(self._render_sub_env, sub_env)
 
-    def _render_lane(self, lane: int) -> object:
-        pipe = self.parent_pipes[lane]
+    def _render_sub_env(self, sub_env: int) -> object:
+        pipe = self.parent_pipes[sub_env]
         pipe.send(("_call", ("render", (), {})))
         frame, success = pipe.recv()
         self._raise_if_errors([success])
@@ -212,7 +213,7 @@ class AsyncLanes(AsyncVectorEnv):
     def _ended(self) -> str:
         sentinels = [process.sentinel for process in self.processes]
         ended = wait(sentinels, timeout=1)
-        return f"lane {sentinels.index(ended[0])}" if ended else "a lane"
+        return f"sub-environment {sentinels.index(ended[0])}" if ended else "a sub-environment"
 
     def _raise_if_errors(self, successes: Sequence[bool]) -> None:
         if all(successes):
@@ -221,7 +222,7 @@ class AsyncLanes(AsyncVectorEnv):
             _, _, failure, _ = self.error_queue.get(timeout=_ERROR_SECONDS)
         except Exception:
             # Not every exception survives the way here.
-            raise RuntimeError("a lane failed, and could not send why") from None
+            raise RuntimeError("a sub-environment failed, and could not send why") from None
         raise failure
 
     def kill(self) -> None:

@@ -1,4 +1,4 @@
-"""Make a vector environment: choose what runs its lanes, or say why what was chosen cannot."""
+"""Make a vector environment by the mode that was chosen, or by the fastest that fits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gym_server.envs import make, repeats
 from gym_server.envs.config import Choices
 from gym_server.envs.footprint import Account, answer_bytes, environment_bytes, vector_bytes
-from gym_server.envs.vector_envs import AsyncLanes, Lane, SyncLanes
+from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv, SyncSubEnvs
 from gym_server.errors import GymServerError, wrong_length
 from gym_server.json_values import from_words
 from gym_server.rendering.render_thread import RenderThread
@@ -33,7 +33,7 @@ def make_vector_env(
     Args:
         choices: what the client wants; its wrappers are on the list.
         allowed_modules: as for ``make.make_env()``.
-        most: how many lanes the server allows.
+        most: how many sub-environments the server allows.
         renderer: the process's render thread.
         account: what its memory is charged to.
 
@@ -41,7 +41,7 @@ def make_vector_env(
         It, and its vectorization_mode.
 
     Raises:
-        GymServerError: as for ``make.make_env()``; ``too_many_lanes``, ``too_much_memory``,
+        GymServerError: as for ``make.make_env()``; ``too_many_sub_envs``, ``too_much_memory``,
             ``not_supported``.
     """
     kwargs = choices.kwargs or {}
@@ -81,19 +81,19 @@ class _Asked:
 
 
 def check_single(choices: Choices) -> None:
-    """Raise ``invalid_parameter`` for what only lanes can have."""
-    lanes_only = {
+    """Raise ``invalid_parameter`` for what only sub-environments can have."""
+    sub_envs_only = {
         "vectorization_mode": choices.vectorization_mode,
         "autoreset_mode": choices.autoreset_mode,
         "seed": choices.seed if isinstance(choices.seed, tuple) else None,
     }
-    for name, value in lanes_only.items():
+    for name, value in sub_envs_only.items():
         if value is not None:
             what = "A list as 'seed'" if name == "seed" else f"The parameter '{name}'"
             raise GymServerError(
                 "invalid_parameter",
-                f"{what} is for environments with lanes, and 'num_envs' was not provided",
-                "give num_envs, the number of lanes, which may also be 1",
+                f"{what} is for vector environments, and 'num_envs' was not provided",
+                "give num_envs, the number of sub-environments, which may also be 1",
             )
 
 
@@ -102,14 +102,15 @@ def _check(choices: Choices, most: int) -> None:
         raise wrong_length("seed", len(choices.seed), choices.num_envs, "integer or null")
     if choices.num_envs > most:
         raise GymServerError(
-            "too_many_lanes",
-            f"This server takes at most {most} lanes, not {choices.num_envs}",
+            "too_many_sub_envs",
+            f"This server takes at most {most} sub-environments, not {choices.num_envs}",
             "the server's option --max-num-envs sets the limit",
         )
     if choices.vectorization_mode == "async" and choices.num_envs > MOST_PROCESSES:
         raise GymServerError(
-            "too_many_lanes",
-            f"'async' takes at most {MOST_PROCESSES} lanes, a process each, not {choices.num_envs}",
+            "too_many_sub_envs",
+            f"'async' takes at most {MOST_PROCESSES} sub-environments, a process each, not "
+            f"{choices.num_envs}",
             "vectorization_mode 'sync' takes as many as the server's option --max-num-envs says",
         )
 
@@ -126,7 +127,7 @@ def _against_entry_point(asked: _Asked) -> str | None:
     if asked.kwargs.get("max_episode_steps", 1) in (-1, None):
         return "it has no words for no time limit"
     if isinstance(asked.choices.seed, tuple):
-        return "it has one generator for all lanes, so it takes one seed"
+        return "it has one generator for all sub-environments, so it takes one seed"
     return None
 
 
@@ -143,9 +144,9 @@ def _try_entry_point(asked: _Asked) -> VectorEnv | None:
 
 
 def _is_the_same_task(env: VectorEnv, asked: _Asked) -> bool:
-    """Tell whether lanes have the spaces of the environment; Atari's own lanes see other pictures.
+    """Tell whether sub-environments have the spaces of the environment.
 
-    They are also taken for the same when only they can be made.
+    Atari's own see other pictures. They are also taken for the same when only they can be made.
     """
     try:
         single = make.make_from_spec(asked.spec, None, asked.kwargs)
@@ -222,19 +223,19 @@ def _with_time_limit(asked: _Asked) -> EnvSpec:
 
 
 def _make_sync(asked: _Asked) -> VectorEnv:
-    return _make_lanes(SyncLanes, asked)
+    return _make_sub_envs(SyncSubEnvs, asked)
 
 
 def _make_async(asked: _Asked) -> VectorEnv:
-    return _make_lanes(AsyncLanes, asked)
+    return _make_sub_envs(AsyncSubEnvs, asked)
 
 
-def _make_lanes(kind: type[SyncLanes] | type[AsyncLanes], asked: _Asked) -> VectorEnv:
+def _make_sub_envs(kind: type[SyncSubEnvs] | type[AsyncSubEnvs], asked: _Asked) -> VectorEnv:
     render_mode = make.choose_render_mode(
         make.load_creator(asked.spec), asked.spec, asked.choices.render_mode
     )
     asked.account.charge(environment_bytes(asked.spec, asked.kwargs), asked.spec.id)
-    lane = Lane(
+    sub_env = SubEnv(
         asked.spec,
         render_mode,
         asked.kwargs,
@@ -242,6 +243,6 @@ def _make_lanes(kind: type[SyncLanes] | type[AsyncLanes], asked: _Asked) -> Vect
         asked.renderer,
         asked.account,
     )
-    env = make.ask(kind, lane, asked.num_envs, asked.autoreset_mode)
+    env = make.ask(kind, sub_env, asked.num_envs, asked.autoreset_mode)
     env.spec = _with_time_limit(asked)
     return env

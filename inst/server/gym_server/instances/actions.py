@@ -20,23 +20,23 @@ class ActionReader:
     makes a member is asked for.
     """
 
-    def __init__(self, space: Space, lanes: int) -> None:
+    def __init__(self, space: Space, sub_envs: int) -> None:
         """Name the space.
 
         Args:
             space: of one action.
-            lanes: how many lanes there are.
+            sub_envs: how many sub-environments there are.
         """
         self._space = space
         self._taken = spaces.with_wide_boxes(space)
-        self._lanes = lanes
+        self._sub_envs = sub_envs
 
     def read(self, action: object, rows: int | None = None) -> object:
-        """Return the action, or with lanes the batch of actions, that was sent.
+        """Return the action, or with sub-environments the batch of actions, that was sent.
 
         Args:
             action: a JSON value or ``Parts``.
-            rows: how many lanes step; None for a single environment.
+            rows: how many sub-environments step; None for a single environment.
 
         Raises:
             GymServerError: ``action_not_in_space``.
@@ -63,12 +63,12 @@ class ActionReader:
             if is_parts:
                 return spaces.decode_tensors(space, "action", action)
             return spaces.decode(space, action)
-        whose = f"the {rows} lanes"
-        if rows != self._lanes:
+        whose = f"the {rows} sub-environments"
+        if rows != self._sub_envs:
             whose += " that step"
         if is_parts:
-            return spaces.decode_lanes_tensors(space, "action", action, rows, whose)
-        return spaces.decode_lanes(space, action, rows, whose)
+            return spaces.decode_sub_envs_tensors(space, "action", action, rows, whose)
+        return spaces.decode_sub_envs(space, action, rows, whose)
 
 
 def _which_there_are(space: Space) -> str | None:

@@ -61,51 +61,51 @@ class Tally:
             self._ended = True
             self.returns.append(self._return)
 
-    def of(self, lane: int) -> Standing:
+    def of(self, sub_env: int) -> Standing:
         """Return where the episode stands."""
         return Standing(self._episode, self._step, self._return, self._ended)
 
 
-class LaneTally:
-    """Counts the episodes of many lanes.
+class SubEnvTally:
+    """Counts the episodes of many sub-environments.
 
     Attributes:
-        returns: of the last episodes that ended, in any lane.
+        returns: of the last episodes that ended, in any sub-environment.
     """
 
-    def __init__(self, lanes: int, mode: AutoresetMode) -> None:
-        """Begin before the first episode of each lane."""
+    def __init__(self, sub_envs: int, mode: AutoresetMode) -> None:
+        """Begin before the first episode of each sub-environment."""
         self.returns: deque[float] = deque(maxlen=_KEPT)
         self._mode = mode
-        self._episodes = np.zeros(lanes, dtype=np.int64)
-        self._steps = np.zeros(lanes, dtype=np.int64)
-        self._returns = np.zeros(lanes)
-        # Lanes whose next step is a reset, or that wait for one.
-        self._ended = np.zeros(lanes, dtype=bool)
+        self._episodes = np.zeros(sub_envs, dtype=np.int64)
+        self._steps = np.zeros(sub_envs, dtype=np.int64)
+        self._returns = np.zeros(sub_envs)
+        # Sub-environments whose next step is a reset, or that wait for one.
+        self._ended = np.zeros(sub_envs, dtype=bool)
 
     def begin(self, mask: np.ndarray | None) -> None:
-        """Count the episodes that begin in the lanes of a mask; None for all of them."""
-        lanes = slice(None) if mask is None else mask
-        self._episodes[lanes] += (self._steps[lanes] > 0) | (self._episodes[lanes] == 0)
-        self._clear(lanes)
+        """Count the episodes that begin in the sub-environments of a mask; None for all of them."""
+        sub_envs = slice(None) if mask is None else mask
+        self._episodes[sub_envs] += (self._steps[sub_envs] > 0) | (self._episodes[sub_envs] == 0)
+        self._clear(sub_envs)
 
-    def _clear(self, lanes: slice | np.ndarray) -> None:
-        self._steps[lanes] = 0
-        self._returns[lanes] = 0.0
-        self._ended[lanes] = False
+    def _clear(self, sub_envs: slice | np.ndarray) -> None:
+        self._steps[sub_envs] = 0
+        self._returns[sub_envs] = 0.0
+        self._ended[sub_envs] = False
 
-    def step(self, reward: np.ndarray, ended: np.ndarray, lanes: np.ndarray | None) -> None:
-        """Count a step of some lanes, one row for each; None for all of them."""
-        rows = slice(None) if lanes is None else lanes
+    def step(self, reward: np.ndarray, ended: np.ndarray, sub_envs: np.ndarray | None) -> None:
+        """Count a step of some sub-environments, one row for each; None for all of them."""
+        rows = slice(None) if sub_envs is None else sub_envs
         again = self._ended[rows]
         self._steps[rows] += 1
         self._returns[rows] += reward
         if again.any():
-            begun = np.flatnonzero(again) if lanes is None else lanes[again]
+            begun = np.flatnonzero(again) if sub_envs is None else sub_envs[again]
             self._episodes[begun] += 1
             self._clear(begun)
         if ended.any():
-            over = np.flatnonzero(ended) if lanes is None else lanes[ended]
+            over = np.flatnonzero(ended) if sub_envs is None else sub_envs[ended]
             self.returns.extend(self._returns[over].tolist())
             if self._mode is AutoresetMode.SAME_STEP:
                 self._episodes[over] += 1
@@ -113,19 +113,19 @@ class LaneTally:
             else:
                 self._ended[over] = True
 
-    def of(self, lane: int) -> Standing:
-        """Return where the episode of a lane stands."""
+    def of(self, sub_env: int) -> Standing:
+        """Return where the episode of a sub-environment stands."""
         return Standing(
-            int(self._episodes[lane]),
-            int(self._steps[lane]),
-            float(self._returns[lane]),
-            bool(self._ended[lane]),
+            int(self._episodes[sub_env]),
+            int(self._steps[sub_env]),
+            float(self._returns[sub_env]),
+            bool(self._ended[sub_env]),
         )
 
 
-def told(tally: Tally | LaneTally, lane: int) -> dict:
-    """Return as JSON values what watchers of a lane are told of its episodes."""
-    standing = tally.of(lane)
+def told(tally: Tally | SubEnvTally, sub_env: int) -> dict:
+    """Return as JSON values what watchers of a sub-environment are told of its episodes."""
+    standing = tally.of(sub_env)
     return {
         "state": "ended" if standing.ended else "running",
         "episode": standing.episode,

@@ -27,7 +27,7 @@ def make_instance(
     Args:
         choices: what that is.
         allowed_modules: names of the modules that an env_id may import.
-        max_num_envs: how many lanes it may have.
+        max_num_envs: how many sub-environments it may have.
         renderer: the process's render thread.
         undo: closes the environment when something goes wrong from here on.
         account: what its memory is charged to.
@@ -48,11 +48,11 @@ def make_instance(
         undo.push(_closing_quietly(renderer, env.close))
         wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, account)
         return Instance(wrapped, choices, renderer)
-    lanes, mode = vectorization.make_vector_env(
+    sub_envs, mode = vectorization.make_vector_env(
         choices, allowed_modules, max_num_envs, renderer, account
     )
-    undo.push(_closing_quietly(renderer, lanes.close))
-    return VectorInstance(lanes, mode, choices, renderer)
+    undo.push(_closing_quietly(renderer, sub_envs.close))
+    return VectorInstance(sub_envs, mode, choices, renderer)
 
 
 def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:

@@ -16,7 +16,7 @@ from gym_server.envs.make import ask
 from gym_server.envs.wrappers import draws_when_stepped, time_limit
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
 from gym_server.instances.actions import ActionReader
-from gym_server.instances.episode_statistics import LaneTally, Tally, told
+from gym_server.instances.episode_statistics import SubEnvTally, Tally, told
 from gym_server.instances.listed import Listed
 from gym_server.instances.lock import Hold
 from gym_server.json_values import plain
@@ -43,10 +43,10 @@ class Instance(Listed):
         """
         self._env = env
         self._learn_spaces()
-        self._lane_action_space_info = spaces.describe(self._lane_action_space)
-        self._lane_observation_space_info = spaces.describe(self._lane_observation_space)
-        self._actions = ActionReader(self._lane_action_space, self._lanes)
-        self._observes_tensors = spaces.travels_as_tensors(self._lane_observation_space)
+        self._sub_env_action_space_info = spaces.describe(self._sub_env_action_space)
+        self._sub_env_observation_space_info = spaces.describe(self._sub_env_observation_space)
+        self._actions = ActionReader(self._sub_env_action_space, self._sub_envs)
+        self._observes_tensors = spaces.travels_as_tensors(self._sub_env_observation_space)
         # Whoever reads it can create another: with the module, and with the version found.
         module, colon, name = str(choices.env_id).rpartition(":")
         self.env_id = f"{module}{colon}{env.spec.id if env.spec else name}"
@@ -69,17 +69,17 @@ class Instance(Listed):
             self._seed_actions(choices.seed)
 
     def _learn_spaces(self) -> None:
-        self.action_space = self._lane_action_space = self._env.action_space
-        self.observation_space = self._lane_observation_space = self._env.observation_space
+        self.action_space = self._sub_env_action_space = self._env.action_space
+        self.observation_space = self._sub_env_observation_space = self._env.observation_space
 
     def _find_out_whether_it_draws(self) -> bool:
         return draws_when_stepped(self._env)
 
-    def _make_tally(self) -> Tally | LaneTally:
+    def _make_tally(self) -> Tally | SubEnvTally:
         return Tally()
 
     def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
-        # One generator serves all lanes.
+        # One generator serves all sub-environments.
         seeds = seed if isinstance(seed, tuple) else (seed,)
         first = next((one for one in seeds if one is not None), None)
         if first is not None:
@@ -88,12 +88,12 @@ class Instance(Listed):
     @property
     def action_space_info(self) -> dict:
         """The description of the action space."""
-        return self._lane_action_space_info
+        return self._sub_env_action_space_info
 
     @property
     def observation_space_info(self) -> dict:
         """The description of the observation space."""
-        return self._lane_observation_space_info
+        return self._sub_env_observation_space_info
 
     def reset(
         self,
@@ -109,7 +109,7 @@ class Instance(Listed):
                 takes the seed given at creation the first time.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
-            mask: for environments with lanes only.
+            mask: for environments with sub-environments only.
 
         Returns:
             ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
@@ -155,7 +155,7 @@ class Instance(Listed):
             action: the JSON value of an action, or the action as ``Parts``; the bounds of a
                 Box are the environment's affair.
             tensors: whether the observation is wanted as tensors.
-            mask: for environments with lanes only.
+            mask: for environments with sub-environments only.
             for_eyes: whether people want to see it: not faster than in real time, then, while
                 somebody watches.
 
@@ -223,24 +223,24 @@ class Instance(Listed):
         """Answer a client's "contains"; see ``spaces.contains()``."""
         return spaces.contains(self.observation_space, self.observation_space_info, claim)
 
-    def render(self, lane: int = 0) -> np.ndarray:
-        """Draw the current state of a lane; see ``png.picture()`` for the array.
+    def render(self, sub_env: int = 0) -> np.ndarray:
+        """Draw the current state of a sub-environment; see ``png.picture()`` for the array.
 
         Raises:
             GymServerError: ``cannot_render``, ``reset_needed``, ``invalid_parameter``.
         """
-        self.check_lane(lane)
+        self.check_sub_env(sub_env)
         with self.hold:
-            return self._picture(lane)
+            return self._picture(sub_env)
 
-    def _picture(self, lane: int) -> np.ndarray:
+    def _picture(self, sub_env: int) -> np.ndarray:
         if self._env.render_mode != "rgb_array":
             raise GymServerError(
                 "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
             )
         if not self._was_reset:
             raise reset_needed("render()")
-        frame = ask(self._draw, lane)
+        frame = ask(self._draw, sub_env)
         try:
             return picture(frame)
         except ValueError as error:
@@ -252,7 +252,7 @@ class Instance(Listed):
         """Tell whether a picture takes the render thread."""
         return self._env.render_mode == "rgb_array"
 
-    def _draw(self, lane: int) -> object:
+    def _draw(self, sub_env: int) -> object:
         return self.renderer.run(self._env.render)
 
     def start_monitor(
@@ -340,12 +340,11 @@ class Instance(Listed):
         monitor = self._monitor
         return {
             **self.line(),
-            "observation_space": self._lane_observation_space_info,
-            "action_space": self._lane_action_space_info,
+            "observation_space": self._sub_env_observation_space_info,
+            "action_space": self._sub_env_action_space_info,
             "reward_threshold": spec.reward_threshold if spec else None,
             "max_episode_steps": self._max_episode_steps,
             "render_fps": plain((self._env.metadata or {}).get("render_fps")),
-            "lanes": self._lanes,
             "vectorization_mode": None,
             "autoreset_mode": None,
             "render_mode": self._choices.render_mode or self._env.render_mode,
@@ -358,8 +357,8 @@ class Instance(Listed):
             "isolated": False,
         }
 
-    def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a lane; whoever calls it has the hold.
+    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a sub-environment; whoever calls it has the hold.
 
         Returns:
             JSON values, among them the observation where there is no picture and the reason
@@ -367,9 +366,9 @@ class Instance(Listed):
         """
         facts = {
             "env_id": self.env_id,
-            "lane": lane,
-            "lanes": self._num_envs,
-            **told(self._tally, lane),
+            "sub_env": sub_env,
+            "num_envs": self._num_envs,
+            **told(self._tally, sub_env),
             "reward_threshold": getattr(self._env.spec, "reward_threshold", None),
             "steps": self._steps,
             "fps": self.screen.fps if self._for_eyes else None,
@@ -377,17 +376,19 @@ class Instance(Listed):
         if not self._was_reset:
             return {**facts, "state": "not_reset"}, None
         try:
-            return facts, self._picture(lane)
+            return facts, self._picture(sub_env)
         except GymServerError as refusal:
             reason = {"why_no_picture": refusal.message, "hint": refusal.hint}
-            return {**facts, **reason, "observation": entries(self._observed(lane))}, None
+            return {**facts, **reason, "observation": entries(self._observed(sub_env))}, None
 
-    def _observed(self, lane: int) -> object:
+    def _observed(self, sub_env: int) -> object:
         return self._observation
 
 
 def _refuse_mask(name: str, mask: np.ndarray | None) -> None:
     if mask is not None:
         raise GymServerError(
-            "not_supported", f"'{name}' is for environments with lanes", "create it with num_envs"
+            "not_supported",
+            f"'{name}' is for environments with sub-environments",
+            "create it with num_envs",
         )

@@ -23,10 +23,10 @@ class Listed:
     hold: Hold
     screen: Screen
     _choices: Choices
-    # None where there are no lanes.
+    # None where there are no sub-environments.
     _num_envs: int | None = None
     # As many as can be looked at.
-    _lanes = 1
+    _sub_envs = 1
     _made: float
     _steps: int
     # How often the environment has begun to move, and who wants to hear of the next time.
@@ -41,11 +41,11 @@ class Listed:
         """Since when a call has waited for it, in the clock's seconds, or None."""
         return self.hold.busy_since
 
-    def check_lane(self, lane: int) -> None:
-        """Raise ``invalid_parameter`` for a lane that there is not."""
-        if lane >= self._lanes:
-            last = f"an integer from 0 to {self._lanes - 1}" if self._lanes > 1 else "0"
-            raise invalid_parameter("lane", lane, f"{last} for this environment")
+    def check_sub_env(self, sub_env: int) -> None:
+        """Raise ``invalid_parameter`` for a sub-environment that there is not."""
+        if sub_env >= self._sub_envs:
+            last = f"an integer from 0 to {self._sub_envs - 1}" if self._sub_envs > 1 else "0"
+            raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
 
     def line(self) -> dict:
         """Return its line in the list."""

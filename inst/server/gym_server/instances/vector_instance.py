@@ -1,4 +1,4 @@
-"""An environment of many lanes: one row a lane in what comes and goes."""
+"""An environment of many sub-environments: one row a sub-environment in what comes and goes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gym_server import spaces
 from gym_server.envs import repeats
 from gym_server.envs.config import Choices
 from gym_server.envs.make import ask
-from gym_server.envs.vector_envs import AsyncLanes, SyncLanes
+from gym_server.envs.vector_envs import AsyncSubEnvs, SyncSubEnvs
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, reset_needed, wrong_length
-from gym_server.instances.episode_statistics import LaneTally
+from gym_server.instances.episode_statistics import SubEnvTally
 from gym_server.instances.instance import Instance
 from gym_server.json_values import plain
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.viewing.observation_summary import lane_of
+from gym_server.viewing.observation_summary import sub_env_of
 
-# What draws all lanes at once may have no more than these.
+# What draws all sub-environments at once may have no more than these.
 _MOST_DRAWN_AT_ONCE = 16
 
 
@@ -30,7 +30,7 @@ class VectorInstance(Instance):
     """A vector environment; see ``Instance`` for what is the same."""
 
     _env: VectorEnv
-    _tally: LaneTally
+    _tally: SubEnvTally
 
     def __init__(self, env: VectorEnv, mode: str, choices: Choices, renderer: RenderThread) -> None:
         """Take over a vector environment.
@@ -46,29 +46,29 @@ class VectorInstance(Instance):
         """
         self._mode = mode
         self._autoreset_mode = env.metadata["autoreset_mode"]
-        self._lanes = self._num_envs = env.num_envs
-        # The lanes that ended, where nobody resets them.
+        self._sub_envs = self._num_envs = env.num_envs
+        # The sub-environments that ended, where nobody resets them.
         self._ended = np.zeros(env.num_envs, dtype=bool)
         super().__init__(env, choices, renderer)
 
     def _learn_spaces(self) -> None:
         self.action_space = self._env.action_space
         self.observation_space = self._env.observation_space
-        self._lane_action_space = self._env.single_action_space
-        self._lane_observation_space = self._env.single_observation_space
-        if _holds_nothing(self._lane_action_space):
+        self._sub_env_action_space = self._env.single_action_space
+        self._sub_env_observation_space = self._env.single_observation_space
+        if _holds_nothing(self._sub_env_action_space):
             raise GymServerError(
                 "unsupported_space",
-                "Gymnasium cannot give each lane its action where it is of "
-                f"{spaces.brief_space(self._lane_action_space)}",
+                "Gymnasium cannot give each sub-environment its action where it is of "
+                f"{spaces.brief_space(self._sub_env_action_space)}",
                 "an empty Tuple or Dict is the reason; create the environment without num_envs",
             )
 
     def _find_out_whether_it_draws(self) -> bool:
-        return isinstance(self._env, SyncLanes) and draws_when_stepped(self._env.envs[0])
+        return isinstance(self._env, SyncSubEnvs) and draws_when_stepped(self._env.envs[0])
 
-    def _make_tally(self) -> LaneTally:
-        return LaneTally(self._lanes, self._autoreset_mode)
+    def _make_tally(self) -> SubEnvTally:
+        return SubEnvTally(self._sub_envs, self._autoreset_mode)
 
     @cached_property
     def action_space_info(self) -> dict:
@@ -89,17 +89,17 @@ class VectorInstance(Instance):
         tensors: bool = False,
         mask: np.ndarray | None = None,
     ) -> dict:
-        """Start an episode in every lane, or in those of a mask.
+        """Start an episode in every sub-environment, or in those of a mask.
 
         Args:
-            seed: one for all lanes, each of which makes its own of it, or one a lane; None as
-                for a single environment.
+            seed: one for all sub-environments, each of which makes its own of it, or one a
+                sub-environment; None as for a single environment.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
-            mask: a boolean a lane; None for all of them.
+            mask: a boolean a sub-environment; None for all of them.
 
         Returns:
-            As for a single environment, with the observations of all lanes as a batch.
+            As for a single environment, with the observations of all sub-environments as a batch.
 
         Raises:
             GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
@@ -122,7 +122,7 @@ class VectorInstance(Instance):
             if seed is None:
                 self._seed_for_reset = None
             elif mask is None:
-                # One generator serves all lanes.
+                # One generator serves all sub-environments.
                 self._seed_actions(seed)
             self._ended[slice(None) if mask is None else mask] = False
             self._tally.begin(mask)
@@ -138,10 +138,10 @@ class VectorInstance(Instance):
     def _check_seed(self, seed: int | tuple | None) -> None:
         if not isinstance(seed, tuple):
             return
-        if len(seed) != self._lanes:
-            raise wrong_length("seed", len(seed), self._lanes, "integer or null")
+        if len(seed) != self._sub_envs:
+            raise wrong_length("seed", len(seed), self._sub_envs, "integer or null")
         if self._mode == "vector_entry_point":
-            raise self._not_supported("one seed a lane")
+            raise self._not_supported("one seed a sub-environment")
 
     def _check_options(self, options: dict | None) -> None:
         repeats.check_options(self._env, options)
@@ -159,16 +159,17 @@ class VectorInstance(Instance):
         if not self._was_reset:
             raise GymServerError(
                 "reset_needed",
-                "reset() with a mask needs lanes that have been reset",
+                "reset() with a mask needs sub-environments that have been reset",
                 "reset all of them first",
             )
 
     def _check_mask(self, name: str, mask: np.ndarray) -> None:
-        if len(mask) != self._lanes:
-            raise wrong_length(name, len(mask), self._lanes, "boolean")
+        if len(mask) != self._sub_envs:
+            raise wrong_length(name, len(mask), self._sub_envs, "boolean")
         if not mask.any():
             raise GymServerError(
-                "invalid_parameter", f"The parameter '{name}' must hold true for at least one lane"
+                "invalid_parameter",
+                f"The parameter '{name}' must hold true for at least one sub-environment",
             )
 
     def _not_supported(self, what: str) -> GymServerError:
@@ -187,23 +188,24 @@ class VectorInstance(Instance):
         mask: np.ndarray | None = None,
         for_eyes: bool = False,
     ) -> dict:
-        """Take one step in every lane, or in those of a mask.
+        """Take one step in every sub-environment, or in those of a mask.
 
         Args:
-            action: a list of one JSON value for each lane that steps, or a batch as ``Parts``.
+            action: a list of one JSON value for each sub-environment that steps, or a batch as
+                ``Parts``.
             tensors: whether the answer is wanted as tensors.
-            mask: a boolean a lane; None for all of them.
+            mask: a boolean a sub-environment; None for all of them.
             for_eyes: as for a single environment.
 
         Returns:
-            As for a single environment, with one row for each lane that stepped: arrays where
-            the observation is ``Parts``, else lists.  When lanes ended and were reset at once
-            also ``final_obs``, a batch of their last observations, and ``final_lanes``, the
-            rows that they are.
+            As for a single environment, with one row for each sub-environment that stepped: arrays
+            where the observation is ``Parts``, else lists.  When sub-environments ended and were
+            reset at once also ``final_obs``, a batch of their last observations, and
+            ``final_sub_envs``, the rows that they are.
 
         Raises:
-            GymServerError: as for a single environment, each before any lane moves;
-                ``reset_needed`` also for a lane that ended and is not reset by itself;
+            GymServerError: as for a single environment, each before any sub-environment moves;
+                ``reset_needed`` also for a sub-environment that ended and is not reset by itself;
                 ``invalid_parameter``, ``not_supported``.
         """
         if for_eyes or self._for_eyes:
@@ -211,48 +213,51 @@ class VectorInstance(Instance):
         with self.hold:
             if not self._was_reset:
                 raise reset_needed("step()")
-            lanes = None if mask is None else self._lanes_of(mask)
-            rows = self._lanes if lanes is None else len(lanes)
+            sub_envs = None if mask is None else self._sub_envs_of(mask)
+            rows = self._sub_envs if sub_envs is None else len(sub_envs)
             batch = self._actions.read(action, rows)
             if self._autoreset_mode is AutoresetMode.DISABLED:
-                self._refuse_ended(lanes)
+                self._refuse_ended(sub_envs)
             try:
-                result = ask(self._step_lanes, batch, lanes, tensors and self._observes_tensors)
+                result = ask(
+                    self._step_sub_envs, batch, sub_envs, tensors and self._observes_tensors
+                )
             except GymServerError as failure:
-                # Some lanes may have moved, and others not.
+                # Some sub-environments may have moved, and others not.
                 self._was_reset = False
                 self._actions.explain(failure, action, rows)
                 raise
             self._steps += rows
             return result
 
-    def _lanes_of(self, mask: np.ndarray) -> np.ndarray:
+    def _sub_envs_of(self, mask: np.ndarray) -> np.ndarray:
         self._check_mask("step_mask", mask)
-        if not isinstance(self._env, SyncLanes):
+        if not isinstance(self._env, SyncSubEnvs):
             raise self._not_supported("step_mask")
         return np.flatnonzero(mask)
 
-    def _refuse_ended(self, lanes: np.ndarray | None) -> None:
-        stepping = np.arange(self._lanes) if lanes is None else lanes
+    def _refuse_ended(self, sub_envs: np.ndarray | None) -> None:
+        stepping = np.arange(self._sub_envs) if sub_envs is None else sub_envs
         ended = stepping[self._ended[stepping]]
         if len(ended):
             raise GymServerError(
                 "reset_needed",
-                f"step() needs a running episode in every lane, and {_named(ended)} ended",
+                f"step() needs a running episode in every sub-environment, and "
+                f"{_named(ended)} ended",
                 "reset with a reset_mask, or step the others with a step_mask",
             )
 
-    def _step_lanes(self, batch: object, lanes: np.ndarray | None, tensors: bool) -> dict:
-        if lanes is None:
+    def _step_sub_envs(self, batch: object, sub_envs: np.ndarray | None, tensors: bool) -> dict:
+        if sub_envs is None:
             moved = self._move(self._env.step, batch)
         else:
-            moved = self._move(self._env.step_lanes, lanes, batch)
+            moved = self._move(self._env.step_sub_envs, sub_envs, batch)
         observation, reward, terminated, truncated, info = moved
         reward = _reward(reward)
-        self._tally.step(reward, terminated | truncated, lanes)
+        self._tally.step(reward, terminated | truncated, sub_envs)
         self._observation = observation
         if self._autoreset_mode is AutoresetMode.DISABLED:
-            self._ended[slice(None) if lanes is None else lanes] = terminated | truncated
+            self._ended[slice(None) if sub_envs is None else sub_envs] = terminated | truncated
         final = self._take_final(info, tensors) if info else {}
         result = {
             "observation": self._encode(observation, tensors),
@@ -265,76 +270,76 @@ class VectorInstance(Instance):
         return result if tensors else _as_lists(result)
 
     def _take_final(self, info: dict, tensors: bool) -> dict:
-        """Take the last observations of the lanes that were reset out of an info."""
+        """Take the last observations of the sub-environments that were reset out of an info."""
         if self._autoreset_mode is not AutoresetMode.SAME_STEP or "final_obs" not in info:
             return {}
         final, which = info.pop("final_obs"), info.pop("_final_obs")
         rows = np.flatnonzero(which)
-        batch = spaces.stack(self._lane_observation_space, [final[row] for row in rows])
+        batch = spaces.stack(self._sub_env_observation_space, [final[row] for row in rows])
         return {
             "final_obs": self._encode(batch, tensors, "final_obs"),
-            "final_lanes": rows.tolist(),
+            "final_sub_envs": rows.tolist(),
         }
 
     def _encode(self, batch: object, tensors: bool, name: str = "observation") -> object:
         if tensors and self._observes_tensors:
-            return spaces.encode_batch_tensors(self._lane_observation_space, name, batch)
-        return spaces.encode_batch(self._lane_observation_space, batch)
+            return spaces.encode_batch_tensors(self._sub_env_observation_space, name, batch)
+        return spaces.encode_batch(self._sub_env_observation_space, batch)
 
     # The rest -------------------------------------------------------------------------------
 
     def sample_action(self) -> object:
-        """Draw an action for each lane from the batched action space's own generator."""
+        """Draw an action for each sub-environment from the batched action space's own generator."""
         with self.hold:
-            return spaces.encode_lanes(self._lane_action_space, self.action_space.sample())
+            return spaces.encode_sub_envs(self._sub_env_action_space, self.action_space.sample())
 
     def action_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains": a value has one entry a lane."""
-        return self._contains(self._lane_action_space, "action_space_info", claim)
+        """Answer a client's "contains": a value has one entry a sub-environment."""
+        return self._contains(self._sub_env_action_space, "action_space_info", claim)
 
     def observation_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains": a value has one entry a lane."""
-        return self._contains(self._lane_observation_space, "observation_space_info", claim)
+        """Answer a client's "contains": a value has one entry a sub-environment."""
+        return self._contains(self._sub_env_observation_space, "observation_space_info", claim)
 
     def _contains(self, space: Any, info: str, claim: dict) -> bool:
         if "value" not in claim:
             return spaces.describes(claim, getattr(self, info))
         try:
-            spaces.decode_lanes(space, claim["value"], self._lanes, "the lanes")
+            spaces.decode_sub_envs(space, claim["value"], self._sub_envs, "the sub-environments")
         except spaces.NotInSpace:
             return False
         return True
 
     def draws_on_render_thread(self) -> bool:
-        """Tell whether a picture takes the render thread; async lanes draw in theirs."""
-        return super().draws_on_render_thread() and not isinstance(self._env, AsyncLanes)
+        """Tell whether a picture takes the render thread; async sub-environments draw in theirs."""
+        return super().draws_on_render_thread() and not isinstance(self._env, AsyncSubEnvs)
 
-    def _draw(self, lane: int) -> object:
-        if isinstance(self._env, AsyncLanes):
-            return self._env.render_lane(lane)
-        if isinstance(self._env, SyncLanes):
-            return self.renderer.run(self._env.render_lane, lane)
-        if self._lanes > _MOST_DRAWN_AT_ONCE:
+    def _draw(self, sub_env: int) -> object:
+        if isinstance(self._env, AsyncSubEnvs):
+            return self._env.render_sub_env(sub_env)
+        if isinstance(self._env, SyncSubEnvs):
+            return self.renderer.run(self._env.render_sub_env, sub_env)
+        if self._sub_envs > _MOST_DRAWN_AT_ONCE:
             raise GymServerError(
                 "cannot_render",
-                f"{self.env_id} draws all of its {self._lanes} lanes at once, and the most that "
-                f"this server lets it draw are {_MOST_DRAWN_AT_ONCE}",
+                f"{self.env_id} draws all of its {self._sub_envs} sub-environments at once, and "
+                f"the most that this server lets it draw are {_MOST_DRAWN_AT_ONCE}",
                 "create the environment with vectorization_mode 'sync'",
             )
-        return self.renderer.run(self._env.render)[lane]
+        return self.renderer.run(self._env.render)[sub_env]
 
-    def _observed(self, lane: int) -> object:
-        if isinstance(self._env, SyncLanes):
-            # The last batch may have held only some of the lanes.
-            return self._env.observation_of(lane)
-        return lane_of(self._lane_observation_space, self._observation, lane)
+    def _observed(self, sub_env: int) -> object:
+        if isinstance(self._env, SyncSubEnvs):
+            # The last batch may have held only some of the sub-environments.
+            return self._env.observation_of(sub_env)
+        return sub_env_of(self._sub_env_observation_space, self._observation, sub_env)
 
     def _end_processes(self) -> None:
-        if isinstance(self._env, AsyncLanes):
+        if isinstance(self._env, AsyncSubEnvs):
             self._env.kill()
 
     def _close_env(self) -> None:
-        if isinstance(self._env, AsyncLanes):
+        if isinstance(self._env, AsyncSubEnvs):
             self._env.close()
         else:
             super()._close_env()
@@ -343,7 +348,8 @@ class VectorInstance(Instance):
         """Refuse: what a monitor writes is about one environment."""
         raise GymServerError(
             "not_supported",
-            f"Instance {self.instance_id} has lanes, and a monitor records single environments",
+            f"Instance {self.instance_id} has sub-environments, and a monitor records single "
+            "environments",
             "create it without num_envs",
         )
 
@@ -368,12 +374,12 @@ def _holds_nothing(space: Space) -> bool:
             return False
 
 
-def _named(lanes: np.ndarray, most: int = 10) -> str:
-    """Return the numbers of some lanes as words."""
-    if len(lanes) == 1:
-        return f"lane {lanes[0]}"
-    more = f" and {len(lanes) - most} more" if len(lanes) > most else ""
-    return f"lanes {', '.join(map(str, lanes[:most]))}{more}"
+def _named(sub_envs: np.ndarray, most: int = 10) -> str:
+    """Return the numbers of some sub-environments as words."""
+    if len(sub_envs) == 1:
+        return f"sub-environment {sub_envs[0]}"
+    more = f" and {len(sub_envs) - most} more" if len(sub_envs) > most else ""
+    return f"sub-environments {', '.join(map(str, sub_envs[:most]))}{more}"
 
 
 def _reward(reward: object) -> np.ndarray:

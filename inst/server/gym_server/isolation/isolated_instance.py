@@ -82,7 +82,7 @@ class IsolatedInstance(Listed):
         self._about = made["about"]
         account.take(max(0.0, float(made["memory"])), self.env_id)
         self.env_id = str(self._about["env_id"])
-        self._lanes = int(self._about["lanes"])
+        self._sub_envs = int(self._about["num_envs"] or 1)
         self.screen = Screen(self, made["fps"])  # type: ignore[arg-type]
         self._made = self.hold.used = time.monotonic()
 
@@ -123,7 +123,7 @@ class IsolatedInstance(Listed):
             action = _sendable(action)
         with self.hold:
             answer = self._move("step", action, tensors, mask)
-            self._steps += self._lanes if mask is None else int(mask.sum())
+            self._steps += self._sub_envs if mask is None else int(mask.sum())
             return answer
 
     def _move(self, method: str, *args: object) -> Ready:
@@ -137,19 +137,19 @@ class IsolatedInstance(Listed):
 
     # Looks ----------------------------------------------------------------------------------
 
-    def render(self, lane: int = 0) -> np.ndarray:
-        """Draw the current state of a lane; see ``Instance.render()``."""
-        self.check_lane(lane)
+    def render(self, sub_env: int = 0) -> np.ndarray:
+        """Draw the current state of a sub-environment; see ``Instance.render()``."""
+        self.check_sub_env(sub_env)
         with self.hold:
-            return self._worker.move("render", lane).frame
+            return self._worker.move("render", sub_env).frame
 
     def draws_on_render_thread(self) -> bool:
         """Tell whether a picture takes the server's render thread."""
         return False
 
-    def look(self, lane: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a lane; whoever calls it has the hold."""
-        seen = self._worker.move("look", lane)
+    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a sub-environment; whoever calls it has the hold."""
+        seen = self._worker.move("look", sub_env)
         return dict(self._value(seen)), seen.frame
 
     # While it moves -------------------------------------------------------------------------
@@ -191,7 +191,7 @@ class IsolatedInstance(Listed):
     def start_monitor(self, root: MonitorRoot, directory: str, *how: object) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
         with self.hold:
-            # Lanes are refused by the process, which says why.
+            # Sub-environments are refused by the process, which says why.
             path = None if self._num_envs is not None else root.resolve(directory)
             self._worker.move("start_monitor", self.instance_id, path, directory, *how)
 

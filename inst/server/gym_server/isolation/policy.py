@@ -16,13 +16,13 @@ to create one, ms                      2               20 (the first: 1000)   53
 memory an instance, MiB (PSS)          0.02            7.7                    29
 processor time of a step by HTTP, us   202             350 (both processes)   as by forkserver
 single steps a second from R           420             384 (9.6 % lost)
-steps of 1,024 lanes a second from R   235,000         203,000 (14.5 % lost)
+steps of 1,024 sub-environments a second from R   235,000         203,000 (14.5 % lost)
 =====================================  ==============  =====================  ================
 
 (Rates: medians of 60 interleaved rounds of 300 and 60 calls, and of the ratios of their pairs;
-six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the lanes'. Waking another
-process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a step does so
-twice; with an environment that takes its time itself the share is smaller.)
+six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the sub-environments'.
+Waking another process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a
+step does so twice; with an environment that takes its time itself the share is smaller.)
 """
 
 from __future__ import annotations

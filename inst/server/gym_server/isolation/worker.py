@@ -44,7 +44,7 @@ class Surroundings:
     Attributes:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
-        max_num_envs: how many lanes an environment may have.
+        max_num_envs: how many sub-environments an environment may have.
         memory: how many bytes it may be reckoned to take; see ``footprint``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
@@ -193,11 +193,11 @@ class _Asked:
     def sample_action(self) -> object:
         return self.instance.sample_action()
 
-    def render(self, lane: int) -> _Look:
-        return _Look(None, self.instance.render(lane))
+    def render(self, sub_env: int) -> _Look:
+        return _Look(None, self.instance.render(sub_env))
 
-    def look(self, lane: int) -> _Look:
-        return _Look(*self.instance.look(lane))
+    def look(self, sub_env: int) -> _Look:
+        return _Look(*self.instance.look(sub_env))
 
     def start_monitor(self, instance_id: str, path: Path, *args: object) -> None:
         self.instance.instance_id = instance_id

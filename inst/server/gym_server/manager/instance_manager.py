@@ -105,7 +105,7 @@ class Instances:
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``invalid_kwargs``, ``shutting_down``,
-                ``environment_died``, ``too_many_instances``, ``too_many_lanes``,
+                ``environment_died``, ``too_many_instances``, ``too_many_sub_envs``,
                 ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
         # Before an environment is made for nothing.
@@ -142,7 +142,7 @@ class Instances:
     def _room_for(self, choices: Choices, isolated: bool) -> Iterator[_Making]:
         """Keep room for an environment while it is made."""
         room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
-        share = _Share(room, Account(self._budget, room.lanes))
+        share = _Share(room, Account(self._budget, room.sub_envs))
         making, thread = _Making(choices, share), threading.get_ident()
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
@@ -381,5 +381,5 @@ class Instances:
 
 def _processes_of(choices: Choices, isolated: bool) -> int:
     """Return how many processes of its own run an environment."""
-    lanes = choices.num_envs or 1
-    return isolated + (lanes if choices.vectorization_mode == "async" else 0)
+    sub_envs = choices.num_envs or 1
+    return isolated + (sub_envs if choices.vectorization_mode == "async" else 0)

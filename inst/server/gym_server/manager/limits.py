@@ -15,16 +15,16 @@ class Room:
     """What an environment takes of what there is for all.
 
     Attributes:
-        lanes: how many it has; one without lanes counts as one.
+        sub_envs: how many it has; one without sub-environments counts as one.
         processes: how many of its own run it.
     """
 
-    lanes: int = 1
+    sub_envs: int = 1
     processes: int = 0
 
     def __add__(self, other: Room) -> Room:
         """Return both together."""
-        return Room(self.lanes + other.lanes, self.processes + other.processes)
+        return Room(self.sub_envs + other.sub_envs, self.processes + other.processes)
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Limits:
 
     Attributes:
         max_instances: how many environments there may be.
-        max_num_envs: how many lanes one of them may have.
-        max_total_lanes: how many all of them may have together, where one without lanes counts
-            as one; None for four times as many as one may have.
+        max_num_envs: how many sub-environments one of them may have.
+        max_total_sub_envs: how many all of them may have together, where one without
+            sub-environments counts as one; None for four times as many as one may have.
         max_processes: how many processes all of them may have together. However many processors
             there are, each takes 7 MB of its own when it is made and 20 MB in use, two threads
             and 15 files, whether it is used or not; this is two environments of as many as one
@@ -52,7 +52,7 @@ class Limits:
 
     max_instances: int = 1000
     max_num_envs: int = 16384
-    max_total_lanes: int | None = None
+    max_total_sub_envs: int | None = None
     max_processes: int = 128
     max_memory_mb: int = 4096
     max_watchers: int = 100
@@ -68,7 +68,7 @@ class Limits:
             more: what the new one is to have.
 
         Raises:
-            GymServerError: ``too_many_instances``, ``too_many_lanes``, ``too_many_processes``.
+            GymServerError: ``too_many_instances``, ``too_many_sub_envs``, ``too_many_processes``.
         """
         if instances >= self.max_instances:
             raise GymServerError(
@@ -77,15 +77,15 @@ class Limits:
                 "close some, GET /v1/instances/ lists them; the server's option --max-instances "
                 "sets the limit",
             )
-        most = self.max_total_lanes or 4 * self.max_num_envs
+        most = self.max_total_sub_envs or 4 * self.max_num_envs
         # One that is too large for itself hears of that.
-        if taken.lanes + more.lanes > most and more.lanes <= self.max_num_envs:
+        if taken.sub_envs + more.sub_envs > most and more.sub_envs <= self.max_num_envs:
             raise GymServerError(
-                "too_many_lanes",
-                f"All environments together may have {most} lanes, and "
-                f"{max(0, most - taken.lanes)} are left, not {more.lanes}",
+                "too_many_sub_envs",
+                f"All environments together may have {most} sub-environments, and "
+                f"{max(0, most - taken.sub_envs)} are left, not {more.sub_envs}",
                 "close some, GET /v1/instances/ lists them; the server's option "
-                "--max-total-lanes sets the limit",
+                "--max-total-sub-envs sets the limit",
             )
         left = self.max_processes - taken.processes
         if more.processes > max(0, left):

@@ -62,7 +62,7 @@ class WorkerProcess:
         context = start.context()
         pipes = [context.Pipe() for _ in range(2)]
         self._moves, self._questions = (Channel(ours) for ours, _ in pipes)
-        # Not a daemon: those may start no processes, as lanes are.
+        # Not a daemon: those may start no processes, as sub-environments are.
         self._process = context.Process(
             target=target, args=(*(theirs for _, theirs in pipes), *args), daemon=False
         )

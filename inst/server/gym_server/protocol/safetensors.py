@@ -76,7 +76,7 @@ _FEW_COLUMNS = 16
 
 
 def _by_rows(array: np.ndarray) -> np.ndarray:
-    """Return an array that lies by columns, as CartPole's lanes do, by rows; NumPy takes longer."""
+    """Return an array that lies by columns, as CartPole's do, by rows; NumPy takes longer."""
     rows = np.empty(array.shape, array.dtype)
     for column in range(array.shape[1]):
         rows[:, column] = array[:, column]

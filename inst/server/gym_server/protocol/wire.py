@@ -396,15 +396,15 @@ def _flag(value: bool) -> Tensor:
     return Tensor("BOOL", (), b"\1" if value else b"\0")
 
 
-# What an answer holds beside the observation; done is one of the two flags. With lanes they are
-# arrays already.
+# What an answer holds beside the observation; done is one of the two flags. With sub-environments
+# they are arrays already.
 _SCALARS = {
     "reward": lambda value: Tensor("F64", (), struct.pack("<d", value)),
     "terminated": _flag,
     "truncated": _flag,
 }
 
-_METADATA = ("info", "request", "final_lanes")
+_METADATA = ("info", "request", "final_sub_envs")
 
 
 def parse_path_value(text: str) -> object:

@@ -18,11 +18,11 @@ from gym_server.spaces import (  # noqa: F401
     tuple_,
 )
 from gym_server.spaces.batches import (
-    decode_lanes,
-    decode_lanes_tensors,
+    decode_sub_envs,
+    decode_sub_envs_tensors,
     encode_batch,
     encode_batch_tensors,
-    encode_lanes,
+    encode_sub_envs,
 )
 from gym_server.spaces.kinds import NotInSpace, brief_space, decode, encode
 from gym_server.spaces.membership import contains, describes
@@ -42,15 +42,15 @@ __all__ = [
     "brief_space",
     "contains",
     "decode",
-    "decode_lanes",
-    "decode_lanes_tensors",
+    "decode_sub_envs",
+    "decode_sub_envs_tensors",
     "decode_tensors",
     "describe",
     "describes",
     "encode",
     "encode_batch",
     "encode_batch_tensors",
-    "encode_lanes",
+    "encode_sub_envs",
     "encode_tensors",
     "stack",
     "travels_as_tensors",

@@ -1,8 +1,8 @@
-"""Batches of members of a space, one member a lane, as Gymnasium's vector environments have them.
+"""Batches of members of a space, one a sub-environment, as in Gymnasium's vector environments.
 
-Arrays carry the lanes along their first axis, Tuples and Dicts are batched part by part, and
-Text, Sequence, Graph and OneOf have one entry a lane.  Nothing here loops over the lanes of
-an array.
+Arrays carry the sub-environments along their first axis, Tuples and Dicts are batched part by part,
+and Text, Sequence, Graph and OneOf have one entry a sub-environment.  Nothing here loops over the
+sub-environments of an array.
 """
 
 from __future__ import annotations
@@ -66,34 +66,36 @@ def _(space: Dict, batch: dict) -> object:
     return {str(key): encode_batch(part, batch[key]) for key, part in space.spaces.items()}
 
 
-def encode_lanes(space: Space, batch: object) -> list:
-    """Return a batch as JSON values, one a lane: what ``decode_lanes()`` reads."""
+def encode_sub_envs(space: Space, batch: object) -> list:
+    """Return a batch as JSON values, one a sub-environment: what ``decode_sub_envs()`` reads."""
     return [encode(space, member) for member in unstack(space, batch)]  # type: ignore[arg-type]
 
 
-def decode_lanes(space: Space, value: object, lanes: int, whose: str) -> object:
-    """Return the batch that a list of JSON values stands for, each of them a lane's.
+def decode_sub_envs(space: Space, value: object, sub_envs: int, whose: str) -> object:
+    """Return the batch that a list of JSON values stands for, each of them a sub-environment's.
 
     Args:
-        space: of one lane.
+        space: of one sub-environment.
         value: what came.
-        lanes: how many there are.
-        whose: names the lanes where the number is wrong, in words that follow "for each of".
+        sub_envs: how many there are.
+        whose: names the sub-environments where the number is wrong, in words that follow "for each
+            of".
 
     Raises:
-        NotInSpace: for a wrong number of lanes; for a value that is no member, with the lane
-            (from 0) as the first step of its path.
+        NotInSpace: for a wrong number of sub-environments; for a value that is no member, with the
+            sub-environment (from 0) as the first step of its path.
     """
-    if not isinstance(value, list) or len(value) != lanes:
+    if not isinstance(value, list) or len(value) != sub_envs:
         found = f", not {len(value)}" if isinstance(value, list) else ", as a list"
         raise NotInSpace(space, value, f"one action for each of {whose} is needed{found}")
     if isinstance(space, _ARRAYS):
         try:
             return _all_at_once(space, value)
         except (TypeError, ValueError, OverflowError, NotInSpace):
-            # Lanes may write their values in several ways, and a refusal names the lane.
+            # Sub-environments may write their values in several ways, and a refusal names the
+            # sub-environment.
             pass
-    return stack(space, [decode_part(space, item, lane) for lane, item in enumerate(value)])
+    return stack(space, [decode_part(space, item, sub_env) for sub_env, item in enumerate(value)])
 
 
 class _Batched(NamedTuple):
@@ -151,8 +153,8 @@ def _(space: Discrete, name: str, batch: object, parts: Parts) -> None:
 
 @_take_apart.register
 def _(space: Text, name: str, batch: tuple, parts: Parts) -> None:
-    for lane, text in enumerate(batch):
-        parts.texts[part_name(name, lane)] = encode(space, text)  # type: ignore[assignment]
+    for sub_env, text in enumerate(batch):
+        parts.texts[part_name(name, sub_env)] = encode(space, text)  # type: ignore[assignment]
 
 
 @_take_apart.register
@@ -167,110 +169,113 @@ def _(space: Dict, name: str, batch: dict, parts: Parts) -> None:
         _take_apart(part, part_name(name, key), batch[key], parts)
 
 
-def decode_lanes_tensors(space: Space, name: str, sent: Parts, lanes: int, whose: str) -> object:
-    """Return the batch that some tensors are, the lanes along their first axes.
+def decode_sub_envs_tensors(
+    space: Space, name: str, sent: Parts, sub_envs: int, whose: str
+) -> object:
+    """Return the batch that some tensors are, the sub-environments along their first axes.
 
     Args:
-        space: of one lane.
+        space: of one sub-environment.
         name: of the tensors.
         sent: what came.
-        lanes: how many there are.
-        whose: as for ``decode_lanes()``.
+        sub_envs: how many there are.
+        whose: as for ``decode_sub_envs()``.
 
     Raises:
-        NotInSpace: as for ``decode_lanes()``, and for a part too few or too many, or of another
+        NotInSpace: as for ``decode_sub_envs()``, and for a part too few or too many, or of another
             dtype or shape.
     """
     left = Parts(dict(sent.tensors), dict(sent.texts))
-    batch = _put_together(space, name, left, _Lanes(lanes, whose))
+    batch = _put_together(space, name, left, _SubEnvs(sub_envs, whose))
     refuse_leftovers(space, name, left)
     return batch
 
 
-class _Lanes(NamedTuple):
-    """How many lanes there must be, what they are called, and where in their members we are."""
+class _SubEnvs(NamedTuple):
+    """How many sub-environments there must be, their name, and where in their members we are."""
 
     number: int
     whose: str
     path: tuple[str | int, ...] = ()
 
-    def inside(self, step: str | int) -> _Lanes:
+    def inside(self, step: str | int) -> _SubEnvs:
         return self._replace(path=(*self.path, step))
 
 
 @singledispatch
-def _put_together(space: Space, name: str, parts: Parts, lanes: _Lanes) -> object:
+def _put_together(space: Space, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     raise NotInSpace(space, name, "its members travel as JSON")
 
 
 @_put_together.register
-def _(space: Tuple, name: str, parts: Parts, lanes: _Lanes) -> object:
+def _(space: Tuple, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     return tuple(
-        _put_together(part, part_name(name, index), parts, lanes.inside(index))
+        _put_together(part, part_name(name, index), parts, sub_envs.inside(index))
         for index, part in enumerate(space.spaces)
     )
 
 
 @_put_together.register
-def _(space: Dict, name: str, parts: Parts, lanes: _Lanes) -> object:
+def _(space: Dict, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     return {
-        key: _put_together(part, part_name(name, key), parts, lanes.inside(str(key)))
+        key: _put_together(part, part_name(name, key), parts, sub_envs.inside(str(key)))
         for key, part in space.spaces.items()
     }
 
 
 @_put_together.register
-def _(space: Text, name: str, parts: Parts, lanes: _Lanes) -> object:
+def _(space: Text, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     try:
         return tuple(
-            put_part_together(space, name, lane, parts, lane) for lane in range(lanes.number)
+            put_part_together(space, name, sub_env, parts, sub_env)
+            for sub_env in range(sub_envs.number)
         )
     except NotInSpace as refusal:
-        refusal.path[1:1] = lanes.path
+        refusal.path[1:1] = sub_envs.path
         raise
 
 
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: Space, name: str, parts: Parts, lanes: _Lanes) -> object:
-    return _take_lanes(space, name, space.dtype, parts, lanes)
+def _(space: Space, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
+    return _take_sub_envs(space, name, space.dtype, parts, sub_envs)
 
 
 @_put_together.register
-def _(space: Discrete, name: str, parts: Parts, lanes: _Lanes) -> object:
+def _(space: Discrete, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     wide = wide_dtype(space)
     sent = parts.tensors.get(name)
     # R's integers are these.
     is_short = sent is not None and sent.dtype == "I32" and wide == np.int64
-    array = _take_lanes(space, name, np.dtype(np.int32) if is_short else wide, parts, lanes)
+    array = _take_sub_envs(space, name, np.dtype(np.int32) if is_short else wide, parts, sub_envs)
     return array.astype(space.dtype, copy=False)
 
 
-def _take_lanes(
-    space: Space, name: str, dtype: np.dtype, parts: Parts, lanes: _Lanes
+def _take_sub_envs(
+    space: Space, name: str, dtype: np.dtype, parts: Parts, sub_envs: _SubEnvs
 ) -> np.ndarray:
     try:
-        _check_number(space, parts.tensors.get(name), lanes)
-        array = take_array(space, name, dtype, (lanes.number, *(space.shape or ())), parts)
+        _check_number(space, parts.tensors.get(name), sub_envs)
+        array = take_array(space, name, dtype, (sub_envs.number, *(space.shape or ())), parts)
     except NotInSpace as refusal:
-        refusal.path[:] = lanes.path
+        refusal.path[:] = sub_envs.path
         raise
     try:
         check_bounds(space, bounds_of(space), array)
     except NotInSpace as refusal:
-        # Its path begins with the lane.
-        refusal.path[1:1] = lanes.path
+        # Its path begins with the sub-environment.
+        refusal.path[1:1] = sub_envs.path
         raise
     return array
 
 
-def _check_number(space: Space, sent: Tensor | None, lanes: _Lanes) -> None:
+def _check_number(space: Space, sent: Tensor | None, sub_envs: _SubEnvs) -> None:
     if not sent or not sent.shape or sent.shape[1:] != (space.shape or ()):
         return
-    if sent.shape[0] != lanes.number:
+    if sent.shape[0] != sub_envs.number:
         raise NotInSpace(
             space,
             f"{sent.dtype} {list(sent.shape)}",
-            f"one action for each of {lanes.whose} is needed, not {sent.shape[0]}",
+            f"one action for each of {sub_envs.whose} is needed, not {sent.shape[0]}",
         )

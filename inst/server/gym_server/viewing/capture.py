@@ -45,13 +45,13 @@ class Glimpse(NamedTuple):
 
 
 def glimpse(
-    instance: Instance, lane: int, deadline: float, is_patient: Callable[[float], bool]
+    instance: Instance, sub_env: int, deadline: float, is_patient: Callable[[float], bool]
 ) -> Glimpse:
-    """Look at a lane of an instance.
+    """Look at a sub-environment of an instance.
 
     Args:
         instance: what to look at.
-        lane: its number, from 0.
+        sub_env: its number, from 0.
         deadline: until when to wait for the render thread, in the clock's seconds.
         is_patient: tells, given such a deadline, whether to wait on.
 
@@ -61,13 +61,13 @@ def glimpse(
     """
     if not instance.draws_on_render_thread():
         with _holding(instance, is_patient) as began:
-            return _look(instance, lane, began)
+            return _look(instance, sub_env, began)
     while True:
         # First the render thread: who has the hold and then waits for it keeps the environment
         # from its steps while others are drawn.
         try:
             seen = instance.renderer.run_while(
-                lambda: is_patient(deadline), _look_if_free, instance, lane
+                lambda: is_patient(deadline), _look_if_free, instance, sub_env
             )
         except Occupied:
             raise Busy from None
@@ -77,22 +77,22 @@ def glimpse(
         # step. If its steps wait for the render thread themselves, this may wait there as they do.
         goes_on = (lambda: is_patient(deadline)) if instance.draws_when_stepped else (lambda: False)
         with _holding(instance, is_patient) as began, contextlib.suppress(Occupied):
-            return instance.renderer.run_while(goes_on, _look, instance, lane, began)
+            return instance.renderer.run_while(goes_on, _look, instance, sub_env, began)
 
 
-def _look_if_free(instance: Instance, lane: int) -> Glimpse | None:
+def _look_if_free(instance: Instance, sub_env: int) -> Glimpse | None:
     # No waiting here: the step that has the hold may wait for the render thread.
     if not instance.hold.take(0):
         return None
     try:
-        return _look(instance, lane, time.monotonic())
+        return _look(instance, sub_env, time.monotonic())
     finally:
         instance.hold.give_back()
 
 
-def _look(instance: Instance, lane: int, began: float) -> Glimpse:
+def _look(instance: Instance, sub_env: int, began: float) -> Glimpse:
     moves = instance.moves
-    facts, frame = instance.look(lane)
+    facts, frame = instance.look(sub_env)
     return Glimpse(moves, facts, frame, began, time.monotonic() - began)
 
 

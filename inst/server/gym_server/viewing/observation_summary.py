@@ -12,22 +12,24 @@ _MOST = 64
 _LONGEST_TEXT = 200
 
 
-def lane_of(space: Space, batch: object, lane: int) -> object:
-    """Return the observation of one lane out of a batch.
+def sub_env_of(space: Space, batch: object, sub_env: int) -> object:
+    """Return the observation of one sub-environment out of a batch.
 
     Args:
-        space: of one lane.
+        space: of one sub-environment.
         batch: as Gymnasium's vector environments have it.
-        lane: its number, from 0.
+        sub_env: its number, from 0.
     """
     match space:
         case Dict():
-            return {key: lane_of(part, batch[key], lane) for key, part in space.spaces.items()}
+            return {
+                key: sub_env_of(part, batch[key], sub_env) for key, part in space.spaces.items()
+            }
         case Tuple():
             parts = zip(space.spaces, batch, strict=True)
-            return tuple(lane_of(part, items, lane) for part, items in parts)
+            return tuple(sub_env_of(part, items, sub_env) for part, items in parts)
         case _:
-            return batch[lane]
+            return batch[sub_env]
 
 
 def entries(observation: object) -> dict:

@@ -35,7 +35,7 @@ _LONGEST_WAIT = 15.0
 # How long after its last question a watcher is taken to be still there.
 _STAYS_SECONDS = 2.0
 
-# Pictures of lanes that nobody has asked for since.
+# Pictures of sub-environments that nobody has asked for since.
 _KEPT_SECONDS = 10.0
 
 # What environments without a speed of their own move at, and the longest that one step waits.
@@ -44,7 +44,7 @@ _LONGEST_PACE = 1.0
 
 
 class Shot(NamedTuple):
-    """What was seen of a lane.
+    """What was seen of a sub-environment.
 
     Attributes:
         number: tells it from every other of this environment.
@@ -86,11 +86,11 @@ class Screen:
 
     # For watchers ---------------------------------------------------------------------------
 
-    def see(self, lane: int, after: int | None) -> bytes:
+    def see(self, sub_env: int, after: int | None) -> bytes:
         """Wait for something that a watcher has not seen.
 
         Args:
-            lane: which lane to look at.
+            sub_env: which sub-environment to look at.
             after: the number of what it saw last.
 
         Returns:
@@ -107,11 +107,11 @@ class Screen:
             self._asking += 1
         try:
             while True:
-                shot = self._await(lane, after, deadline)
+                shot = self._await(sub_env, after, deadline)
                 if shot is not None:
                     return shot.body
                 try:
-                    self._draw(lane, deadline)
+                    self._draw(sub_env, deadline)
                 finally:
                     with self._changed:
                         self._drawing = False
@@ -141,20 +141,20 @@ class Screen:
     def _stay(self) -> None:
         self._stays_until = time.monotonic() + _STAYS_SECONDS
 
-    def _await(self, lane: int, after: int | None, deadline: float) -> Shot | None:
+    def _await(self, sub_env: int, after: int | None, deadline: float) -> Shot | None:
         """Return what answers a watcher, or None when it has to draw."""
         with self._changed:
             while True:
                 if self._ended is not None:
                     raise self._ended
                 now = time.monotonic()
-                shot = self._shots.get(lane)
+                shot = self._shots.get(sub_env)
                 stale = shot is None or shot.moves != self._instance.moves
                 due = now >= self._due
                 if shot is not None:
                     new = shot.number != after and not (stale and due)
                     if new or now >= deadline:
-                        self._shots[lane] = shot._replace(seen=now)
+                        self._shots[sub_env] = shot._replace(seen=now)
                         return shot
                 if stale and due and not self._drawing:
                     self._drawing = True
@@ -179,8 +179,8 @@ class Screen:
 
     # Drawing --------------------------------------------------------------------------------
 
-    def _draw(self, lane: int, deadline: float) -> None:
-        seen = glimpse(self._instance, lane, deadline, self._is_patient)
+    def _draw(self, sub_env: int, deadline: float) -> None:
+        seen = glimpse(self._instance, sub_env, deadline, self._is_patient)
         facts, frame = seen.facts, seen.frame
         # The instance goes on while this is put into words.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
@@ -192,7 +192,7 @@ class Screen:
             self._due = seen.began + max(_LEAST_SECONDS, wait)
             self._numbers += 1
             now = time.monotonic()
-            self._shots[lane] = Shot(self._numbers, seen.moves, body, now)
+            self._shots[sub_env] = Shot(self._numbers, seen.moves, body, now)
             for other in [key for key, s in self._shots.items() if s.seen < now - _KEPT_SECONDS]:
                 del self._shots[other]
 

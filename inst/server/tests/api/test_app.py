@@ -235,10 +235,10 @@ def test_a_field_of_a_query_is_given_once(client, create):
     url = create()
     client.post(f"{url}/reset/", json={})
     for path in (
-        f"{url}/watch/state/?lane=&lane=7",
-        f"{url}/render/?lane=0&lane=0",
+        f"{url}/watch/state/?sub_env=&sub_env=7",
+        f"{url}/render/?sub_env=0&sub_env=0",
         "/v1/registry/?search=Cart&search=Pole",
     ):
         refusal = client.get(path)
         assert (refusal.status_code, refusal.json["code"]) == (400, "invalid_parameter")
-    assert client.get(f"{url}/render/?lane=0&unknown=1&unknown=2").status_code == 200
+    assert client.get(f"{url}/render/?sub_env=0&unknown=1&unknown=2").status_code == 200

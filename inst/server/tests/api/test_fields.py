@@ -11,7 +11,7 @@ def test_what_is_no_mask_is_refused(value):
     assert code_of(wire.read, {"m": value}, [Field("m", fields.MASK, "")]) == "invalid_parameter"
 
 
-def test_seeds_may_be_one_a_lane():
+def test_seeds_may_be_one_a_sub_env():
     seed = [Field("seed", fields.SEED, "")]
     assert wire.read({"seed": [1, None, 3.0]}, seed) == {"seed": (1, None, 3)}
     assert wire.read({"seed": 3.0}, seed) == {"seed": 3}

@@ -86,7 +86,7 @@ def test_every_kind_of_answer_is_named(route):
     assert operation["responses"]["default"]["content"]["application/json"]
 
 
-def test_lanes_are_described():
+def test_sub_envs_are_described():
     paths = document(ROUTES)["paths"]
 
     def fields(path):
@@ -105,7 +105,7 @@ def test_lanes_are_described():
     assert meant(created["autoreset_mode"])["enum"] == ["NextStep", "SameStep", "Disabled"]
     assert "reset_mask" in fields("/v1/envs/{instance_id}/reset/")
     drawn = paths["/v1/envs/{instance_id}/render/"]["get"]["parameters"]
-    assert [parameter["name"] for parameter in drawn] == ["instance_id", "lane"]
+    assert [parameter["name"] for parameter in drawn] == ["instance_id", "sub_env"]
 
 
 def test_the_environment_ids_that_it_names_can_be_created(client):

@@ -144,11 +144,11 @@ def test_the_size_of_a_request_is_limited_as_asked(serve):
     assert server.post("/v1/envs/", {"env_id": "x" * 2**20})[1]["code"] == "body_too_large"
 
 
-def test_the_number_of_lanes_is_limited_as_asked(serve):
+def test_the_number_of_sub_envs_is_limited_as_asked(serve):
     server = serve("--max-num-envs", "3")
     assert server.create("CartPole-v1", num_envs=3)
     status, answer = server.post("/v1/envs/", {"env_id": "CartPole-v1", "num_envs": 4})
-    assert (status, answer["code"]) == (429, "too_many_lanes")
+    assert (status, answer["code"]) == (429, "too_many_sub_envs")
 
 
 def test_modules_are_allowed_by_the_operator_alone(serve):

@@ -27,7 +27,7 @@ def test_limits_of_time_are_numbers(name, value, capsys):
     "name",
     [
         "--max-instances",
-        "--max-total-lanes",
+        "--max-total-sub-envs",
         "--max-watchers",
         "--max-num-envs",
         "--max-processes",

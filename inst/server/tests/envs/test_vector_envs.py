@@ -12,21 +12,21 @@ from conftest import SERVER
 from gymnasium.vector import AutoresetMode
 from running import descendants, is_running
 
-from gym_server.envs.vector_envs import AsyncLanes, Lane
+from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv
 from gym_server.rendering.render_thread import RenderThread
 
 
-def lane(name="Uneven", **kwargs):
-    return Lane(gymnasium.spec(f"{name}-v0"), None, kwargs, (), RenderThread())
+def sub_env(name="Uneven", **kwargs):
+    return SubEnv(gymnasium.spec(f"{name}-v0"), None, kwargs, (), RenderThread())
 
 
 @pytest.fixture
 def processes():
-    """Make lanes in processes; they are gone when the test is over."""
+    """Make sub-environments in processes; they are gone when the test is over."""
     made = []
 
     def processes(name="Uneven", mode=AutoresetMode.NEXT_STEP, **kwargs):
-        made.append(AsyncLanes(lane(name, **kwargs), 3, mode))
+        made.append(AsyncSubEnvs(sub_env(name, **kwargs), 3, mode))
         return made[-1]
 
     yield processes
@@ -38,8 +38,8 @@ def zeros(env):
     return np.zeros(env.action_space.shape, env.action_space.dtype)
 
 
-def test_a_failure_in_a_lane_is_told_and_the_other_processes_end(processes):
-    env = processes("SpoilsOneLane", space="Discrete", longest=1)
+def test_a_failure_in_a_sub_env_is_told_and_the_other_processes_end(processes):
+    env = processes("SpoilsOneSubEnv", space="Discrete", longest=1)
     env.reset(seed=1)
     pids = [process.pid for process in env.processes]
     with pytest.raises(ValueError, match="too long"):
@@ -59,12 +59,14 @@ def test_a_failure_that_cannot_be_sent_is_told_as_such(processes, monkeypatch):
 
 
 @pytest.mark.parametrize("how", ["itself", "killed"])
-def test_a_process_that_ends_is_told_by_its_lane(processes, how):
+def test_a_process_that_ends_is_told_by_its_sub_env(processes, how):
     env = processes("KillsItself" if how == "itself" else "Uneven")
     env.reset(seed=1)
     if how == "killed":
         env.processes[1].kill()
-    words = "lane 1 ended" if how == "killed" else "the process of lane . ended"
+    words = (
+        "sub-environment 1 ended" if how == "killed" else "the process of sub-environment . ended"
+    )
     with pytest.raises(RuntimeError, match=words):
         for _ in range(3):
             env.step(zeros(env))
@@ -82,7 +84,7 @@ def test_closing_does_not_wait_for_a_process_that_hangs(processes, monkeypatch):
     assert not any(map(is_running, pids))
 
 
-def test_a_signal_to_the_server_is_none_to_its_lanes(processes):
+def test_a_signal_to_the_server_is_none_to_its_sub_envs(processes):
     # A forked process would have the server's own handlers.
     env = processes()
     assert all("forkserver" in repr(type(process)).lower() or os.name == "nt"
@@ -92,12 +94,12 @@ def test_a_signal_to_the_server_is_none_to_its_lanes(processes):
 _DIES = """
 import os, sys, time
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.envs.vector_envs import AsyncLanes, Lane
+from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv
 from gymnasium.vector import AutoresetMode
 import gymnasium, faulty_envs, numpy
 if __name__ == "__main__":
-    lane = Lane(gymnasium.spec("Hanging-v0"), None, {}, (), RenderThread())
-    env = AsyncLanes(lane, 2, AutoresetMode.NEXT_STEP)
+    sub-environment = Sub-environment(gymnasium.spec("Hanging-v0"), None, {}, (), RenderThread())
+    env = AsyncSubEnvs(sub_env, 2, AutoresetMode.NEXT_STEP)
     env.reset()
     env.step_async(numpy.zeros(2, numpy.int64))
     print(*[process.pid for process in env.processes], flush=True)
@@ -105,7 +107,7 @@ if __name__ == "__main__":
 """
 
 
-def test_lanes_end_with_a_server_that_is_killed(tmp_path, eventually):
+def test_sub_envs_end_with_a_server_that_is_killed(tmp_path, eventually):
     script = tmp_path / "dies.py"
     script.write_text(_DIES)
     variables = {**os.environ, "PYTHONPATH": f"{SERVER}{os.pathsep}{SERVER / 'tests'}"}
@@ -118,7 +120,7 @@ def test_lanes_end_with_a_server_that_is_killed(tmp_path, eventually):
     eventually(lambda: not any(map(is_running, pids)))
 
 
-def test_a_server_that_stops_ends_its_lanes(serve, eventually):
+def test_a_server_that_stops_ends_its_sub_envs(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Uneven-v0", num_envs=2, vectorization_mode="async")
     assert server.post(f"{url}/reset/")[0] == 200

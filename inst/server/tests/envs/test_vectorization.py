@@ -7,7 +7,7 @@ from gym_server.api.app import Config, create_app
 from gym_server.manager.limits import Limits
 
 
-class OwnLanes(VectorEnv):
+class OwnSubEnvs(VectorEnv):
     """A vector implementation that knows one argument and resets in the same step."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
@@ -25,12 +25,12 @@ class OwnLanes(VectorEnv):
         type(self).closed_ones += 1
 
 
-class HasNoLanes(OwnLanes):
+class HasNoSubEnvs(OwnSubEnvs):
     def __init__(self, num_envs, length=5):
-        raise RuntimeError("no lanes today")
+        raise RuntimeError("no sub-environments today")
 
 
-class OtherLanes(OwnLanes):
+class OtherSubEnvs(OwnSubEnvs):
     """Has actions that the environment has not."""
 
     def __init__(self, num_envs, length=5, colour=0):
@@ -39,9 +39,9 @@ class OtherLanes(OwnLanes):
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
 
 
-gymnasium.register("faultyOtherLanes-v0", entry_point=Counting, vector_entry_point=OtherLanes)
-gymnasium.register("faultyOwnLanes-v0", entry_point=Counting, vector_entry_point=OwnLanes)
-gymnasium.register("faultyHasNoLanes-v0", entry_point=Counting, vector_entry_point=HasNoLanes)
+gymnasium.register("faultyOtherSubEnvs-v0", entry_point=Counting, vector_entry_point=OtherSubEnvs)
+gymnasium.register("faultyOwnSubEnvs-v0", entry_point=Counting, vector_entry_point=OwnSubEnvs)
+gymnasium.register("faultyHasNoSubEnvs-v0", entry_point=Counting, vector_entry_point=HasNoSubEnvs)
 
 
 def chosen(client, env_id="CartPole-v1", **fields):
@@ -96,17 +96,17 @@ def test_an_environment_without_an_own_implementation_says_so(client):
 
 
 def test_an_implementation_is_judged_by_what_it_is(client):
-    own = "faultyOwnLanes-v0"
+    own = "faultyOwnSubEnvs-v0"
     assert chosen(client, own, autoreset_mode="same_step") == ("vector_entry_point", "SameStep")
-    before = OwnLanes.closed_ones
+    before = OwnSubEnvs.closed_ones
     assert chosen(client, own) == ("sync", "NextStep")
-    assert OwnLanes.closed_ones == before + 1
+    assert OwnSubEnvs.closed_ones == before + 1
     # It draws nothing, and so it is taken when nobody asks for pictures.
     assert chosen(client, own, autoreset_mode="SAME_STEP", kwargs={"seconds": 0})[0] == "sync"
 
 
 def test_an_implementation_of_another_task_is_taken_only_when_asked_for(client):
-    other = "faultyOtherLanes-v0"
+    other = "faultyOtherSubEnvs-v0"
     assert chosen(client, other, autoreset_mode="SameStep")[0] == "sync"
     mode = "vector_entry_point"
     assert chosen(client, other, autoreset_mode="SameStep", vectorization_mode=mode)[0] == mode
@@ -115,8 +115,8 @@ def test_an_implementation_of_another_task_is_taken_only_when_asked_for(client):
 
 
 def test_an_implementation_that_fails_is_not_passed_over(client):
-    refusal = refused(client, status=500, env_id="faultyHasNoLanes-v0")
-    assert refusal["message"] == "The environment raised RuntimeError: no lanes today"
+    refusal = refused(client, status=500, env_id="faultyHasNoSubEnvs-v0")
+    assert refusal["message"] == "The environment raised RuntimeError: no sub-environments today"
 
 
 @pytest.mark.parametrize(
@@ -148,8 +148,12 @@ def test_case_and_underscores_do_not_matter_in_an_autoreset_mode(client, mode, m
         ("vectorization_mode", "fast", '"vector_entry_point", "sync" or "async"'),
         ("vectorization_mode", 1, '"vector_entry_point", "sync" or "async"'),
         ("autoreset_mode", "never", '"NextStep", "SameStep" or "Disabled"'),
-        ("seed", [1, -1], "an integer, 0 or greater, or a list of one, or null, for each lane"),
-        ("seed", [1, 2, 3], "hold one integer or null for each of the 2 lanes, not 3"),
+        (
+            "seed",
+            [1, -1],
+            "an integer, 0 or greater, or a list of one, or null, for each sub-environment",
+        ),
+        ("seed", [1, 2, 3], "hold one integer or null for each of the 2 sub-environments, not 3"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_named(client, field, value, wanted):
@@ -162,7 +166,7 @@ def test_what_cannot_be_meant_is_refused_and_named(client, field, value, wanted)
 @pytest.mark.parametrize(
     "fields", [{"vectorization_mode": "sync"}, {"autoreset_mode": "NextStep"}, {"seed": [1]}]
 )
-def test_what_is_for_lanes_needs_lanes(client, fields):
+def test_what_is_for_sub_envs_needs_sub_envs(client, fields):
     refusal = refused(client, num_envs=None, **fields)
     assert refusal["code"] == "invalid_parameter"
     assert "'num_envs' was not provided" in refusal["message"]
@@ -176,20 +180,20 @@ def small_server():
     app.close()
 
 
-def test_a_server_has_a_largest_number_of_lanes(small_server):
+def test_a_server_has_a_largest_number_of_sub_envs(small_server):
     assert chosen(small_server, num_envs=100)[0] == "vector_entry_point"
     answer = small_server.post("/v1/envs/", json={"env_id": "CartPole-v1", "num_envs": 101})
-    assert (answer.status_code, answer.json["code"]) == (429, "too_many_lanes")
-    assert answer.json["message"] == "This server takes at most 100 lanes, not 101"
+    assert (answer.status_code, answer.json["code"]) == (429, "too_many_sub_envs")
+    assert answer.json["message"] == "This server takes at most 100 sub-environments, not 101"
     assert "--max-num-envs" in answer.json["hint"]
 
 
 def test_processes_are_fewer(client):
     refusal = refused(client, 429, num_envs=65, vectorization_mode="async")
-    assert refusal["code"] == "too_many_lanes"
+    assert refusal["code"] == "too_many_sub_envs"
     assert "--max-num-envs" in refusal["hint"]
     refusal = refused(client, 429, num_envs=16385)
-    assert refusal["message"] == "This server takes at most 16384 lanes, not 16385"
+    assert refusal["message"] == "This server takes at most 16384 sub-environments, not 16385"
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
@@ -207,7 +211,7 @@ def test_processes_are_fewer(client):
         ("faulty_envs:LongDouble-v0", {}, "unsupported_space"),
     ],
 )
-def test_what_no_environment_can_have_no_lane_can(client, mode, env_id, fields, code):
+def test_what_no_environment_can_have_no_sub_env_can(client, mode, env_id, fields, code):
     assert refused(client, env_id=env_id, vectorization_mode=mode, **fields)["code"] == code
 
 

@@ -49,7 +49,7 @@ def test_pendulum_moves_as_in_process(client, create):
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
-def test_so_do_its_lanes(client, create, mode):
+def test_so_do_its_sub_envs(client, create, mode):
     for as_tensors in (False, True):
         url = create("Pendulum-v1", num_envs=2, vectorization_mode=mode)
         client.post(f"{url}/reset/", json={"seed": [1, 1]})

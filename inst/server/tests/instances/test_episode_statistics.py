@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from gym_server.instances.episode_statistics import LaneTally, Standing, Tally, told
+from gym_server.instances.episode_statistics import Standing, SubEnvTally, Tally, told
 
 
 def play(tally, rewards, ends=True):
@@ -67,19 +67,19 @@ def test_the_last_hundred_returns_are_kept():
     assert list(tally.returns) == list(range(30, 130))
 
 
-def lanes_of(mode, lanes=3):
-    tally = LaneTally(lanes, mode)
+def sub_envs_of(mode, sub_envs=3):
+    tally = SubEnvTally(sub_envs, mode)
     tally.begin(None)
     return tally
 
 
-def step(tally, rewards, ended, lanes=None):
-    rows = None if lanes is None else np.array(lanes)
+def step(tally, rewards, ended, sub_envs=None):
+    rows = None if sub_envs is None else np.array(sub_envs)
     tally.step(np.array(rewards, dtype=float), np.array(ended, dtype=bool), rows)
 
 
-def test_the_step_that_resets_a_lane_is_no_step_of_its_episode():
-    tally = lanes_of(AutoresetMode.NEXT_STEP)
+def test_the_step_that_resets_a_sub_env_is_no_step_of_its_episode():
+    tally = sub_envs_of(AutoresetMode.NEXT_STEP)
     step(tally, [1, 1, 1], [0, 1, 0])
     assert tally.of(1) == Standing(1, 1, 1.0, True)
     step(tally, [1, 0, 1], [0, 0, 0])
@@ -90,20 +90,20 @@ def test_the_step_that_resets_a_lane_is_no_step_of_its_episode():
     assert list(tally.returns) == [1, 3]
 
 
-def test_a_lane_that_resets_at_once_is_in_its_next_episode():
-    tally = lanes_of(AutoresetMode.SAME_STEP)
+def test_a_sub_env_that_resets_at_once_is_in_its_next_episode():
+    tally = sub_envs_of(AutoresetMode.SAME_STEP)
     step(tally, [2, 1, 1], [1, 0, 0])
     assert tally.of(0) == Standing(2, 0, 0.0, False)
     step(tally, [3, 1, 1], [1, 1, 0])
     assert list(tally.returns) == [2, 3, 2]
 
 
-def test_lanes_reset_by_a_mask_begin_anew_and_others_go_on():
-    tally = lanes_of(AutoresetMode.DISABLED)
+def test_sub_envs_reset_by_a_mask_begin_anew_and_others_go_on():
+    tally = sub_envs_of(AutoresetMode.DISABLED)
     step(tally, [1, 1, 1], [1, 0, 0])
-    step(tally, [5, 6], [0, 1], lanes=[1, 2])
+    step(tally, [5, 6], [0, 1], sub_envs=[1, 2])
     tally.begin(np.array([True, False, False]))
-    assert [tally.of(lane) for lane in range(3)] == [
+    assert [tally.of(sub_env) for sub_env in range(3)] == [
         Standing(2, 0, 0.0, False),
         Standing(1, 2, 6.0, False),
         Standing(1, 2, 7.0, True),
@@ -112,8 +112,8 @@ def test_lanes_reset_by_a_mask_begin_anew_and_others_go_on():
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_lanes_return_what_the_environment_gave(client, lanes, app, mode):
-    url = lanes(num_envs=3, autoreset_mode=mode, vectorization_mode="sync")
+def test_sub_envs_return_what_the_environment_gave(client, sub_envs, app, mode):
+    url = sub_envs(num_envs=3, autoreset_mode=mode, vectorization_mode="sync")
     client.post(f"{url}/reset/", json={"seed": 1})
     so_far, returns, over = np.zeros(3), [], np.zeros(3, dtype=bool)
     for _ in range(30):

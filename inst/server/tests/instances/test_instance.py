@@ -198,7 +198,6 @@ def test_all_about_an_instance(client, create):
         "reward_threshold": 195.0,
         "max_episode_steps": 200,
         "render_fps": 50,
-        "lanes": 1,
         "num_envs": None,
         "vectorization_mode": None,
         "autoreset_mode": None,

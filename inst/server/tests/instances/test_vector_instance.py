@@ -33,14 +33,14 @@ from gym_server.spaces.stacking import stack, unstack
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_lanes_in_json_are_those_of_gymnasium(client, lanes, kind, mode):
-    check_play(client, lanes(kind, autoreset_mode=mode, vectorization_mode="sync"), kind, mode)
+def test_sub_envs_in_json_are_those_of_gymnasium(client, sub_envs, kind, mode):
+    check_play(client, sub_envs(kind, autoreset_mode=mode, vectorization_mode="sync"), kind, mode)
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Sequence"])
-def test_lanes_in_processes_are_those_of_gymnasium(client, lanes, kind, mode):
-    check_play(client, lanes(kind, autoreset_mode=mode, vectorization_mode="async"), kind, mode)
+def test_sub_envs_in_processes_are_those_of_gymnasium(client, sub_envs, kind, mode):
+    check_play(client, sub_envs(kind, autoreset_mode=mode, vectorization_mode="async"), kind, mode)
 
 
 def check_play(client, url, kind, mode, steps=12):
@@ -67,8 +67,8 @@ def check_play(client, url, kind, mode, steps=12):
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", IN_TENSORS)
-def test_lanes_in_tensors_are_those_of_gymnasium_byte_for_byte(client, lanes, kind, mode):
-    url, env = lanes(kind, autoreset_mode=mode), twin(kind, autoreset_mode=mode)
+def test_sub_envs_in_tensors_are_those_of_gymnasium_byte_for_byte(client, sub_envs, kind, mode):
+    url, env = sub_envs(kind, autoreset_mode=mode), twin(kind, autoreset_mode=mode)
     expected, _ = env.reset(seed=7)
     space = env.single_observation_space
     check_tensors(space, "observation", post(client, url, "reset", ACCEPT, seed=7), expected)
@@ -87,17 +87,17 @@ def test_lanes_in_tensors_are_those_of_gymnasium_byte_for_byte(client, lanes, ki
         assert file.tensors["truncated"].array().tolist() == truncated.tolist()
         final, which = info.pop("final_obs", None), info.pop("_final_obs", None)
         assert json.loads(file.metadata["info"]) == plain(info)
-        assert ("final_lanes" in file.metadata) is (final is not None)
+        assert ("final_sub_envs" in file.metadata) is (final is not None)
         if final is not None:
             rows = np.flatnonzero(which)
-            assert json.loads(file.metadata["final_lanes"]) == rows.tolist()
+            assert json.loads(file.metadata["final_sub_envs"]) == rows.tolist()
             batch = stack(space, [final[row] for row in rows])
             check_tensors(space, "final_obs", file, batch)
         if mode == "Disabled" and (terminated | truncated).any():
             reset_those_that_ended(client, url, env, (terminated | truncated).tolist())
 
 
-def test_cartpoles_own_lanes_are_those_of_gymnasium(client, create):
+def test_cartpoles_own_sub_envs_are_those_of_gymnasium(client, create):
     url = create(num_envs=16)
     env = gymnasium.make_vec("CartPole-v1", num_envs=16)
     expected, _ = env.reset(seed=3)
@@ -123,20 +123,20 @@ def test_cartpoles_own_lanes_are_those_of_gymnasium(client, create):
     assert ended > 0
 
 
-def test_one_lane_has_a_dimension_of_its_own(client, create):
+def test_one_sub_env_has_a_dimension_of_its_own(client, create):
     url = create(num_envs=1)
     answer = post(client, url, "reset", seed=1)
     assert np.shape(answer["observation"]) == (1, 4)
     answer = post(client, url, "step", action=[1])
     assert (answer["reward"], answer["done"]) == ([1.0], [False])
-    assert client.get(url).json["lanes"] == client.get(url).json["num_envs"] == 1
+    assert client.get(url).json["num_envs"] == client.get(url).json["num_envs"] == 1
 
 
-def test_final_infos_stay_where_gymnasium_puts_them(client, lanes):
-    url = lanes(autoreset_mode="SameStep", longest=1)
+def test_final_infos_stay_where_gymnasium_puts_them(client, sub_envs):
+    url = sub_envs(autoreset_mode="SameStep", longest=1)
     post(client, url, "reset", seed=1)
     answer = post(client, url, "step", action=[np.zeros((2, 3)).tolist()] * 3)
-    assert answer["final_lanes"] == [0, 1, 2]
+    assert answer["final_sub_envs"] == [0, 1, 2]
     assert answer["info"]["final_info"]["left"] == [0, 0, 0]
     assert answer["info"]["_final_info"] == [True] * 3
     assert "final_obs" not in answer["info"]
@@ -146,8 +146,8 @@ def test_final_infos_stay_where_gymnasium_puts_them(client, lanes):
 
 
 @pytest.mark.parametrize("seed", [0, 5, [4, 0, 9]])
-def test_the_seed_of_creation_serves_the_first_reset_that_has_none(client, lanes, seed):
-    url, env = lanes(seed=seed, vectorization_mode="sync"), twin()
+def test_the_seed_of_creation_serves_the_first_reset_that_has_none(client, sub_envs, seed):
+    url, env = sub_envs(seed=seed, vectorization_mode="sync"), twin()
     first, second = (post(client, url, "reset")["observation"] for _ in range(2))
     assert first == members(env, env.reset(seed=seed)[0])
     assert second == members(env, env.reset()[0])
@@ -155,11 +155,11 @@ def test_the_seed_of_creation_serves_the_first_reset_that_has_none(client, lanes
 
 
 @pytest.mark.parametrize("seed", [5, [None, 5, 6]])
-def test_a_seed_seeds_the_action_space(client, lanes, seed):
+def test_a_seed_seeds_the_action_space(client, sub_envs, seed):
     def samples(url):
         return [client.get(f"{url}/action_space/sample").json["action"] for _ in range(3)]
 
-    one, other, third = (lanes(seed=seed) for _ in range(3))
+    one, other, third = (sub_envs(seed=seed) for _ in range(3))
     post(client, third, "reset", seed=8)
     expected = samples(one)
     assert samples(other) == expected
@@ -168,12 +168,13 @@ def test_a_seed_seeds_the_action_space(client, lanes, seed):
     assert samples(third) == expected
 
 
-def test_a_seed_that_is_no_list_for_these_lanes_is_refused(client, lanes):
-    url = lanes()
+def test_a_seed_that_is_no_list_for_these_sub_envs_is_refused(client, sub_envs):
+    url = sub_envs()
     code, message = refusal(client, url, "reset", seed=[1, 2])
     assert code == "invalid_parameter"
     assert message == (
-        "The parameter 'seed' must hold one integer or null for each of the 3 lanes, not 2"
+        "The parameter 'seed' must hold one integer or null for each of the 3 sub-environments, "
+        "not 2"
     )
     assert refusal(client, url, "reset", seed=[1, -2, 3])[0] == "invalid_parameter"
     assert refusal(client, url, "reset", seed=[1, "a", 3])[0] == "invalid_parameter"
@@ -182,8 +183,8 @@ def test_a_seed_that_is_no_list_for_these_lanes_is_refused(client, lanes):
 # Episodes that are over ----------------------------------------------------------------------
 
 
-def test_a_lane_that_ended_does_not_step_when_nobody_resets_it(client, lanes):
-    url = lanes("Discrete", num_envs=12, autoreset_mode="Disabled", longest=2)
+def test_a_sub_env_that_ended_does_not_step_when_nobody_resets_it(client, sub_envs):
+    url = sub_envs("Discrete", num_envs=12, autoreset_mode="Disabled", longest=2)
     post(client, url, "reset", seed=10)
     assert client.get(url).json["needs_reset"] is False
     answer = post(client, url, "step", action=[0] * 12)
@@ -194,11 +195,11 @@ def test_a_lane_that_ended_does_not_step_when_nobody_resets_it(client, lanes):
     assert client.get(url).json["needs_reset"] is True
     code, message = refusal(client, url, "step", action=[0] * 12)
     assert code == "reset_needed"
-    assert f"lanes {', '.join(map(str, ended))} ended" in message
+    assert f"sub-environments {', '.join(map(str, ended))} ended" in message
     some = np.zeros(12, dtype=bool)
     some[ended[:1]] = True
     code, message = refusal(client, url, "step", action=[0], step_mask=some.tolist())
-    assert (code, f"lane {ended[0]} ended" in message) == ("reset_needed", True)
+    assert (code, f"sub-environment {ended[0]} ended" in message) == ("reset_needed", True)
     assert client.get(url).json["steps"] == 12
     others = ~np.array(answer["done"])
     post(client, url, "step", action=[0] * int(others.sum()), step_mask=others.tolist())
@@ -207,14 +208,14 @@ def test_a_lane_that_ended_does_not_step_when_nobody_resets_it(client, lanes):
 
 
 @pytest.mark.parametrize("route", ["step/", "render/"])
-def test_before_the_first_reset_there_is_nothing_to_do(client, lanes, route):
+def test_before_the_first_reset_there_is_nothing_to_do(client, sub_envs, route):
     call = client.get if route == "render/" else client.post
-    answer = call(f"{lanes()}/{route}", json={"action": 0})
+    answer = call(f"{sub_envs()}/{route}", json={"action": 0})
     assert (answer.status_code, answer.json["code"]) == (400, "reset_needed")
 
 
-def test_after_a_step_that_failed_half_way_the_lanes_need_a_reset(client, lanes):
-    url = lanes("Discrete", num_envs=12, name="SpoilsOneLane")
+def test_after_a_step_that_failed_half_way_the_sub_envs_need_a_reset(client, sub_envs):
+    url = sub_envs("Discrete", num_envs=12, name="SpoilsOneSubEnv")
     post(client, url, "reset", seed=1)
     answer = client.post(f"{url}/step/", json={"action": [0] * 12})
     assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
@@ -226,11 +227,10 @@ def test_after_a_step_that_failed_half_way_the_lanes_need_a_reset(client, lanes)
 # The rest ------------------------------------------------------------------------------------
 
 
-def test_all_about_lanes(client, create):
+def test_all_about_sub_envs(client, create):
     url = create(num_envs=3, seed=[1, None, 0], autoreset_mode="same_step")
     about = client.get(url).json
     wanted = {
-        "lanes": 3,
         "num_envs": 3,
         "vectorization_mode": "sync",
         "autoreset_mode": "SameStep",
@@ -253,7 +253,7 @@ def test_the_time_limit_is_the_one_that_was_chosen(client, create, mode):
     assert client.get(url).json["max_episode_steps"] == 7
 
 
-def test_the_spaces_are_those_of_all_lanes(client, create):
+def test_the_spaces_are_those_of_all_sub_envs(client, create):
     url = create(num_envs=3)
     space = client.get(f"{url}/observation_space/").json["info"]
     assert (space["name"], space["shape"], len(space["low"])) == ("Box", [3, 4], 12)
@@ -263,8 +263,8 @@ def test_the_spaces_are_those_of_all_lanes(client, create):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_sample_is_a_list_of_actions_and_contained(client, lanes, kind):
-    url = lanes(kind, seed=3)
+def test_a_sample_is_a_list_of_actions_and_contained(client, sub_envs, kind):
+    url = sub_envs(kind, seed=3)
     sample = client.get(f"{url}/action_space/sample").json["action"]
     env = twin(kind)
     env.action_space.seed(3)
@@ -279,22 +279,22 @@ def test_a_sample_is_a_list_of_actions_and_contained(client, lanes, kind):
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
-def test_a_frame_shows_one_lane(client, lanes, mode):
-    url, env = lanes(vectorization_mode=mode), twin()
+def test_a_frame_shows_one_sub_env(client, sub_envs, mode):
+    url, env = sub_envs(vectorization_mode=mode), twin()
     post(client, url, "reset", seed=4)
     env.reset(seed=4)
-    for lane in range(3):
-        answer = client.get(f"{url}/render/?lane={lane}", headers=ACCEPT)
+    for sub_env in range(3):
+        answer = client.get(f"{url}/render/?sub_env={sub_env}", headers=ACCEPT)
         frame = read_tensors(answer).tensors["frame"].array()
-        assert frame[0, 0, 0] == env.envs[lane].unwrapped.left
-    assert client.get(f"{url}/render/").data == client.get(f"{url}/render/?lane=0").data
+        assert frame[0, 0, 0] == env.envs[sub_env].unwrapped.left
+    assert client.get(f"{url}/render/").data == client.get(f"{url}/render/?sub_env=0").data
 
 
-def test_an_implementation_that_draws_all_lanes_at_once_draws_few(client, create):
+def test_an_implementation_that_draws_all_sub_envs_at_once_draws_few(client, create):
     few, many = create(num_envs=16), create(num_envs=17)
     for url in (few, many):
         post(client, url, "reset", seed=1)
-    frames = [client.get(f"{few}/render/?lane={lane}") for lane in (0, 15)]
+    frames = [client.get(f"{few}/render/?sub_env={sub_env}") for sub_env in (0, 15)]
     assert [frame.status_code for frame in frames] == [200, 200]
     assert frames[0].data != frames[1].data
     refused = client.get(f"{many}/render/").json
@@ -302,21 +302,21 @@ def test_an_implementation_that_draws_all_lanes_at_once_draws_few(client, create
     assert "'sync'" in refused["hint"]
 
 
-@pytest.mark.parametrize("lane", ["3", "-1", "a", "1.0"])
-def test_a_lane_that_there_is_not_is_refused(client, lanes, create, lane):
-    for url in (lanes(), create()):
+@pytest.mark.parametrize("sub_env", ["3", "-1", "a", "1.0"])
+def test_a_sub_env_that_there_is_not_is_refused(client, sub_envs, create, sub_env):
+    for url in (sub_envs(), create()):
         client.post(f"{url}/reset/")
-        answer = client.get(f"{url}/render/?lane={lane}")
+        answer = client.get(f"{url}/render/?sub_env={sub_env}")
         assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
-        assert client.get(f"{url}/render/?lane=0").status_code == 200
+        assert client.get(f"{url}/render/?sub_env=0").status_code == 200
 
 
-def test_lanes_are_not_monitored(client, lanes):
-    code, message = refusal(client, lanes(), "monitor/start", directory="d")
-    assert (code, "has lanes" in message) == ("not_supported", True)
+def test_sub_envs_are_not_monitored(client, sub_envs):
+    code, message = refusal(client, sub_envs(), "monitor/start", directory="d")
+    assert (code, "has sub-environments" in message) == ("not_supported", True)
 
 
-def test_lanes_that_draw_in_each_step_draw_on_the_render_thread(client, create):
+def test_sub_envs_that_draw_in_each_step_draw_on_the_render_thread(client, create):
     url = create("faulty_envs:Drawing-v0", num_envs=2, wrappers=[{"name": "AddRenderObservation"}])
     faulty_envs.Drawing.threads.clear()
     post(client, url, "reset", seed=1)
@@ -326,7 +326,7 @@ def test_lanes_that_draw_in_each_step_draw_on_the_render_thread(client, create):
     assert len(faulty_envs.Drawing.threads) == 1
 
 
-def test_wrappers_are_put_around_each_lane(client, create):
+def test_wrappers_are_put_around_each_sub_env(client, create):
     wrappers = [{"name": "TimeLimit", "kwargs": {"max_episode_steps": 2}}]
     url = create("faulty_envs:Counting-v0", num_envs=2, wrappers=wrappers)
     post(client, url, "reset")

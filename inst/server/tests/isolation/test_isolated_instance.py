@@ -74,7 +74,7 @@ def calls_of(action, accept):
         ("POST", "action_space/contains/", {"value": action}, accept),
         ("POST", "observation_space/contains/", {"value": action}, accept),
         ("GET", "render/", b"", "image/png"),
-        ("GET", "render/?lane=9", b"", "image/png"),
+        ("GET", "render/?sub_env=9", b"", "image/png"),
         ("POST", "reset/", {"seed": [1]}, accept),
     ]
 

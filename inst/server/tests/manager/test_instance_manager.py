@@ -152,10 +152,10 @@ def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
 
 def test_instances_are_listed_with_who_uses_them_how_much(client, create):
     url = create("CartPole-v1", name="Änne's pole")
-    lanes = create("CartPole-v1", num_envs=3)
-    client.post(f"{lanes}/reset/")
-    client.post(f"{lanes}/step/", json={"action": [0, 0, 0]})
-    client.get(f"{lanes}/watch/presence/")
+    sub_envs = create("CartPole-v1", num_envs=3)
+    client.post(f"{sub_envs}/reset/")
+    client.post(f"{sub_envs}/step/", json={"action": [0, 0, 0]})
+    client.get(f"{sub_envs}/watch/presence/")
     first, second = client.get("/v1/instances/").json["instances"]
     assert first["age_seconds"] >= first.pop("idle_seconds") >= 0
     assert first.pop("age_seconds") >= second["age_seconds"]

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from gym_server.api.app import Config, create_app
-from gym_server.envs.vector_envs import AsyncLanes
+from gym_server.envs.vector_envs import AsyncSubEnvs
 from gym_server.errors import GymServerError
 from gym_server.manager.limits import Limits, Room, Watchers
 
@@ -73,36 +73,36 @@ SHORTLY = {"where": "init", "hours": 0.3 / 3600}
 
 
 def test_what_could_not_be_made_takes_no_room(limited):
-    client = limited(max_instances=1, max_num_envs=4, max_total_lanes=4)
+    client = limited(max_instances=1, max_num_envs=4, max_total_sub_envs=4)
     for _ in range(3):
         assert make(client, env_id="NoSuch-v0").status_code == 400
         assert make(client, num_envs=4, kwargs={"none": 1}).status_code == 400
     assert make(client, num_envs=4).status_code == 200
 
 
-def test_all_together_have_only_so_many_lanes(limited):
-    client = limited(max_num_envs=8, max_total_lanes=10)
+def test_all_together_have_only_so_many_sub_envs(limited):
+    client = limited(max_num_envs=8, max_total_sub_envs=10)
     assert make(client, num_envs=8).status_code == 200
     refusal = make(client, num_envs=3)
-    assert refused(refusal, "too_many_lanes")
+    assert refused(refusal, "too_many_sub_envs")
     assert refusal.json["message"] == (
-        "All environments together may have 10 lanes, and 2 are left, not 3"
+        "All environments together may have 10 sub-environments, and 2 are left, not 3"
     )
-    assert "--max-total-lanes" in refusal.json["hint"]
-    # One without lanes is one.
+    assert "--max-total-sub-envs" in refusal.json["hint"]
+    # One without sub-environments is one.
     assert make(client).status_code == make(client).status_code == 200
-    assert refused(make(client), "too_many_lanes")
+    assert refused(make(client), "too_many_sub_envs")
 
 
 def test_one_that_is_too_large_hears_of_that(limited):
     refusal = make(limited(max_num_envs=8), num_envs=9)
-    assert refused(refusal, "too_many_lanes")
+    assert refused(refusal, "too_many_sub_envs")
     assert "--max-num-envs" in refusal.json["hint"]
 
 
-def test_the_lanes_of_all_follow_those_of_one():
+def test_the_sub_envs_of_all_follow_those_of_one():
     Limits(max_num_envs=100_000).check_room(0, Room(0), Room(100_000))
-    with pytest.raises(GymServerError, match="may have 400000 lanes"):
+    with pytest.raises(GymServerError, match="may have 400000 sub-environments"):
         Limits(max_num_envs=100_000).check_room(4, Room(400_000), Room(1))
 
 
@@ -171,7 +171,7 @@ def test_processes_that_are_started_at_once_are_no_more(limited):
 def test_processes_count_until_they_have_ended(limited, monkeypatch):
     client = limited(max_processes=2)
     closing, released = threading.Event(), threading.Event()
-    close = AsyncLanes.close_extras
+    close = AsyncSubEnvs.close_extras
 
     def close_when_released(self, **how):
         closing.set()
@@ -179,7 +179,7 @@ def test_processes_count_until_they_have_ended(limited, monkeypatch):
         close(self, **how)
 
     url = f"/v1/envs/{ask_for_processes(client, 2).json['instance_id']}"
-    monkeypatch.setattr(AsyncLanes, "close_extras", close_when_released)
+    monkeypatch.setattr(AsyncSubEnvs, "close_extras", close_when_released)
     closer = threading.Thread(target=lambda: client.post(f"{url}/close/"))
     closer.start()
     assert closing.wait(20)

@@ -117,9 +117,9 @@ def test_an_environment_may_hang_while_it_is_made(strict, call):
     assert strict.get("/v1/health/")[1]["instances"] == before + 1
 
 
-@pytest.mark.parametrize("lanes", [None, 2])
-def test_drawing_may_hang_and_others_are_drawn_all_the_same(strict, call, lanes):
-    fields = {} if lanes is None else {"num_envs": lanes}
+@pytest.mark.parametrize("num_envs", [None, 2])
+def test_drawing_may_hang_and_others_are_drawn_all_the_same(strict, call, sub_envs):
+    fields = {} if sub_envs is None else {"num_envs": sub_envs}
     url = strict.create("faulty_envs:HangsWhere-v0", kwargs={"where": "render"}, **fields)
     other = strict.create("faulty_envs:Drawing-v0")
     for one in (url, other):
@@ -165,7 +165,7 @@ def test_a_server_with_calls_that_hang_stops_all_the_same(serve):
     assert server.stop(timeout=SOON)[0] == 0
 
 
-def test_lanes_in_processes_end_with_it(quick, eventually):
+def test_sub_envs_in_processes_end_with_it(quick, eventually):
     app = quick(max_call_seconds=60)
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}

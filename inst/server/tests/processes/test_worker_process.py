@@ -153,8 +153,8 @@ def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
 def test_no_process_outlives_the_server(serve, how, eventually):
     server = serve()
     pids = [rogue(server)[1] for _ in range(2)]
-    lanes = server.create("faulty_envs:Uneven-v0", num_envs=2, vectorization_mode="async")
-    assert server.post(f"{lanes}/reset/")[0] == 200
+    sub_envs = server.create("faulty_envs:Uneven-v0", num_envs=2, vectorization_mode="async")
+    assert server.post(f"{sub_envs}/reset/")[0] == 200
     if how == signal.SIGKILL:
         stuck, pid = rogue(server, does="never_returns")
         pids.append(pid)

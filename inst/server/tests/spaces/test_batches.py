@@ -21,20 +21,20 @@ def are_readable(space, members):
 
 
 @pytest.mark.parametrize("seed", range(150))
-def test_lanes_survive_json(seed):
+def test_sub_envs_survive_json(seed):
     rng = np.random.default_rng(seed)
     space = random_space(rng)
     members = [random_member(rng, space) for _ in range(3)]
     if not are_readable(space, members):
         return
     sent = [plain(spaces.encode(space, member)) for member in members]
-    batch = spaces.decode_lanes(space, sent, 3, "the 3 lanes")
+    batch = spaces.decode_sub_envs(space, sent, 3, "the 3 sub-environments")
     one_by_one = stack(space, [spaces.decode(space, value) for value in sent])
     assert same(batch, one_by_one)
 
 
 @pytest.mark.parametrize("seed", range(150))
-def test_lanes_survive_tensors(seed):
+def test_sub_envs_survive_tensors(seed):
     rng = np.random.default_rng(seed)
     space = random_space(rng, tensors=True)
     members = [random_member(rng, space) for _ in range(3)]
@@ -42,41 +42,41 @@ def test_lanes_survive_tensors(seed):
         return
     batch = stack(space, members)
     parts = spaces.encode_batch_tensors(space, "action", batch)
-    back = spaces.decode_lanes_tensors(space, "action", parts, 3, "the 3 lanes")
+    back = spaces.decode_sub_envs_tensors(space, "action", parts, 3, "the 3 sub-environments")
     assert same(back, batch)
 
 
-def test_every_way_to_write_a_lane_is_read():
+def test_every_way_to_write_a_sub_env_is_read():
     box = Box(-1, 1, (1,), np.float32)
-    assert spaces.decode_lanes(box, [[1], 0.5], 2, "").tolist() == [[1], [0.5]]
-    assert spaces.decode_lanes(box, [1, 0.5], 2, "").tolist() == [[1], [0.5]]
+    assert spaces.decode_sub_envs(box, [[1], 0.5], 2, "").tolist() == [[1], [0.5]]
+    assert spaces.decode_sub_envs(box, [1, 0.5], 2, "").tolist() == [[1], [0.5]]
     square = Box(0, 9, (2, 2), np.uint8)
-    assert spaces.decode_lanes(square, [[1, 2, 3, 4], [[5, 6], [7, 8]]], 2, "").tolist() == [
+    assert spaces.decode_sub_envs(square, [[1, 2, 3, 4], [[5, 6], [7, 8]]], 2, "").tolist() == [
         [[1, 2], [3, 4]],
         [[5, 6], [7, 8]],
     ]
-    assert spaces.decode_lanes(Discrete(3), [1, 2.0], 2, "").tolist() == [1, 2]
-    assert spaces.decode_lanes(MultiBinary(2), [[True, 0], [1, 1]], 2, "").tolist() == [
+    assert spaces.decode_sub_envs(Discrete(3), [1, 2.0], 2, "").tolist() == [1, 2]
+    assert spaces.decode_sub_envs(MultiBinary(2), [[True, 0], [1, 1]], 2, "").tolist() == [
         [1, 0],
         [1, 1],
     ]
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
-def test_discrete_lanes_may_be_32_or_64_bits_wide(dtype):
+def test_discrete_sub_envs_may_be_32_or_64_bits_wide(dtype):
     parts = Parts({"action": Tensor.of(np.array([0, 2], dtype))})
-    batch = spaces.decode_lanes_tensors(Discrete(3, dtype=np.int8), "action", parts, 2, "")
+    batch = spaces.decode_sub_envs_tensors(Discrete(3, dtype=np.int8), "action", parts, 2, "")
     assert (batch.dtype, batch.tolist()) == (np.int8, [0, 2])
 
 
-def test_unsigned_discrete_lanes_are_unsigned():
+def test_unsigned_discrete_sub_envs_are_unsigned():
     space = Discrete(3, dtype=np.uint64)
     parts = spaces.encode_batch_tensors(space, "action", np.array([0, 2], np.uint64))
     assert parts.tensors["action"].dtype == "U64"
-    assert spaces.decode_lanes_tensors(space, "action", parts, 2, "").dtype == np.uint64
+    assert spaces.decode_sub_envs_tensors(space, "action", parts, 2, "").dtype == np.uint64
     short = Parts({"action": Tensor.of(np.array([0, 2], np.int32))})
     with pytest.raises(NotInSpace, match=r"U64 \[2\] is needed"):
-        spaces.decode_lanes_tensors(space, "action", short, 2, "")
+        spaces.decode_sub_envs_tensors(space, "action", short, 2, "")
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
@@ -96,6 +96,6 @@ def test_what_was_encoded_does_not_change_with_the_batch():
 def test_a_part_too_many_or_too_few_is_refused():
     parts = Parts({"action": Tensor.of(np.zeros(2, np.int64)), "action/x": Tensor.of(np.zeros(2))})
     with pytest.raises(NotInSpace, match="no such part"):
-        spaces.decode_lanes_tensors(Discrete(3), "action", parts, 2, "")
+        spaces.decode_sub_envs_tensors(Discrete(3), "action", parts, 2, "")
     with pytest.raises(NotInSpace, match="there is no tensor 'action'"):
-        spaces.decode_lanes_tensors(Discrete(3), "action", Parts(), 2, "")
+        spaces.decode_sub_envs_tensors(Discrete(3), "action", Parts(), 2, "")

@@ -3,7 +3,7 @@ import pytest
 from gymnasium.spaces import MultiDiscrete
 from refusals import refused
 
-from gym_server.spaces import decode, decode_lanes, describe
+from gym_server.spaces import decode, decode_sub_envs, describe
 
 SPACE = MultiDiscrete([[2, 3], [4, 5]], dtype=np.int32, start=[[0, -1], [0, 10]])
 
@@ -28,8 +28,8 @@ def test_a_list_gets_its_dtype_and_shape():
 def test_true_and_false_are_1_and_0_as_for_discrete():
     space = MultiDiscrete([2, 2], dtype=np.uint8)
     assert decode(space, [True, False]).tolist() == [1, 0]
-    lanes = [[True, False], [0, True]]
-    assert decode_lanes(space, lanes, 2, "").tolist() == [[1, 0], [0, 1]]
+    sub_envs = [[True, False], [0, True]]
+    assert decode_sub_envs(space, sub_envs, 2, "").tolist() == [[1, 0], [0, 1]]
     assert refused(space, [-1, True]).startswith("-1 at [0]")
 
 

@@ -21,7 +21,7 @@ def occupied(app, client, faulty, watch):
         begun.set()
         over.wait(30)
 
-    instance._draw = lambda lane: instance.renderer.run(for_long) or draw(lane)
+    instance._draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
     client.post(f"{url}/reset/")
     thread, _ = in_background(state, app.test_client(), url)
     assert begun.wait(5)

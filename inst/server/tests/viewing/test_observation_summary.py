@@ -6,7 +6,7 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 
 from gym_server.protocol import wire
 from gym_server.spaces.stacking import stack
-from gym_server.viewing.observation_summary import entries, lane_of
+from gym_server.viewing.observation_summary import entries, sub_env_of
 
 
 def test_an_array_is_its_numbers_in_order():
@@ -55,16 +55,16 @@ def test_an_observation_of_any_space_can_be_looked_at(kind):
 
 
 @pytest.mark.parametrize("kind", SPACES)
-def test_a_lane_is_taken_out_of_a_batch(kind):
+def test_a_sub_env_is_taken_out_of_a_batch(kind):
     space = SPACES[kind]
     space.seed(4)
     members = [space.sample() for _ in range(3)]
     batch = stack(space, members)
-    for lane, member in enumerate(members):
-        assert entries(lane_of(space, batch, lane)) == entries(member)
+    for sub_env, member in enumerate(members):
+        assert entries(sub_env_of(space, batch, sub_env)) == entries(member)
 
 
 def test_what_gymnasium_batches_can_be_taken_apart():
     space = gymnasium.spaces.Dict({"a": gymnasium.spaces.Box(0, 1, (2,))})
     batch = create_empty_array(batch_space(space, 2).spaces["a"], n=2)
-    assert lane_of(space, {"a": batch}, 1)["a"].shape == batch[1].shape
+    assert sub_env_of(space, {"a": batch}, 1)["a"].shape == batch[1].shape

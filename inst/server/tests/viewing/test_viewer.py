@@ -59,7 +59,7 @@ def test_a_watcher_sees_the_frame_and_the_numbers_that_belong_to_it(client, crea
         "step": 3,
         "return": 3.0,
     }
-    assert (seen["lanes"], seen["returns"], seen["reward_threshold"]) == (None, [], 475.0)
+    assert (seen["num_envs"], seen["returns"], seen["reward_threshold"]) == (None, [], 475.0)
 
 
 def test_episodes_and_returns_are_counted_unwatched_too(client, faulty):
@@ -102,39 +102,39 @@ def test_values_that_json_has_no_word_for_are_seen(client, faulty):
 
 
 @pytest.mark.parametrize("mode", ["sync", "vector_entry_point", "async"])
-def test_each_lane_can_be_watched(client, create, mode):
+def test_each_sub_env_can_be_watched(client, create, mode):
     url = create(num_envs=3, vectorization_mode=mode, seed=1)
     client.post(f"{url}/reset/")
     for _ in range(8):
         play(client, url, action=[0, 1, 1])
-    seen = [state(client, url, lane=lane) for lane in range(3)]
-    assert [(one["lane"], one["lanes"], one["step"]) for one in seen] == [
+    seen = [state(client, url, sub_env=sub_env) for sub_env in range(3)]
+    assert [(one["sub_env"], one["num_envs"], one["step"]) for one in seen] == [
         (0, 3, 8),
         (1, 3, 8),
         (2, 3, 8),
     ]
     # The carts went apart.
     assert not np.array_equal(frame_of(seen[0]), frame_of(seen[1]))
-    refused = client.get(f"{url}/watch/state/?lane=3")
+    refused = client.get(f"{url}/watch/state/?sub_env=3")
     assert (refused.status_code, refused.json["code"]) == (400, "invalid_parameter")
 
 
-def test_more_lanes_than_can_be_drawn_at_once_show_their_observations(client, create):
+def test_more_sub_envs_than_can_be_drawn_at_once_show_their_observations(client, create):
     url = create(num_envs=20, vectorization_mode="vector_entry_point", seed=1)
     observations = client.post(f"{url}/reset/").json["observation"]
-    seen = state(client, url, lane=19)
+    seen = state(client, url, sub_env=19)
     assert seen["frame"] is None
-    assert "all of its 20 lanes at once" in seen["why_no_picture"]
+    assert "all of its 20 sub-environments at once" in seen["why_no_picture"]
     assert seen["observation"]["values"] == pytest.approx(observations[19])
 
 
-def test_the_observation_of_a_lane_is_its_own_when_only_others_stepped(app, client, lanes):
-    url = lanes("bytes", num_envs=3, longest=9, vectorization_mode="sync")
+def test_the_observation_of_a_sub_env_is_its_own_when_only_others_stepped(app, client, sub_envs):
+    url = sub_envs("bytes", num_envs=3, longest=9, vectorization_mode="sync")
     instance = app._instances.get(url.rsplit("/", 1)[1])
     before = client.post(f"{url}/reset/", json={"seed": 1}).json["observation"]
     fields = {"action": [[0] * 4] * 2, "step_mask": [True, False, True]}
     after = client.post(f"{url}/step/", json=fields).json["observation"]
-    seen = [instance._observed(lane).tolist() for lane in range(3)]
+    seen = [instance._observed(sub_env).tolist() for sub_env in range(3)]
     assert seen == [after[0], before[1], after[1]]
 
 
@@ -228,9 +228,9 @@ def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch
     instance, drawn = watch(url)
     draw = instance._draw
 
-    def slowly(lane):
+    def slowly(sub_env):
         time.sleep(0.05)
-        return draw(lane)
+        return draw(sub_env)
 
     instance._draw = slowly
     client.post(f"{url}/reset/")
@@ -243,13 +243,13 @@ def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch
     assert 2 <= len(drawn) <= 2 + (time.monotonic() - began) / 0.25
 
 
-def test_lanes_that_nobody_looks_at_any_more_are_forgotten(client, create, watch, monkeypatch):
+def test_sub_envs_that_nobody_looks_at_any_more_are_forgotten(client, create, watch, monkeypatch):
     monkeypatch.setattr(screens, "_KEPT_SECONDS", 0.1)
     url = create(num_envs=8, vectorization_mode="sync")
     instance, _ = watch(url)
     client.post(f"{url}/reset/")
-    for lane in range(8):
-        state(client, url, lane=lane)
+    for sub_env in range(8):
+        state(client, url, sub_env=sub_env)
         time.sleep(0.06)
     assert len(instance.screen._shots) < 5
 
@@ -317,13 +317,13 @@ def is_paced(instance):
     return instance.screen._next_tick > 0
 
 
-@pytest.mark.parametrize("how", ["human", "render", "lanes"])
+@pytest.mark.parametrize("how", ["human", "render", "num_envs"])
 def test_what_people_want_to_see_moves_in_real_time_while_they_watch(client, create, watch, how):
     made = {"render_mode": "human"} if how != "render" else {}
-    url = create(**made, num_envs=2 if how == "lanes" else None)
+    url = create(**made, num_envs=2 if how == "num_envs" else None)
     instance, _ = watch(url)
     fields = {"render": True} if how == "render" else {}
-    if how == "lanes":
+    if how == "num_envs":
         fields["action"] = [0, 1]
     client.post(f"{url}/reset/")
     play(client, url, 10, **fields)

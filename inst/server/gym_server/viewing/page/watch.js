@@ -20,7 +20,7 @@ const CLOSED = new Set([
 
 const observation = new Observation($("observation"));
 const playback = new Playback(show);
-let lane = 0;
+let subEnv = 0;
 let after = null;
 let shown = null;
 let question = null;
@@ -51,8 +51,8 @@ async function follow() {
         tellLocked(problem);
         return;
       }
-      if (problem.code === "invalid_parameter" && lane > 0) {
-        setLane(0);
+      if (problem.code === "invalid_parameter" && subEnv > 0) {
+        setSubEnv(0);
         continue;
       }
       after = null;
@@ -64,11 +64,11 @@ async function follow() {
 }
 
 async function askForNews() {
-  const query = new URLSearchParams({ lane });
+  const query = new URLSearchParams({ sub_env: subEnv });
   if (after !== null) query.set("after", after);
-  const asked = lane;
+  const asked = subEnv;
   const shot = await ask(`state/?${query}`);
-  if (asked !== lane || playback.paused) return;
+  if (asked !== subEnv || playback.paused) return;
   if (shot.state === "busy") {
     setState("busy", "busy: a picture has to wait");
     return;
@@ -110,7 +110,7 @@ async function show(shot) {
   hideMessage();
   $("env").textContent = shot.env_id;
   document.title = `${shot.env_id} · episode ${shot.episode}`;
-  showLanes(shot);
+  showSubEnvs(shot);
   $("episode").textContent = shot.episode ? number(shot.episode) : "–";
   $("step").textContent = shot.episode ? number(shot.step) : "–";
   $("return").textContent = shot.episode ? number(shot.return) : "–";
@@ -144,7 +144,7 @@ async function showPicture(shot) {
   pen.clearRect(0, 0, canvas.width, canvas.height);
   pen.drawImage(bitmap, 0, 0);
   bitmap.close();
-  const where = shot.lanes === null ? "" : `, lane ${shot.lane + 1}`;
+  const where = shot.num_envs === null ? "" : `, sub-environment ${shot.sub_env + 1}`;
   canvas.setAttribute(
     "aria-label", `${shot.env_id}${where}, episode ${shot.episode}, step ${shot.step}`
   );
@@ -160,19 +160,19 @@ function showObservation({ observation: seen, why_no_picture: why, hint }) {
   observation.draw(seen);
 }
 
-function showLanes({ lanes }) {
-  $("lanes").hidden = lanes === null;
-  if (lanes === null) return;
-  $("lane").max = lanes;
-  $("of").textContent = `of ${number(lanes)}`;
+function showSubEnvs({ num_envs: numEnvs }) {
+  $("sub_envs").hidden = numEnvs === null;
+  if (numEnvs === null) return;
+  $("sub_env").max = numEnvs;
+  $("of").textContent = `of ${number(numEnvs)}`;
 }
 
 let charted = null;
-function showReturns({ returns, lanes, reward_threshold: goal }) {
+function showReturns({ returns, num_envs: numEnvs, reward_threshold: goal }) {
   const key = returns.join();
   if (key === charted) return;
   charted = key;
-  const whose = lanes === null ? "" : " of all lanes";
+  const whose = numEnvs === null ? "" : " of all sub-environments";
   const many = returns.length === 1 ? "the last episode" : `the last ${returns.length} episodes`;
   $("caption").textContent = `Returns of ${returns.length ? many : "the last episodes"}${whose}`;
   const mean = returns.map(Number).reduce((sum, value) => sum + value, 0) / returns.length;
@@ -181,12 +181,12 @@ function showReturns({ returns, lanes, reward_threshold: goal }) {
 }
 
 // The steps of all sub-environments are counted; real time holds for each of them.
-function showPace({ steps, fps, lanes }) {
+function showPace({ steps, fps, num_envs: numEnvs }) {
   const now = performance.now();
   if (!pace || steps < pace.steps) pace = { steps, now, rate: null };
   const seconds = (now - pace.now) / 1000;
   if (seconds > 1) pace = { steps, now, rate: (steps - pace.steps) / seconds };
-  const [together, each] = lanes > 1 ? [`, all ${number(lanes)} together`, " each"] : ["", ""];
+  const [together, each] = numEnvs > 1 ? [`, all ${number(numEnvs)} together`, " each"] : ["", ""];
   const rate =
     pace.rate === null ? "" : `about ${number(Math.round(pace.rate))} steps a second${together}`;
   const real = fps === null ? "" : `real time (at most ${number(fps)}${each})`;
@@ -294,10 +294,10 @@ function setPaused(paused) {
   askAnew();
 }
 
-function setLane(number) {
-  lane = number;
+function setSubEnv(number) {
+  subEnv = number;
   after = null;
-  $("lane").value = number + 1;
+  $("sub_env").value = number + 1;
   observation.forget();
   playback.drop();
   askAnew();
@@ -310,9 +310,9 @@ $("speeds").addEventListener("change", (event) => {
   wake();
 });
 
-$("lane").addEventListener("change", () => {
-  const wanted = Math.min(Math.max(1, Math.round(Number($("lane").value) || 1)), $("lane").max);
-  setLane(wanted - 1);
+$("sub_env").addEventListener("change", () => {
+  const wanted = Math.min(Math.max(1, Math.round(Number($("sub_env").value) || 1)), $("sub_env").max);
+  setSubEnv(wanted - 1);
 });
 
 document.addEventListener("keydown", (event) => {

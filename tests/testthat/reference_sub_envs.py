@@ -1,10 +1,10 @@
 """Plays a vector environment in process and writes down what came of it, for the R tests.
 
-Usage: reference_lanes.py ENV_ID NUM_ENVS MODE AUTORESET STEPS FILE < ACTIONS. MODE is
+Usage: reference_sub_envs.py ENV_ID NUM_ENVS MODE AUTORESET STEPS FILE < ACTIONS. MODE is
 "vector_entry_point" or "sync", AUTORESET a value of Gymnasium's AutoresetMode, and ACTIONS
-holds a line of numbers for each step, one for each lane. The file holds the observation of
-the reset with seed 7, then for each step observation, reward, terminated and truncated, lane
-by lane as little-endian doubles.
+holds a line of numbers for each step, one for each sub-environment. The file holds the observation
+of the reset with seed 7, then for each step observation, reward, terminated and truncated,
+sub-environment by sub-environment as little-endian doubles.
 """
 
 import sys

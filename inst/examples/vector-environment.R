@@ -13,7 +13,7 @@ while (any(alive)) {
   out <- env$step(observation[, 3] > 0)
   observation <- out$observation
   steps <- steps + sum(alive)
-  # A lane whose episode has ended begins another one by itself; the first one counts.
+  # A sub-environment whose episode has ended begins another one by itself; the first one counts.
   alive <- alive & !out$done
 }
 env$close()
