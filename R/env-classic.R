@@ -183,7 +183,7 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' @param render Whether people want to see it: `TRUE` or `FALSE`, the default. The first
 #'   `TRUE` opens the environment's page, see [env_watch()], and while somebody watches
 #'   there each such step waits for real time. [env_render()] fetches a picture.
-#' @param sub-environments For an environment with sub-environments: the numbers of those that are
+#' @param which For an environment with sub-environments: the numbers of those that are
 #'   to step, counted from 1 and in increasing order; `action` and what is returned then have
 #'   rows for these alone. `NULL`, the default, steps all. Needs `"sync"`.
 #' @return A list of
@@ -222,7 +222,7 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' str(env_step(client, sub-environments, c(1, 0, 1)))
 #' env_step(client, sub-environments, c(0, 1), sub-environments = c(1, 3))$observation
 #' env_close(client, sub-environments)
-env_step <- function(x, instance_id, action, render = FALSE, sub_envs = NULL) {
+env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
   check_flag(render)
   step_instance(x, known_instance(x, instance_id), action, render, which)
 }

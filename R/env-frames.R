@@ -11,8 +11,8 @@ new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
 }
 
-frames_of <- function(record, sub_envs) {
-  lapply(record$blocks, function(block) new_frames(block$frames, sub_envs$spec$render_fps))
+frames_of <- function(record, vector_env) {
+  lapply(record$blocks, function(block) new_frames(block$frames, vector_env$spec$render_fps))
 }
 
 #' @export

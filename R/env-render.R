@@ -3,7 +3,7 @@
 #' Asks the server for a picture of the environment as it is now.
 #'
 #' @inheritParams env_reset
-#' @param sub-environment Which sub-environment to draw where the environment has sub-environments,
+#' @param which Which sub-environment to draw where the environment has sub-environments,
 #'   a number from 1, the default. An implementation of an environment's own
 #'   (`"vector_entry_point"`) draws all sub-environments at once, and the server lets it have 16 at
 #'   most for that.

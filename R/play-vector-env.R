@@ -120,7 +120,7 @@ make_if_can <- function(env_id, num_envs, vectorization_mode, autoreset_mode, cl
 #'   where its seed is enough; `frame()`, which gives the current frame as the bytes of a
 #'   PNG file, `NULL` where none are wanted.
 #' @noRd
-sub_envs_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
+vector_env_of <- function(env, block = NULL, call = rlang::caller_env(), frames = FALSE) {
   if (is.null(env$num_envs)) {
     vector_env <- single_sub_env(env, call)
   } else if (identical(env$vectorization_mode, "sync")) {

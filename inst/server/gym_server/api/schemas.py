@@ -46,7 +46,6 @@ _ABOUT = {
     "reward_threshold": _or_null(_NUMBER),
     "max_episode_steps": _or_null(_COUNT),
     "render_fps": _ANYTHING,
-    "num_envs": _or_null(_COUNT),
     "vectorization_mode": _or_null(_TEXT),
     "autoreset_mode": _or_null(_TEXT),
     "render_mode": _or_null(_TEXT),

@@ -129,7 +129,7 @@ def test_one_sub_env_has_a_dimension_of_its_own(client, create):
     assert np.shape(answer["observation"]) == (1, 4)
     answer = post(client, url, "step", action=[1])
     assert (answer["reward"], answer["done"]) == ([1.0], [False])
-    assert client.get(url).json["num_envs"] == client.get(url).json["num_envs"] == 1
+    assert client.get(url).json["num_envs"] == 1
 
 
 def test_final_infos_stay_where_gymnasium_puts_them(client, sub_envs):

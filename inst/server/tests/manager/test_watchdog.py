@@ -118,8 +118,8 @@ def test_an_environment_may_hang_while_it_is_made(strict, call):
 
 
 @pytest.mark.parametrize("num_envs", [None, 2])
-def test_drawing_may_hang_and_others_are_drawn_all_the_same(strict, call, sub_envs):
-    fields = {} if sub_envs is None else {"num_envs": sub_envs}
+def test_drawing_may_hang_and_others_are_drawn_all_the_same(strict, call, num_envs):
+    fields = {} if num_envs is None else {"num_envs": num_envs}
     url = strict.create("faulty_envs:HangsWhere-v0", kwargs={"where": "render"}, **fields)
     other = strict.create("faulty_envs:Drawing-v0")
     for one in (url, other):
