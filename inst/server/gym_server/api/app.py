@@ -17,7 +17,7 @@ from werkzeug.http import parse_accept_header
 
 from gym_server.api import watch_routes
 from gym_server.api.access import Access, Guard
-from gym_server.api.exactly_once import ExactlyOnce, Outcome, RequestId
+from gym_server.api.exactly_once import ExactlyOnce, Outcome
 from gym_server.api.routes import (
     ROUTES,
     Call,
@@ -36,9 +36,10 @@ from gym_server.manager.instance_manager import Instances
 from gym_server.manager.limits import Limits, Watchers
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol import wire
+from gym_server.protocol import answers, bodies
+from gym_server.protocol.answers import Answer
+from gym_server.protocol.fields import REQUEST, RequestId, read
 from gym_server.protocol.safetensors import TENSORS
-from gym_server.protocol.wire import Answer
 from gym_server.rendering.render_thread import RenderThread
 
 # The routes of each step; the id is one that an instance can have.
@@ -224,9 +225,10 @@ class _Handler:
         if route.method == "GET":
             body = request.query
         else:
-            body = wire.loads_tensors(request.body) if sends_tensors else wire.loads(request.body)
+            loads = bodies.loads_tensors if sends_tensors else bodies.loads
+            body = loads(request.body)
         wants_tensors = route.tensors and _prefers_tensors(request.accept, route.content_type)
-        request_id = wire.read(body, (wire.REQUEST,))["request"] if route.once else None
+        request_id = read(body, (REQUEST,))["request"] if route.once else None
 
         instance_id = request.variables.get("instance_id")
         # What ends an instance is known as what makes one is, by key and number: it is never one
@@ -235,7 +237,7 @@ class _Handler:
 
         def perform() -> Outcome:
             try:
-                fields = wire.read(body, route.fields)
+                fields = read(body, route.fields)
                 call = Call(
                     self._services,
                     request.variables,
@@ -246,7 +248,7 @@ class _Handler:
                     request.accept,
                 )
                 result = route.handler(call)
-                answer = wire.answer(result, request_id)
+                answer = answers.answer(result, request_id)
                 return Outcome(answer, True, instance_id or _made(result))
             except BaseException as error:
                 # What an environment raises must not pass by the answer that is stored.
@@ -316,7 +318,7 @@ def _turn_away(refusal: GymServerError, environ: dict) -> Answer:
     path = environ["PATH_INFO"]
     wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
     if refusal.code == "unauthorized" and wants_page and _WATCH_PAGE.fullmatch(path):
-        page = wire.answer(watch_routes.page(path, refusal.status), None)
+        page = answers.answer(watch_routes.page(path, refusal.status), None)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return _failure(refusal, None)
 
@@ -332,7 +334,7 @@ def _query(args: MultiDict) -> dict[str, str | list[str]]:
 
 def _failure(error: BaseException, request_id: RequestId | None) -> Answer:
     status, body = answer_to(error)
-    answer = wire.answer(body, request_id, status)
+    answer = answers.answer(body, request_id, status)
     if isinstance(error, GymServerError):
         answer = answer._replace(headers=error.headers)
     elif isinstance(error, MethodNotAllowed):

@@ -21,10 +21,11 @@ from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import Instances
 from gym_server.manager.limits import Watchers
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol import wire
+from gym_server.protocol.answers import HTML, JSON, Content
+from gym_server.protocol.bodies import parse_path_value
+from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.safetensors import TENSORS, Tensor
 from gym_server.protocol.safetensors import write as write_tensors
-from gym_server.protocol.wire import Content, Field
 from gym_server.rendering.png import png
 
 
@@ -102,7 +103,7 @@ class Route:
     handler: Handler
     answer: str = ""
     once: bool = False
-    content_type: str = wire.JSON
+    content_type: str = JSON
     tensors: bool = False
     html: bool = False
     tensor_body: bool = False
@@ -131,7 +132,7 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
 @declare(
     "POST",
     "/v1/envs/",
-    Field("env_id", wire.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field("env_id", fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
     Field(
         "seed",
         fields.SEED,
@@ -140,12 +141,12 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
     ),
     Field(
         "render_mode",
-        wire.TEXT,
+        TEXT,
         "rgb_array (the default where it is supported), or human: the same, but while somebody "
         "watches it moves in real time.",
     ),
-    Field("kwargs", wire.OBJECT, "Handed to the environment."),
-    Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("kwargs", OBJECT, "Handed to the environment."),
+    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field(
         "num_envs", fields.NUM_ENVS, "How many sub-environments; absent for a single environment."
     ),
@@ -160,7 +161,7 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
         "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
         "NextStep.",
     ),
-    Field("name", wire.NAME, "What its owner calls it; shown wherever it is listed."),
+    Field("name", fields.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
     once=True,
 )
@@ -203,7 +204,7 @@ def env_about(call: Call) -> dict:
         "Seeds the environment and its action space; with sub-environments also a list of one for "
         "each.",
     ),
-    Field("options", wire.OBJECT, "The environment's own."),
+    Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
     answer="observation, info; with sub-environments one row a sub-environment",
     once=True,
@@ -222,14 +223,14 @@ def env_reset(call: Call) -> dict:
     INSTANCE + "step/",
     Field(
         "action",
-        wire.ANYTHING,
+        ANYTHING,
         "A member of the action space, a Box's bounds aside; with sub-environments one for each "
         "that steps.",
         required=True,
     ),
     Field(
         "render",
-        wire.BOOLEAN,
+        BOOLEAN,
         "Whether people want to see it: while somebody watches, the step waits until real time "
         "has come so far.",
     ),
@@ -270,11 +271,11 @@ def env_action_space_sample(call: Call) -> dict:
 @declare("GET", INSTANCE + "action_space/contains/<x>/", answer="member: true or false")
 def env_action_space_contains(call: Call) -> dict:
     """Tell whether a value is an action."""
-    value = wire.parse_path_value(call.path["x"])
+    value = parse_path_value(call.path["x"])
     return {"member": call.instance.action_contains({"value": value})}
 
 
-_VALUE = Field("value", wire.ANYTHING, "Is it a member? Without it: is the description right?")
+_VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the description right?")
 
 
 @declare("POST", INSTANCE + "action_space/contains/", _VALUE, answer="member: true or false")
@@ -308,10 +309,10 @@ def env_render(call: Call) -> Content:
 @declare(
     "POST",
     INSTANCE + "monitor/start/",
-    Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", wire.BOOLEAN, "Delete what monitors left there that are gone."),
-    Field("resume", wire.BOOLEAN, "Go on counting where an earlier monitor ended."),
-    Field("video_callable", wire.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
+    Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
+    Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
+    Field("video_callable", fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
 )
 def env_monitor_start(call: Call) -> None:
     """Record the episodes that start from now on."""
@@ -346,9 +347,9 @@ def env_delete(call: Call) -> None:
 @declare(
     "POST",
     "/v1/upload/",
-    Field("training_dir", wire.TEXT, "A monitor's directory.", required=True),
-    Field("api_key", wire.TEXT, "A key to OpenAI Gym.", required=True),
-    Field("algorithm_id", wire.ANYTHING, "Ignored."),
+    Field("training_dir", TEXT, "A monitor's directory.", required=True),
+    Field("api_key", TEXT, "A key to OpenAI Gym.", required=True),
+    Field("algorithm_id", ANYTHING, "Ignored."),
     answer="nothing: 410 always",
 )
 def upload(call: Call) -> None:
@@ -365,13 +366,13 @@ def shutdown(call: Call) -> dict | Content:
     """Answer the requests under way and stop the server."""
     call.services.stop()
     message = "Server shutting down"
-    if wire.HTML in call.accept:
+    if HTML in call.accept:
         # As the classic server answered.
-        return Content(message.encode(), f"{wire.HTML}; charset=utf-8")
+        return Content(message.encode(), f"{HTML}; charset=utf-8")
     return {"message": message}
 
 
-_SEARCH = replace(wire.TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
+_SEARCH = replace(TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
 
 
 @declare(

@@ -9,7 +9,8 @@ from gym_server.api import fields
 from gym_server.api.routes import INSTANCE, Call, declare
 from gym_server.api.watch_keys import KEY_SECONDS
 from gym_server.errors import GymServerError
-from gym_server.protocol.wire import JSON, Content, Field
+from gym_server.protocol.answers import JSON, Content
+from gym_server.protocol.fields import Field
 
 _PAGE = Path(viewing.__file__).parent / "page"
 _WATCH = INSTANCE + "watch/"

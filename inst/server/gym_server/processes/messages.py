@@ -20,9 +20,8 @@ import numpy as np
 
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import Nonsense, Pipe
-from gym_server.protocol import wire
+from gym_server.protocol.answers import JSON, Answer, Ready, dumps
 from gym_server.protocol.safetensors import TENSORS
-from gym_server.protocol.wire import JSON, Answer, Ready
 
 # The question's number, what kind of answer it is, and how long its text is.
 _HEAD = struct.Struct("<QBI")
@@ -57,14 +56,14 @@ def answer_of(number: int, answer: Answer) -> bytes:
 
 def value_of(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
     """Return the message that is a JSON value, with a picture."""
-    text = wire.dumps([value, None if frame is None else frame.shape])
+    text = dumps([value, None if frame is None else frame.shape])
     pixels = b"" if frame is None else frame.tobytes()
     return _HEAD.pack(number, _VALUE, len(text)) + text + pixels
 
 
 def refusal_of(number: int, refusal: dict[str, str]) -> bytes:
     """Return the message that is an error; see ``errors.answer_to()``."""
-    text = wire.dumps(refusal)
+    text = dumps(refusal)
     return _HEAD.pack(number, _REFUSAL, len(text)) + text
 
 

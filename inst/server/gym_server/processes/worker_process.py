@@ -15,7 +15,7 @@ from gym_server.errors import GymServerError, environment_died
 from gym_server.processes import start
 from gym_server.processes.messages import Channel, Seen
 from gym_server.processes.pipe import Nonsense
-from gym_server.protocol.wire import Ready
+from gym_server.protocol.answers import Ready
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ import pytest
 from gym_server.errors import GymServerError
 from gym_server.processes.messages import _HEAD, Channel, answer_of, refusal_of, value_of
 from gym_server.processes.pipe import ConnectionPipe, Nonsense, Pipe
-from gym_server.protocol import wire
+from gym_server.protocol.answers import JSON, Answer
 from gym_server.protocol.safetensors import TENSORS
 
 
@@ -29,9 +29,9 @@ def ends(request, monkeypatch):
 def test_questions_and_answers_arrive_as_they_were(ends):
     channel, other = ends
     frame = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    long = wire.Answer(200, b"x" * 300_000, TENSORS)
+    long = Answer(200, b"x" * 300_000, TENSORS)
     for message in (
-        answer_of(1, wire.Answer(200, b'{"a":1}')),
+        answer_of(1, Answer(200, b'{"a":1}')),
         answer_of(2, long),
         value_of(3, {"a": [1, "ä", None]}),
         value_of(4, None, frame),
@@ -43,7 +43,7 @@ def test_questions_and_answers_arrive_as_they_were(ends):
         number, method, args = pickle.loads(other.receive())
         assert (method, args) == ("step", ([1], {"b": 2}))
         if number < 3:
-            assert answer == ((b'{"a":1}', wire.JSON), (long.body, TENSORS))[number - 1]
+            assert answer == ((b'{"a":1}', JSON), (long.body, TENSORS))[number - 1]
     assert (answer.frame == frame).all()
 
 
