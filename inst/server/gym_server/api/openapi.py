@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from gym_server import __version__
-from gym_server.api.schemas import ANSWERS
+from gym_server.api.routing import Route
 from gym_server.protocol.answers import HTML, JSON
-from gym_server.protocol.fields import REQUEST
+from gym_server.protocol.fields import REQUEST, Field
 from gym_server.protocol.safetensors import TENSORS
-
-if TYPE_CHECKING:
-    from gym_server.api.routes import Route
-    from gym_server.protocol.fields import Field
 
 _ERROR = {
     "type": "object",
@@ -39,7 +33,7 @@ def document(routes: Iterable[Route]) -> dict:
     routes = list(routes)
     paths: dict[str, dict] = {}
     for route in routes:
-        path = re.sub(r"<(\w+)>", r"{\1}", route.path)
+        path = route.path.replace("<", "{").replace(">", "}")
         paths.setdefault(path, {})[route.method.lower()] = _operation(route)
     _link_created(paths)
     return {
@@ -85,7 +79,7 @@ def _operation(route: Route) -> dict:
     }
     parameters = [
         {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-        for name in re.findall(r"<(\w+)>", route.path)
+        for name in route.variables
     ]
     if route.method == "GET":
         parameters += map(_query, route.fields)
@@ -108,7 +102,7 @@ def _answer(route: Route) -> dict:
             }
         return answer
     is_json = route.content_type == JSON
-    schema = ANSWERS.get(route.handler.__name__, {"type": "object"})
+    schema = route.schema or {"type": "object"}
     content: dict = {route.content_type: {"schema": schema} if is_json else {}}
     if route.html:
         content[HTML] = {}
