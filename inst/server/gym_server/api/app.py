@@ -10,18 +10,17 @@ from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
 
-import werkzeug
 from flask import Flask, Response
 
 from gym_server.api.access import Access, Guard
 from gym_server.api.calls import Services
-from gym_server.api.endpoint import Endpoint, Request, failure, kept_bytes
+from gym_server.api.endpoint import Endpoint, failure, kept_bytes
 from gym_server.api.exactly_once import ExactlyOnce
 from gym_server.api.routes import ROUTES
 from gym_server.api.routing import Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.errors import GymServerError, body_too_large, shutdown_disabled
+from gym_server.errors import GymServerError, shutdown_disabled
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import Instances
 from gym_server.manager.limits import Limits, Watchers
@@ -30,6 +29,10 @@ from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol import answers
 from gym_server.protocol.answers import Answer
 from gym_server.rendering.render_thread import RenderThread
+
+# As Flask writes them.
+_STATUS_LINES = {status.value: f"{status.value} {status.phrase.upper()}" for status in HTTPStatus}
+_NO_CONTENT = HTTPStatus.NO_CONTENT.value
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,6 @@ class GymApp(Flask):
     def __init__(self, config: Config) -> None:
         """Set up the services and the routes."""
         super().__init__("gym_server", static_folder=None)
-        self.config["MAX_CONTENT_LENGTH"] = config.max_body_bytes
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
         self._instances = Instances(
@@ -100,8 +102,9 @@ class GymApp(Flask):
         exactly_once: ExactlyOnce[Answer] = ExactlyOnce(self._instances.lives, kept_bytes)
         self._exactly_once = exactly_once
         self._router = Router(ROUTES)
-        self._endpoints = {route: Endpoint(route, services, exactly_once) for route in ROUTES}
+        self._endpoints = {}
         for route in ROUTES:
+            self._endpoints[route] = Endpoint(route, services, exactly_once, config.max_body_bytes)
             # By these Flask tells what is wrong with a request that has no route.
             self.add_url_rule(
                 route.path,
@@ -127,23 +130,9 @@ class GymApp(Flask):
             if match is None:
                 # Flask answers by 404, 405, or a redirection where there are slashes too many.
                 return super().wsgi_app(environ, start_response)
-            answer = self._answer(environ, match)
+            answer = self._endpoints[match.route].answer(environ, match)
         start_response(*_head(answer))
         return (answer.body,)
-
-    def _answer(self, environ: dict, match: Match) -> Answer:
-        length = int(environ.get("CONTENT_LENGTH") or 0)
-        if length > self.config["MAX_CONTENT_LENGTH"]:
-            return failure(body_too_large(), None)
-        request = Request(
-            match.path,
-            match.variables,
-            _query(environ) if match.route.method == "GET" else {},
-            environ["wsgi.input"].read(length),
-            environ.get("CONTENT_TYPE", ""),
-            environ.get("HTTP_ACCEPT", ""),
-        )
-        return self._endpoints[match.route].answer(request)
 
     def admit(self, environ: dict) -> None:
         """Raise the refusal of a request that would not be answered, before its body has come."""
@@ -190,18 +179,13 @@ def _refuse_to_stop() -> None:
     raise shutdown_disabled()
 
 
-def _query(environ: dict) -> dict[str, str | list[str]]:
-    """Return a query's fields; one that was given several times is a list, which no field takes."""
-    lists = werkzeug.Request(environ).args.lists()
-    return {name: values[0] if len(values) == 1 else values for name, values in lists}
-
-
 def _head(answer: Answer) -> tuple[str, list[tuple[str, str]]]:
     """Return an answer's status and headers in WSGI's words."""
-    headers = [("Content-Type", answer.content_type), *answer.headers]
-    if answer.status != HTTPStatus.NO_CONTENT:
-        headers.insert(1, ("Content-Length", str(len(answer.body))))
-    return f"{answer.status} {HTTPStatus(answer.status).phrase}", headers
+    headers = [("Content-Type", answer.content_type)]
+    if answer.status != _NO_CONTENT:
+        headers.append(("Content-Length", str(len(answer.body))))
+    headers += answer.headers
+    return _STATUS_LINES[answer.status], headers
 
 
 def _response(answer: Answer) -> Response:

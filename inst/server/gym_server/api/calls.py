@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from gym_server.api.routing import Route
 from gym_server.api.watch_keys import WatchKeys
@@ -34,8 +35,7 @@ class Services:
     watch_keys: WatchKeys | None = None
 
 
-@dataclass(frozen=True)
-class Call:
+class Call(NamedTuple):
     """A request, parsed.
 
     Attributes:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import NamedTuple
 
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
+from werkzeug.wrappers import Request
 
 from gym_server.api.calls import Call, Services
 from gym_server.api.exactly_once import ExactlyOnce, Outcome
-from gym_server.api.routing import Route
-from gym_server.errors import GymServerError, answer_to
+from gym_server.api.routing import Match, Route
+from gym_server.errors import GymServerError, answer_to, body_too_large
 from gym_server.protocol import answers, bodies
 from gym_server.protocol.answers import Answer
 from gym_server.protocol.fields import REQUEST, RequestId, read
@@ -22,65 +22,65 @@ from gym_server.protocol.safetensors import TENSORS
 _KEPT_BYTES = 2**16
 
 
-class Request(NamedTuple):
-    """What the protocol needs to know of an HTTP request.
-
-    Attributes:
-        path: the path of its URL, decoded.
-        variables: the variable parts of the path, by name.
-        query: the fields of a GET's query; one that was given several times is a list.
-        body: the body.
-        content_type: what the body is.
-        accept: what the client says it takes.
-    """
-
-    path: str
-    variables: dict[str, str]
-    query: dict[str, str | list[str]]
-    body: bytes
-    content_type: str
-    accept: str
-
-
 class Endpoint:
     """Answers the requests to one route."""
 
-    def __init__(self, route: Route, services: Services, exactly_once: ExactlyOnce[Answer]) -> None:
-        """Take the route and what its handler works on."""
-        self.route = route
+    def __init__(
+        self,
+        route: Route,
+        services: Services,
+        exactly_once: ExactlyOnce[Answer],
+        max_body_bytes: int,
+    ) -> None:
+        """Prepare to answer.
+
+        Args:
+            route: the route.
+            services: what its handler works on.
+            exactly_once: the answers to requests with an idempotency key.
+            max_body_bytes: the size of the largest body.
+        """
+        self._route = route
         self._services = services
         self._exactly_once = exactly_once
+        self._max_body_bytes = max_body_bytes
 
-    def answer(self, request: Request) -> Answer:
-        """Answer a request; whatever goes wrong is an answer, too."""
+    def answer(self, environ: dict, match: Match) -> Answer:
+        """Answer a request, which is given in WSGI's words; whatever goes wrong is an answer, too.
+
+        Args:
+            environ: the request.
+            match: what its path says.
+        """
         try:
-            return self._answer(request)
+            return self._answer(environ, match)
         except Exception as error:
             return failure(error, None)
 
-    def _answer(self, request: Request) -> Answer:
-        route = self.route
-        sends_tensors = route.tensor_body and TENSORS in request.content_type
+    def _answer(self, environ: dict, match: Match) -> Answer:
+        route = self._route
+        raw = self._body(environ)
+        accept = environ.get("HTTP_ACCEPT", "")
+        sends_tensors = route.tensor_body and TENSORS in environ.get("CONTENT_TYPE", "")
         if route.method == "GET":
-            body = request.query
+            body = _query(environ)
         else:
-            loads = bodies.loads_tensors if sends_tensors else bodies.loads
-            body = loads(request.body)
-        wants_tensors = route.tensors and _prefers_tensors(request.accept, route.content_type)
+            body = bodies.loads_tensors(raw) if sends_tensors else bodies.loads(raw)
+        wants_tensors = route.tensors and _prefers_tensors(accept, route.content_type)
         request_id = read(body, (REQUEST,))["request"] if route.once else None
-        instance_id = request.variables.get("instance_id")
+        instance_id = match.variables.get("instance_id")
 
         def perform() -> Outcome:
             try:
                 fields = read(body, route.fields)
                 call = Call(
                     self._services,
-                    request.variables,
+                    match.variables,
                     body,
                     fields,
                     wants_tensors,
-                    request.path,
-                    request.accept,
+                    match.path,
+                    accept,
                 )
                 result = route.handler(call)
                 answer = answers.answer(result, request_id)
@@ -95,11 +95,17 @@ class Endpoint:
         # A request that ends an instance is kept with those that create one, so that it is never
         # refused because the instance has seen too many keys.
         moved_id = None if route.ends_instance else instance_id
-        content = (request.path, _fingerprint(request.body), sends_tensors, wants_tensors)
+        content = (match.path, _fingerprint(raw), sends_tensors, wants_tensors)
         try:
             return self._exactly_once.answer(request_id, moved_id, content, perform)
         except Exception as error:
             return failure(error, request_id)
+
+    def _body(self, environ: dict) -> bytes:
+        length = int(environ.get("CONTENT_LENGTH") or 0)
+        if length > self._max_body_bytes:
+            raise body_too_large()
+        return environ["wsgi.input"].read(length)
 
 
 def failure(error: BaseException, request_id: RequestId | None) -> Answer:
@@ -116,6 +122,12 @@ def failure(error: BaseException, request_id: RequestId | None) -> Answer:
 def kept_bytes(content: tuple | None, answer: Answer | None) -> int:
     """Tell how much is kept of a request, as its endpoint describes it, and of its answer."""
     return 0 if content is None or answer is None else len(content[1]) + len(answer.body)
+
+
+def _query(environ: dict) -> dict[str, str | list[str]]:
+    """Return a query's fields; one that was given several times is a list, which no field takes."""
+    lists = Request(environ).args.lists()
+    return {name: values[0] if len(values) == 1 else values for name, values in lists}
 
 
 def _fingerprint(body: bytes) -> bytes:
