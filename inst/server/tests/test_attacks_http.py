@@ -184,7 +184,7 @@ def test_who_has_no_token_and_asks_first_is_refused_first(ask, attacked):
 def conversation(monkeypatch):
     """Talk to one connection's code whose patience is short."""
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
     ours, theirs = socket.socketpair()
     listener = socket.create_server(("127.0.0.1", 0))
     ours.close()

@@ -14,7 +14,7 @@ from urllib.parse import parse_qs
 
 from gym_server.api.routing import Callers, Match
 from gym_server.api.watch_keys import WatchKeys
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, malformed_request
 from gym_server.json_values import brief
 
 log = logging.getLogger(__name__)
@@ -89,10 +89,10 @@ class Guard:
         host = environ.get("HTTP_HOST")
         if host is None:
             if environ.get("SERVER_PROTOCOL") == "HTTP/1.1":
-                raise GymServerError("malformed_json", "The request cannot be read: it has no Host")
+                raise malformed_request("it has no Host")
             return
         if "," in host:
-            raise GymServerError("malformed_json", "The request cannot be read: it has two Hosts")
+            raise malformed_request("it has two Hosts")
         match = _AUTHORITY.fullmatch(host)
         name = match[1].lower() if match else None
         if name is None or not (_is_address(name) or self._is_ours(name)):
@@ -148,7 +148,7 @@ class Guard:
             b"Bearer " + token.strip(), self._expected
         )
 
-    def knows(self, environ: dict, match: Match | None) -> bool:
+    def recognizes(self, environ: dict, match: Match | None) -> bool:
         """Tell whether a request shows the token, or a key; where there is none, everybody does.
 
         Args:

@@ -20,7 +20,13 @@ from gym_server.api.routes import ROUTES
 from gym_server.api.routing import Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.errors import GymServerError, shutdown_disabled
+from gym_server.errors import (
+    GymServerError,
+    body_too_large,
+    busy_receiving,
+    malformed_request,
+    shutdown_disabled,
+)
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import Instances
 from gym_server.manager.limits import Limits, Watchers
@@ -30,8 +36,10 @@ from gym_server.protocol import answers
 from gym_server.protocol.answers import Answer
 from gym_server.rendering.render_thread import RenderThread
 
-# As Flask writes them.
-_STATUS_LINES = {status.value: f"{status.value} {status.phrase.upper()}" for status in HTTPStatus}
+# A status line, headers and a body.
+WsgiAnswer = tuple[str, list[tuple[str, str]], bytes]
+
+_STATUS_LINES = {status.value: f"{status.value} {status.phrase}" for status in HTTPStatus}
 _NO_CONTENT = HTTPStatus.NO_CONTENT.value
 
 
@@ -125,28 +133,45 @@ class GymApp(Flask):
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
-            answer = _turn_away(refusal, environ, match)
-        else:
-            if match is None:
-                # Flask answers by 404, 405, or a redirection where there are slashes too many.
-                return super().wsgi_app(environ, start_response)
-            answer = self._endpoints[match.route].answer(environ, match)
-        start_response(*_head(answer))
-        return (answer.body,)
+            status, headers, body = _wsgi(_turn_away(refusal, environ, match))
+            start_response(status, headers)
+            return (body,)
+        if match is None:
+            # Flask answers by 404, 405, or a redirection where there are slashes too many.
+            return super().wsgi_app(environ, start_response)
+        status, headers, body = _wsgi(self._endpoints[match.route].answer(environ, match))
+        # In capitals, as Flask writes it and classic clients show it.
+        start_response(status.upper(), headers)
+        return (body,)
 
-    def admit(self, environ: dict) -> None:
-        """Raise the refusal of a request that would not be answered, before its body has come."""
-        self._guard.check(environ, self._router.match(environ))
+    def admit(self, environ: dict) -> WsgiAnswer | None:
+        """Return the answer that refuses a request before its body has come; None to admit it."""
+        try:
+            self._guard.check(environ, self._router.match(environ))
+        except GymServerError as refusal:
+            return _wsgi(failure(refusal, None))
+        return None
 
-    def knows(self, environ: dict) -> bool:
-        """Tell whether a request comes from one who may talk to this server at all."""
-        return self._guard.knows(environ, self._router.match(environ))
+    def recognizes(self, environ: dict) -> bool:
+        """Tell whether a request comes from a client that may use this server at all."""
+        return self._guard.recognizes(environ, self._router.match(environ))
+
+    def refuse(self, status: int, reason: str) -> WsgiAnswer:
+        """Return the answer to a request that does not get as far as the application.
+
+        Args:
+            status: 400, 413 or 503.
+            reason: what is wrong with the request, for 400.
+        """
+        refusals = {413: body_too_large, 503: busy_receiving}
+        refusal = refusals[status]() if status in refusals else malformed_request(reason)
+        return _wsgi(failure(refusal, None))
 
     def _give_up(self, thread: int, why: GymServerError) -> None:
         """Answer what a thread does that is stuck in an environment."""
         answer = self._exactly_once.give_up(thread, lambda number: failure(why, number))
         answer = answer or failure(why, None)
-        self.answer_for(thread, *_head(answer), answer.body)
+        self.answer_for(thread, *_wsgi(answer))
 
     def end_watching(self) -> None:
         """Send all watchers away, who would wait for more than the server's last moment."""
@@ -179,13 +204,13 @@ def _refuse_to_stop() -> None:
     raise shutdown_disabled()
 
 
-def _head(answer: Answer) -> tuple[str, list[tuple[str, str]]]:
-    """Return an answer's status and headers in WSGI's words."""
+def _wsgi(answer: Answer) -> WsgiAnswer:
+    """Return an answer in WSGI's words."""
     headers = [("Content-Type", answer.content_type)]
     if answer.status != _NO_CONTENT:
         headers.append(("Content-Length", str(len(answer.body))))
     headers += answer.headers
-    return _STATUS_LINES[answer.status], headers
+    return _STATUS_LINES[answer.status], headers, answer.body
 
 
 def _response(answer: Answer) -> Response:

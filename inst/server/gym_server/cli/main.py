@@ -15,6 +15,7 @@ from pathlib import Path
 
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
+from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.port_holder import port_holder
@@ -27,6 +28,10 @@ log = logging.getLogger("gym_server")
 
 # Windows knows a port that is bound exclusively by the second.
 _TAKEN = (errno.EADDRINUSE, 10013)
+
+# How many of the largest bodies may be on their way at a time; of parts of bodies, and of small
+# ones, which do not count, there may be many more.
+_LARGEST_BODIES = 16
 
 # A step that never returns must not keep the server alive for ever.
 _GRACE_SECONDS = 10.0
@@ -91,7 +96,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(app, listener, max_body_bytes, app.end_watching, app.admit, app.knows)
+    server = Server(
+        app,
+        listener,
+        max_body_bytes,
+        Budget(_LARGEST_BODIES * max_body_bytes),
+        app.end_watching,
+        app.admit,
+        app.recognizes,
+        app.refuse,
+    )
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)

@@ -30,7 +30,7 @@ def app(environ, start_response):
 @pytest.fixture
 def patience(monkeypatch):
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
     monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 2**20)
 
 
@@ -125,7 +125,7 @@ def strangers(environ):
 
 
 def test_a_stranger_gets_one_answer(converse):
-    client, _ = converse(knows=strangers)
+    client, _ = converse(recognizes=strangers)
     client.sendall((GET % b"") * 2)
     answer = b""
     while more := client.recv(65536):
@@ -135,14 +135,14 @@ def test_a_stranger_gets_one_answer(converse):
 
 @pytest.mark.parametrize("begun", [b"", GET[:20], POST % 1000])
 def test_a_stranger_may_not_be_silent(converse, begun):
-    client, _ = converse(knows=strangers)
+    client, _ = converse(recognizes=strangers)
     client.sendall(begun)
     assert client.recv(1) == b""
 
 
 def test_a_client_is_asked_for_until_it_is_known(converse):
     asked = []
-    client, _ = converse(knows=lambda environ: asked.append(environ["PATH_INFO"]) or True)
+    client, _ = converse(recognizes=lambda environ: asked.append(environ["PATH_INFO"]) or True)
     for path in (b"1", b"2"):
         client.sendall(GET % path)
         read_head(client)
@@ -181,7 +181,7 @@ def test_what_was_half_sent_leaves_nothing_for_the_garbage_collection(converse):
     gc.disable()
     try:
         client, thread = converse(
-            seen=lambda connection: readers.append(weakref.ref(connection._reader))
+            seen=lambda connection: readers.append(weakref.ref(connection._parser))
         )
         client.sendall(POST % ROOM + bytes(ROOM - 1))
         client.close()

@@ -3,7 +3,7 @@ import tracemalloc
 import pytest
 
 from gym_server.budget import Budget
-from gym_server.http_server.request_parser import Reader
+from gym_server.http_server.request_parser import RequestParser
 
 CHUNKED = b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
 
@@ -15,7 +15,7 @@ def said():
 
 @pytest.fixture
 def reader(said):
-    return Reader(2**20, said.append, lambda request: None, Budget(2**20).share())
+    return RequestParser(2**20, said.append, lambda request: None, Budget(2**20).share())
 
 
 def test_a_body_in_small_chunks_takes_its_own_size(reader):
@@ -38,7 +38,7 @@ def test_a_body_in_one_piece_is_not_copied(reader):
 
 
 def test_requests_without_a_large_body_ask_for_no_room(said):
-    reader = Reader(2**20, said.append, lambda request: None, Budget(0).share())
+    reader = RequestParser(2**20, said.append, lambda request: None, Budget(0).share())
     (request,) = reader.feed(CHUNKED + b"ffff\r\n" + bytes(0xFFFF) + b"\r\n0\r\n\r\n")
     assert request.refusal is None
 
