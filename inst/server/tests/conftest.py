@@ -206,13 +206,14 @@ def watch(app):
     def watch(url):
         instance = app._instances.get(url.rsplit("/", 1)[1])
         drawn = []
-        draw = instance._draw
+        env = instance._backend.env
+        draw = env.draw
 
         def counting(sub_env):
             drawn.append(sub_env)
             return draw(sub_env)
 
-        instance._draw = counting
+        env.draw = counting
         return instance, drawn
 
     return watch

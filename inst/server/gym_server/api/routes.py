@@ -18,7 +18,7 @@ from gym_server.envs.config import Choices
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance
-from gym_server.manager.instance_manager import Instances
+from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Watchers
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol import wire
@@ -40,7 +40,7 @@ class Services:
         watch_keys: the keys that open watch pages; None where no page asks for one.
     """
 
-    instances: Instances
+    instances: InstanceManager
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers

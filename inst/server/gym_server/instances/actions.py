@@ -20,16 +20,16 @@ class ActionReader:
     makes a member is asked for.
     """
 
-    def __init__(self, space: Space, sub_envs: int) -> None:
+    def __init__(self, space: Space, num_envs: int) -> None:
         """Name the space.
 
         Args:
             space: of one action.
-            sub_envs: how many sub-environments there are.
+            num_envs: how many sub-environments there are.
         """
         self._space = space
         self._taken = spaces.with_wide_boxes(space)
-        self._sub_envs = sub_envs
+        self._num_envs = num_envs
 
     def read(self, action: object, rows: int | None = None) -> object:
         """Return the action, or with sub-environments the batch of actions, that was sent.
@@ -64,7 +64,7 @@ class ActionReader:
                 return spaces.decode_tensors(space, "action", action)
             return spaces.decode(space, action)
         whose = f"the {rows} sub-environments"
-        if rows != self._sub_envs:
+        if rows != self._num_envs:
             whose += " that step"
         if is_parts:
             return spaces.decode_sub_envs_tensors(space, "action", action, rows, whose)

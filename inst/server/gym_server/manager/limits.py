@@ -43,11 +43,11 @@ class Limits:
         max_memory_mb: how much memory all of them may be reckoned to take together at their most,
             in MiB; see ``footprint``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
-        max_call_seconds: how long one call may take before its instance is given up; 0 for ever.
-            Longer than any one call that means well, and short enough that somebody who comes
-            back from a coffee finds it said.
-        idle_minutes: how long nobody may have used or watched an instance before it is closed;
-            0 for ever. A day: what is left in the evening is still there in the morning.
+        max_call_seconds: how long one call may take before its instance is evicted; 0 for no limit.
+            Longer than an ordinary call takes, and short enough that somebody who comes back from
+            a coffee finds the error.
+        idle_minutes: how long nobody may have used or watched an instance before it is evicted;
+            0 for no limit. A day: what is left in the evening is still there in the morning.
     """
 
     max_instances: int = 1000
@@ -78,7 +78,7 @@ class Limits:
                 "sets the limit",
             )
         most = self.max_total_sub_envs or 4 * self.max_num_envs
-        # One that is too large for itself hears of that.
+        # One that is larger than any may be gets the error that says so, when it is created.
         if taken.sub_envs + more.sub_envs > most and more.sub_envs <= self.max_num_envs:
             raise GymServerError(
                 "too_many_sub_envs",
