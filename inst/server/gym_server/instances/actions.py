@@ -58,15 +58,14 @@ class ActionReader:
             failure.hint = _CLIP
 
     def _decode(self, space: Space, action: object, rows: int | None) -> object:
-        is_parts = isinstance(action, spaces.Parts)
         if rows is None:
-            if is_parts:
+            if isinstance(action, spaces.Parts):
                 return spaces.decode_tensors(space, "action", action)
             return spaces.decode(space, action)
         whose = f"the {rows} sub-environments"
         if rows != self._num_envs:
             whose += " that step"
-        if is_parts:
+        if isinstance(action, spaces.Parts):
             return spaces.decode_sub_envs_tensors(space, "action", action, rows, whose)
         return spaces.decode_sub_envs(space, action, rows, whose)
 

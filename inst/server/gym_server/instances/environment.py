@@ -9,7 +9,7 @@ from gymnasium.spaces import Space
 from gymnasium.vector import VectorEnv
 
 from gym_server.envs.config import Choices
-from gym_server.instances.episode_statistics import EpisodeStatistics, VectorEpisodeStatistics
+from gym_server.instances.episode_statistics import Statistics
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,13 +35,13 @@ class Environment(Protocol):
     """
 
     env_id: str
-    gym_env: gymnasium.Env | VectorEnv
+    gym_env: Any
     num_envs: int | None
     action_space: Space
     observation_space: Space
     single_action_space: Space
     single_observation_space: Space
-    statistics: EpisodeStatistics | VectorEpisodeStatistics
+    statistics: Statistics
     vectorization_mode: str | None
     autoreset_mode: str | None
     draws_when_stepped: bool

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -26,6 +26,25 @@ class Standing(NamedTuple):
     step: int
     episode_return: float
     ended: bool
+
+
+class Statistics(Protocol):
+    """Counts episodes.
+
+    Attributes:
+        returns: of the last episodes that ended, in any sub-environment.
+    """
+
+    returns: deque[float]
+
+    def begin(self, mask: np.ndarray | None) -> None:
+        """Count the episodes that begin in the sub-environments of a mask; None for all."""
+
+    def step(self, reward: Any, done: Any, which: np.ndarray | None) -> None:
+        """Count a step of some sub-environments, one row for each; None for all of them."""
+
+    def of(self, sub_env: int) -> Standing:
+        """Return where the episode of a sub-environment stands."""
 
 
 class EpisodeStatistics:
@@ -123,7 +142,7 @@ class VectorEpisodeStatistics:
         )
 
 
-def facts_of(statistics: EpisodeStatistics | VectorEpisodeStatistics, sub_env: int) -> dict:
+def facts_of(statistics: Statistics, sub_env: int) -> dict:
     """Return the statistics of a sub-environment's episodes as JSON values for its watchers."""
     standing = statistics.of(sub_env)
     return {

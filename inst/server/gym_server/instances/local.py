@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gymnasium.spaces import Space
 
@@ -97,7 +97,7 @@ class LocalBackend:
             "info": ask(plain, info) if info else {},
         }
 
-    def _reset_env(self, seed: Seed, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def _reset_env(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
         if self._monitor is not None:
             return self._monitor.reset(seed=seed, options=options)
         return self.env.reset(seed, options, mask)
@@ -134,7 +134,7 @@ class LocalBackend:
         self._observation = observation
         return env.answer(observation, reward, terminated, truncated, done, info, tensors)
 
-    def _move(self, move: Callable, *args: object) -> tuple:
+    def _move(self, move: Callable[..., tuple], *args: object) -> tuple:
         self.moves.begin()
         if self.draws_when_stepped:
             return self._renderer.run(move, *args)

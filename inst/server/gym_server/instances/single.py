@@ -12,7 +12,7 @@ from gym_server.envs import repeats
 from gym_server.envs.config import Choices
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.instances.environment import env_id_of
-from gym_server.instances.episode_statistics import EpisodeStatistics
+from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
 from gym_server.rendering.render_thread import RenderThread
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 class SingleEnvironment:
     """A single environment; see ``Environment`` for the methods."""
 
-    num_envs = None
-    vectorization_mode = None
-    autoreset_mode = None
+    num_envs: int | None = None
+    vectorization_mode: str | None = None
+    autoreset_mode: str | None = None
     fails_as_a_whole = False
 
     def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
         """Take over an environment."""
-        self.gym_env = env
+        self.gym_env: Any = env
         self.env_id = env_id_of(choices, env)
         self.action_space = self.single_action_space = env.action_space
         self.observation_space = self.single_observation_space = env.observation_space
         self.draws_when_stepped = draws_when_stepped(env)
         self.draws_on_render_thread = env.render_mode == "rgb_array"
-        self.statistics = EpisodeStatistics()
+        self.statistics: Statistics = EpisodeStatistics()
         self.has_ended = False
         self._renderer = renderer
 
@@ -48,7 +48,8 @@ class SingleEnvironment:
 
     def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
         """Reset the environment."""
-        return self.gym_env.reset(seed=seed, options=options)
+        start: tuple = self.gym_env.reset(seed=seed, options=options)
+        return start
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
         """Remember that an episode has begun."""

@@ -13,7 +13,7 @@ from gym_server.envs import repeats
 from gym_server.envs.config import Choices
 from gym_server.errors import GymServerError, wrong_length
 from gym_server.instances.environment import env_id_of
-from gym_server.instances.episode_statistics import VectorEpisodeStatistics
+from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
 from gym_server.instances.vector_modes import MODES, Mode
 from gym_server.json_values import plain
 from gym_server.rendering.render_thread import RenderThread
@@ -37,9 +37,10 @@ class VectorEnvironment:
         Raises:
             GymServerError: ``unsupported_space``.
         """
-        self.gym_env = env
+        self.gym_env: Any = env
         self.env_id = env_id_of(choices, env)
-        self.num_envs = env.num_envs
+        self.num_envs: int | None = env.num_envs
+        self._num_envs = env.num_envs
         self.action_space = env.action_space
         self.observation_space = env.observation_space
         self.single_action_space = env.single_action_space
@@ -51,13 +52,13 @@ class VectorEnvironment:
                 f"{spaces.brief_space(self.single_action_space)}",
                 "an empty Tuple or Dict is the reason; create the environment without num_envs",
             )
-        self.vectorization_mode = mode
+        self.vectorization_mode: str | None = mode
         self._mode: Mode = MODES[mode](env, self.env_id, renderer)
         self._autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
-        self.autoreset_mode = self._autoreset_mode.value
+        self.autoreset_mode: str | None = self._autoreset_mode.value
         self.draws_when_stepped = self._mode.draws_when_stepped
         self.draws_on_render_thread = env.render_mode == "rgb_array" and self._mode.draws_in_process
-        self.statistics = VectorEpisodeStatistics(env.num_envs, self._autoreset_mode)
+        self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, self._autoreset_mode)
         # The sub-environments that ended, where nobody resets them.
         self._ended = np.zeros(env.num_envs, dtype=bool)
 
@@ -81,8 +82,8 @@ class VectorEnvironment:
     def _check_seed(self, seed: int | tuple | None) -> None:
         if not isinstance(seed, tuple):
             return
-        if len(seed) != self.num_envs:
-            raise wrong_length("seed", len(seed), self.num_envs, "integer or null")
+        if len(seed) != self._num_envs:
+            raise wrong_length("seed", len(seed), self._num_envs, "integer or null")
         if not self._mode.resets_each:
             raise self._not_supported("one seed a sub-environment")
 
@@ -98,8 +99,8 @@ class VectorEnvironment:
             )
 
     def _check_mask(self, name: str, mask: np.ndarray) -> None:
-        if len(mask) != self.num_envs:
-            raise wrong_length(name, len(mask), self.num_envs, "boolean")
+        if len(mask) != self._num_envs:
+            raise wrong_length(name, len(mask), self._num_envs, "boolean")
         if not mask.any():
             raise GymServerError(
                 "invalid_parameter",
@@ -119,7 +120,8 @@ class VectorEnvironment:
             seed = list(seed)
         if mask is not None:
             options = {**(options or {}), "reset_mask": mask}
-        return self.gym_env.reset(seed=seed, options=options)
+        start: tuple = self.gym_env.reset(seed=seed, options=options)
+        return start
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
         """Remember that episodes have begun, in the sub-environments of a mask."""
@@ -130,7 +132,7 @@ class VectorEnvironment:
     def select(self, mask: np.ndarray | None) -> tuple[np.ndarray | None, int]:
         """Return which sub-environments a mask selects, None for all, and how many they are."""
         if mask is None:
-            return None, self.num_envs
+            return None, self._num_envs
         self._check_mask("step_mask", mask)
         if not self._mode.steps_some:
             raise self._not_supported("step_mask")
@@ -141,7 +143,7 @@ class VectorEnvironment:
         """Raise ``reset_needed`` when sub-environments ended that nobody resets."""
         if self._autoreset_mode is not AutoresetMode.DISABLED:
             return
-        stepping = np.arange(self.num_envs) if which is None else which
+        stepping = np.arange(self._num_envs) if which is None else which
         ended = stepping[self._ended[stepping]]
         if len(ended):
             raise GymServerError(
@@ -220,7 +222,7 @@ class VectorEnvironment:
 
     def decode(self, space: Space, value: object) -> object:
         """Return the members of a space that a list has, one a sub-environment."""
-        return spaces.decode_sub_envs(space, value, self.num_envs, "the sub-environments")
+        return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
 
     @property
     def has_ended(self) -> bool:

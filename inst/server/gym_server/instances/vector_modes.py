@@ -65,7 +65,7 @@ class EntryPointMode:
 
     def __init__(self, env: VectorEnv, env_id: str, renderer: RenderThread) -> None:
         """Take over an environment."""
-        self._env = env
+        self._env: Any = env
         self._env_id = env_id
         self._renderer = renderer
 

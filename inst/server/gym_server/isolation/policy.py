@@ -31,6 +31,7 @@ import logging
 import math
 import threading
 from collections.abc import Collection
+from typing import cast
 
 from gymnasium import error
 
@@ -70,8 +71,7 @@ class Isolation:
             allowed_modules: names of the modules that an env_id may import.
         """
         # Looking for ids that resemble a very long one would take minutes.
-        is_id = isinstance(env_id, str) and len(env_id) <= registry.LONGEST_ID
-        if self.mode == "none" or not is_id:
+        if self.mode == "none" or not isinstance(env_id, str) or len(env_id) > registry.LONGEST_ID:
             return False
         module, colon, name = env_id.rpartition(":")
         if colon and module not in allowed_modules:
@@ -89,8 +89,10 @@ class Isolation:
         allowed = frozenset(allowed_modules)
         # An id from the registry's list names no module, and any of the modules may have
         # registered it.
-        bare = isinstance(env_id, str) and ":" not in env_id
-        imported = allowed if bare and _home(env_id, allowed) is _UNKNOWN else frozenset()
+        is_unknown = (
+            isinstance(env_id, str) and ":" not in env_id and _home(env_id, allowed) is _UNKNOWN
+        )
+        imported = allowed if is_unknown else frozenset()
         return WorkerSettings(
             allowed, imported, max_num_envs, memory, self._max_mb, logging.getLogger().level
         )
@@ -132,7 +134,7 @@ class Isolation:
         if seconds:
             overdue.start()
         try:
-            return worker.first_word().value
+            return cast(list[dict], worker.first_word().value)
         finally:
             overdue.cancel()
             # It has answered, and a thread that a module has started could keep it from ending.

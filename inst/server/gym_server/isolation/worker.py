@@ -20,6 +20,9 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from gym_server.budget import Budget
 from gym_server.envs import registry
@@ -150,7 +153,7 @@ def _answer(pipe: Pipe, number: int, call: Callable, *args: object) -> None:
 @dataclass(frozen=True)
 class _Look:
     facts: object
-    frame: object
+    frame: np.ndarray | None
 
 
 class _Methods:
@@ -189,10 +192,10 @@ class _Methods:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: object) -> wire.Answer:
+    def reset(self, *args: Any) -> wire.Answer:
         return wire.answer(self._instance.reset(*args), None)
 
-    def step(self, *args: object) -> wire.Answer:
+    def step(self, *args: Any) -> wire.Answer:
         return wire.answer(self._instance.step(*args), None)
 
     def sample_action(self) -> object:
@@ -204,9 +207,10 @@ class _Methods:
     def look(self, sub_env: int) -> _Look:
         return _Look(*self._instance.look(sub_env))
 
-    def start_monitor(self, instance_id: str, path: Path, *args: object) -> None:
+    def start_monitor(self, instance_id: str, path: Path, *args: Any) -> None:
         self._instance.instance_id = instance_id
-        self._instance.start_monitor(_Resolved(path), *args)
+        root: Any = _Resolved(path)
+        self._instance.start_monitor(root, *args)
 
     def close_monitor(self) -> None:
         self._instance.close_monitor()
@@ -239,5 +243,5 @@ class _Resolved:
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def claim(self, directory: str, *how: object) -> MonitorFiles:
+    def claim(self, directory: str, *how: Any) -> MonitorFiles:
         return claim(self._path, directory, *how)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from gym_server.envs.config import Choices
 from gym_server.envs.footprint import Account
@@ -74,7 +74,7 @@ class WorkerBackend:
         Raises:
             GymServerError: see ``factory.make_instance()``; ``environment_died``.
         """
-        created = self._value(self._worker.first_word())
+        created = _dict(self._worker.first_word())
         self._about = created["about"]
         account.take(max(0.0, float(created["memory"])), self.env_id)
         self.env_id = str(self._about["env_id"])
@@ -85,54 +85,55 @@ class WorkerBackend:
         self._on_end = on_end
         self._worker.stay()
 
-    @staticmethod
-    def _value(seen: Seen) -> dict:
-        return seen.value  # type: ignore[return-value]
-
     # Moves ----------------------------------------------------------------------------------
 
     def reset(
         self, seed: Seed, options: dict | None, tensors: bool, mask: np.ndarray | None
     ) -> Ready:
         """Start an episode; see ``Instance.reset()``."""
-        self.moves.begin()
-        return self._worker.move("reset", seed, options, tensors, mask)
+        return self._move("reset", seed, options, tensors, mask)
 
     def step(self, action: object, tensors: bool, mask: np.ndarray | None) -> Ready:
         """Take one step; see ``Instance.step()``."""
         if isinstance(action, Parts):
             action = _sendable(action)
-        self.moves.begin()
-        answer = self._worker.move("step", action, tensors, mask)
+        answer = self._move("step", action, tensors, mask)
         self.steps += (self._num_envs or 1) if mask is None else int(mask.sum())
         return answer
 
+    def _move(self, method: str, *args: object) -> Ready:
+        self.moves.begin()
+        return cast(Ready, self._worker.move(method, *args))
+
+    def _ask(self, method: str, *args: object) -> Seen:
+        return cast(Seen, self._worker.move(method, *args))
+
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
-        return self._worker.move("sample_action").value
+        return self._ask("sample_action").value
 
     # Looks ----------------------------------------------------------------------------------
 
     def render(self, sub_env: int) -> np.ndarray:
         """Draw the current state of a sub-environment; see ``Instance.render()``."""
-        return self._worker.move("render", sub_env).frame
+        return cast("np.ndarray", self._ask("render", sub_env).frame)
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
-        seen = self._worker.move("look", sub_env)
-        return dict(self._value(seen)), seen.frame
+        seen = self._ask("look", sub_env)
+        return dict(_dict(seen)), seen.frame
 
     # At any time ----------------------------------------------------------------------------
 
     @property
     def action_space_info(self) -> dict:
         """The description of the action space."""
-        return self._value(self._worker.question("action_space_info"))
+        return _dict(self._worker.question("action_space_info"))
 
     @property
     def observation_space_info(self) -> dict:
         """The description of the observation space."""
-        return self._value(self._worker.question("observation_space_info"))
+        return _dict(self._worker.question("observation_space_info"))
 
     def action_contains(self, claim: dict) -> bool:
         """Answer a client's "contains"; see ``spaces.contains()``."""
@@ -145,7 +146,7 @@ class WorkerBackend:
     def about(self) -> dict:
         """Return what is known of the environment, without waiting for it."""
         try:
-            self._about = self._value(self._worker.question("about", seconds=_ABOUT_SECONDS))
+            self._about = _dict(self._worker.question("about", seconds=_ABOUT_SECONDS))
         except TimeoutError:
             log.info("The process of %s does not answer at the moment", self.env_id)
         return {**self._about, "isolated": True}
@@ -162,11 +163,11 @@ class WorkerBackend:
     ) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
         path = root.resolve(directory)
-        self._worker.move("start_monitor", instance_id, path, directory, *how)
+        self._ask("start_monitor", instance_id, path, directory, *how)
 
     def close_monitor(self) -> None:
         """Stop recording and finish the files, if it is recorded."""
-        self._worker.move("close_monitor")
+        self._ask("close_monitor")
 
     # The end --------------------------------------------------------------------------------
 
@@ -174,7 +175,7 @@ class WorkerBackend:
         """Finish the monitor, close the environment and let its process end."""
         self._worker.expect_end()
         try:
-            self._worker.move("close")
+            self._ask("close")
         finally:
             self._worker.let_go(why)
 
@@ -184,6 +185,10 @@ class WorkerBackend:
 
     def clear_away(self) -> None:
         """Do nothing: the process was killed."""
+
+
+def _dict(seen: Seen) -> dict:
+    return cast(dict, seen.value)
 
 
 def _sendable(action: Parts) -> Parts:

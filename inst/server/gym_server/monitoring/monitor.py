@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import logging
 import time
+from typing import Any
 
 import gymnasium
 
@@ -32,10 +33,10 @@ class Monitor:
         self,
         env: gymnasium.Env,
         files: MonitorFiles,
-        recorder: gymnasium.wrappers.RecordVideo | None,
+        recorder: Any,
         renderer: RenderThread,
     ) -> None:
-        """Take over files that are taken; see ``start()``."""
+        """Take over files that are taken, and a RecordVideo or None; see ``start()``."""
         self._env = env
         self._files = files
         self._rows = csv.writer(files.table, lineterminator="\n")

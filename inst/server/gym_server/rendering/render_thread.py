@@ -67,7 +67,8 @@ class RenderThread:
             # Drawing calls for drawing, as a monitor does of an environment that always draws.
             return draw(*args)
         with self._job(draw, *args) as job:
-            return job.future.result()
+            result: ResultT = job.future.result()
+            return result
 
     def run_while(
         self, may_wait: Callable[[], bool], draw: Callable[..., ResultT], *args: object
@@ -86,7 +87,8 @@ class RenderThread:
             while not wait([job.future], _POLL_SECONDS).done:
                 if not may_wait() and job.future.cancel():
                     raise Occupied
-            return job.future.result()
+            result: ResultT = job.future.result()
+            return result
 
     @contextlib.contextmanager
     def _job(self, draw: Callable, *args: object) -> Iterator[_Job]:
@@ -156,15 +158,16 @@ class RenderThread:
             Whether it was so.
         """
         with self._lock:
-            job, hanging = self._running, self._thread
-            if job is None or hanging is None or thread not in (job.caller, hanging.ident):
+            job = self._running
+            hanging = self._thread.ident if self._thread else None
+            if job is None or hanging is None or thread not in (job.caller, hanging):
                 return False
             if not self._in_progress.abandon(job):
                 return False
             job.future.set_exception(why)
             self._running = None
             # Before anything that waits: the thread could end then, and another get its identity.
-            interrupt(hanging.ident)
+            interrupt(hanging)
             self._in_progress.answered(job)
             self._start()
             return True
@@ -180,8 +183,9 @@ class RenderThread:
             Whether it was so.
         """
         job = self._running
-        began = None if job is None else job.began
-        return began is not None and began < moment and self.abandon(job.caller, why)
+        if job is None or job.began is None or job.began >= moment:
+            return False
+        return self.abandon(job.caller, why)
 
     def stop(self) -> None:
         """Let what is queued finish, and end the thread."""

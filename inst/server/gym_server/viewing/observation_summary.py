@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
@@ -12,7 +13,7 @@ _MOST = 64
 _LONGEST_TEXT = 200
 
 
-def sub_env_of(space: Space, batch: object, sub_env: int) -> object:
+def sub_env_of(space: Space, batch: Any, sub_env: int) -> object:
     """Return the observation of one sub-environment out of a batch.
 
     Args:
