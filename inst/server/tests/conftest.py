@@ -26,7 +26,7 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    # Here, where a test can look inside; test_isolated_instance.py has the others.
+    # In this process, where a test can look inside; test_worker_backend.py tests the others.
     app = create_app(
         Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
     )

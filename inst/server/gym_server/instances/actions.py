@@ -1,4 +1,4 @@
-"""Read the actions that clients send, and say more where an environment refuses one."""
+"""Read the actions that clients send, and add a hint where an environment refuses one."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _CLIP = (
 class ActionReader:
     """Reads what is sent as an action of one space.
 
-    A Box's bounds are the environment's affair, as they are in Gymnasium; everything else that
-    makes a member is asked for.
+    The bounds of a Box are left to the environment, as in Gymnasium; everything else that makes a
+    member of the space is checked.
     """
 
     def __init__(self, space: Space, num_envs: int) -> None:
@@ -45,7 +45,7 @@ class ActionReader:
             return self._decode(self._taken, action, rows)
         except spaces.NotInSpace as refusal:
             raise GymServerError(
-                "action_not_in_space", f"The action {refusal}", _which_there_are(self._space)
+                "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)
             ) from None
 
     def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
@@ -70,8 +70,8 @@ class ActionReader:
         return spaces.decode_sub_envs(space, action, rows, whose)
 
 
-def _which_there_are(space: Space) -> str | None:
-    """Return the actions of a Discrete space in words, for those who count from 1."""
+def _possible_actions(space: Space) -> str | None:
+    """Return the actions of a Discrete space in words, as users may count from 1."""
     if not isinstance(space, Discrete):
         return None
     first, last = int(space.start), int(space.start) + int(space.n) - 1

@@ -73,7 +73,7 @@ class Environment(Protocol):
         """
 
     def check_running(self, which: np.ndarray | None) -> None:
-        """Raise ``reset_needed`` when sub-environments ended that nobody resets."""
+        """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
 
     def step_some(self, which: np.ndarray, actions: Any) -> tuple:
         """Step some sub-environments."""

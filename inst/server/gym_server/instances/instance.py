@@ -35,7 +35,7 @@ class Instance:
     """
 
     def __init__(self, backend: Backend, choices: Choices, renderer: RenderThread) -> None:
-        """Take over an environment that was made.
+        """Take over an environment.
 
         Args:
             backend: what runs it.
@@ -189,11 +189,11 @@ class Instance:
         return self._backend.observation_space_info
 
     def action_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains", whose value has an entry for each sub-environment."""
+        """Answer a client's "contains"; a value has an entry for each sub-environment."""
         return self._backend.action_contains(claim)
 
     def observation_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains", whose value has an entry for each sub-environment."""
+        """Answer a client's "contains"; a value has an entry for each sub-environment."""
         return self._backend.observation_contains(claim)
 
     def list_entry(self) -> dict:
@@ -214,7 +214,8 @@ class Instance:
         """Return all that is known of the instance, without waiting for its environment."""
         about = self._backend.about()
         entry = self.list_entry()
-        # The backend may be an instance itself, in another process; its entry does not count.
+        # The backend of an isolated environment answers with an entry of its own, which does not
+        # count: it knows neither the id nor the watchers.
         return {**entry, **about, **entry}
 
     @property
@@ -273,7 +274,7 @@ class Instance:
         """Close the instance without waiting for its lock: a call on it has taken too long.
 
         Args:
-            why: the error for everybody who waits for it.
+            why: the error for every call that waits for the instance.
 
         Returns:
             The thread that is stuck in the environment and cannot answer for itself, or None.

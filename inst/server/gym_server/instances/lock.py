@@ -102,7 +102,7 @@ class InstanceLock:
         """Close the environment, and take the lock away from the thread that has it.
 
         Args:
-            why: the error for everybody who waits for the lock, or will ask for it.
+            why: the error for every thread that waits for the lock, or will.
 
         Returns:
             The thread that had the lock, which gets the error when it comes back; None when no
@@ -122,7 +122,7 @@ class InstanceLock:
             self._held.answered(self._abandoned)
 
     def refusal(self) -> GymServerError:
-        """Return the error for those who ask for an environment that is gone."""
+        """Return the error for calls on an environment that is gone."""
         return self.why.again() if self.why else self._unknown()
 
     def when_free(self) -> threading.Lock:

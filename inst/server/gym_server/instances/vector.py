@@ -45,7 +45,7 @@ class VectorEnvironment:
         self.observation_space = env.observation_space
         self.single_action_space = env.single_action_space
         self.single_observation_space = env.single_observation_space
-        if _holds_nothing(self.single_action_space):
+        if _has_empty_part(self.single_action_space):
             raise GymServerError(
                 "unsupported_space",
                 "Gymnasium cannot give each sub-environment its action where it is of "
@@ -59,7 +59,7 @@ class VectorEnvironment:
         self.draws_when_stepped = self._mode.draws_when_stepped
         self.draws_on_render_thread = env.render_mode == "rgb_array" and self._mode.draws_in_process
         self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, self._autoreset_mode)
-        # The sub-environments that ended, where nobody resets them.
+        # The sub-environments that ended, where they do not reset themselves.
         self._ended = np.zeros(env.num_envs, dtype=bool)
 
     # Reset ----------------------------------------------------------------------------------
@@ -140,7 +140,7 @@ class VectorEnvironment:
         return which, len(which)
 
     def check_running(self, which: np.ndarray | None) -> None:
-        """Raise ``reset_needed`` when sub-environments ended that nobody resets."""
+        """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
         if self._autoreset_mode is not AutoresetMode.DISABLED:
             return
         stepping = np.arange(self._num_envs) if which is None else which
@@ -248,12 +248,12 @@ class VectorEnvironment:
         self._mode.kill()
 
 
-def _holds_nothing(space: Space) -> bool:
+def _has_empty_part(space: Space) -> bool:
     """Tell whether a space is an empty Tuple or Dict, or has such a part."""
     match space:
         case Dict() | Tuple():
             parts = space.spaces.values() if isinstance(space, Dict) else space.spaces
-            return not parts or any(map(_holds_nothing, parts))
+            return not parts or any(map(_has_empty_part, parts))
         case _:
             return False
 

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class _Share(NamedTuple):
-    """What an environment takes of what there is for all, until it is gone."""
+    """What an environment takes of what all share, until it is gone."""
 
     room: Room
     account: Account
@@ -43,7 +43,7 @@ class _Creation:
 
     Attributes:
         choices: what its client wants.
-        share: what it takes of what there is for all.
+        share: what it takes of what all share.
         kill: kills the process that the creating thread waits for, so that the thread answers for
             itself; None where there is no such process.
         began: in the clock's seconds.
@@ -224,7 +224,7 @@ class InstanceManager:
         log.info("Closed instance %s", instance_id)
 
     def _unlist(self, instance_id: str, why: GymServerError | None = None) -> Instance | None:
-        """Take an instance off the list, with the reason for those who will ask for it."""
+        """Take an instance off the list; the reason is for later calls on it."""
         with self._lock:
             instance = self._instances.pop(instance_id, None)
             if instance is None:
@@ -318,7 +318,7 @@ class InstanceManager:
         stuck = instance.abandon(why)
         if stuck is not None:
             answer_for(stuck, why)
-            # The thread has not gone on to other work: that waits for the next line.
+            # The thread has not gone on to other work: it waits until it was answered for.
             interrupt(stuck)
         instance.lock.answered()
 

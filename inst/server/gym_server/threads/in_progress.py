@@ -65,7 +65,9 @@ class InProgress(Generic[KeyT, ValueT]):
     def abandon(self, key: KeyT) -> bool:
         """Take a piece of work away from its thread; return False when it is not in progress."""
         # Before the worker can find its work gone, and wait for the answer.
-        self._abandoned[key] = threading.Event()
+        answered = threading.Event()
+        if self._abandoned.setdefault(key, answered) is not answered:
+            return False
         if self._in_progress.pop(key, _NONE) is not _NONE:
             return True
         del self._abandoned[key]

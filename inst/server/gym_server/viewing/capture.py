@@ -17,7 +17,7 @@ from gym_server.viewing.watchable import Watchable
 if TYPE_CHECKING:
     import numpy as np
 
-# How long a step may keep a watcher waiting before the watcher is told that it is busy.
+# How long a step may keep a watcher waiting before the watcher gets the answer "busy".
 _LOCK_TIMEOUT = 2.0
 
 

@@ -1,4 +1,4 @@
-"""An observation as a list of numbers and texts with names, for eyes."""
+"""An observation as a list of numbers and texts with names, for watchers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
 
-# More of them nobody can look at.
+# More of them are not shown.
 _MOST = 64
 _LONGEST_TEXT = 200
 
@@ -34,7 +34,7 @@ def sub_env_of(space: Space, batch: Any, sub_env: int) -> object:
 
 
 def entries(observation: object) -> dict:
-    """Return the numbers and texts of an observation, whatever holds them.
+    """Return the numbers and texts of an observation of any structure.
 
     Returns:
         ``{"names", "values", "size"}``: at most 64 of each, and how many there are in all.  A

@@ -164,7 +164,7 @@ class Viewer:
                     self._drawing = True
                     return None
                 if now >= deadline:
-                    # No frame was drawn in time, and a watcher waits no longer than with one.
+                    # No frame was ever drawn; the wait ends as it does with one that is old.
                     raise Busy
                 if stale and not self._drawing:
                     self._changed.wait(min(self._due, deadline) - now)
@@ -172,7 +172,14 @@ class Viewer:
                     self._changed.wait(deadline - now)
 
     def _waits_for_move(self, frame: Frame | None) -> bool:
-        """Arrange to be called at the next move; return False when it has moved just now."""
+        """Arrange to be called at the next move; return False when that may have come already.
+
+        1. A watcher finds that its frame shows the last move.
+        2. The environment moves; nobody is to be called yet.
+        3. The watcher arranges to be called, and would wait for a move that has been.
+
+        So the moves are compared once more after 3.
+        """
         self._watchable.moves.on_next = self._on_move
         return frame is not None and frame.moves == self._watchable.moves.count
 
