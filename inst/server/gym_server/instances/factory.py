@@ -1,4 +1,4 @@
-"""Make an environment and what keeps it, here in this process."""
+"""Create instances whose environment runs in this process."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from gym_server.envs import make, vectorization, wrappers
 from gym_server.envs.config import Choices
 from gym_server.envs.footprint import Account
 from gym_server.errors import GymServerError
+from gym_server.instances.environment import Environment
 from gym_server.instances.instance import Instance
-from gym_server.instances.vector_instance import VectorInstance
+from gym_server.instances.local import LocalBackend
+from gym_server.instances.single import SingleEnvironment
+from gym_server.instances.vector import VectorEnvironment
 from gym_server.rendering.render_thread import RenderThread
 
 
@@ -22,7 +25,7 @@ def make_instance(
     undo: contextlib.ExitStack,
     account: Account,
 ) -> Instance:
-    """Make an instance of what a client wants.
+    """Create an instance of what a client wants.
 
     Args:
         choices: what that is.
@@ -34,7 +37,7 @@ def make_instance(
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
-            and ``Instance``.
+            and ``LocalBackend``.
     """
     if choices.num_envs is None:
         env = make.make_env(
@@ -47,21 +50,25 @@ def make_instance(
         )
         undo.push(_closing_quietly(renderer, env.close))
         wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, account)
-        return Instance(wrapped, choices, renderer)
+        return _instance(SingleEnvironment(wrapped, choices, renderer), choices, renderer)
     sub_envs, mode = vectorization.make_vector_env(
         choices, allowed_modules, max_num_envs, renderer, account
     )
     undo.push(_closing_quietly(renderer, sub_envs.close))
-    return VectorInstance(sub_envs, mode, choices, renderer)
+    return _instance(VectorEnvironment(sub_envs, mode, choices, renderer), choices, renderer)
+
+
+def _instance(env: Environment, choices: Choices, renderer: RenderThread) -> Instance:
+    return Instance(LocalBackend(env, choices, renderer), choices, renderer)
 
 
 def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:
-    def leave(kind: type | None, error: BaseException | None, *_: object) -> None:
-        # The render thread hangs in it, and must be left to that.
+    def close_it(kind: type | None, error: BaseException | None, *_: object) -> None:
+        # Where the render thread hangs in the environment, it must be left alone.
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
-        # What the client must hear of is why it gets no instance.
+        # The error for the client is the one that was raised, not one of closing.
         with contextlib.suppress(BaseException):
             renderer.run(close)
 
-    return leave
+    return close_it
