@@ -82,7 +82,7 @@ class WorkerSubEnv(SubEnv):
     def __call__(self) -> gymnasium.Env:
         """Make another one."""
         if self._renderer is None:
-            start.end_with_the_server()
+            start.exit_with_parent()
             load_creator(self._how[0])
             self._renderer = _ThisThread()  # type: ignore[assignment]
             return self._make()

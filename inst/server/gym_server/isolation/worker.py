@@ -31,10 +31,13 @@ from gym_server.instances.instance import Instance
 from gym_server.monitoring.monitor_directory import claim
 from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
-from gym_server.processes.messages import read_question, refusal_of, value_of
+from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
 from gym_server.protocol import wire
 from gym_server.rendering.render_thread import RenderThread
+
+# Its imports take longer than the start of a process.
+start.preload(__name__)
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ def _settle(surroundings: Surroundings) -> None:
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    start.end_with_the_server(group=True)
+    start.exit_with_parent(group=True)
     logging.basicConfig(
         level=surroundings.log_level,
         stream=sys.stderr,
@@ -121,7 +124,7 @@ def _limit_memory(size: int) -> None:
 def _serve(channel: Pipe, asked: _Asked) -> None:
     while not asked.is_closed:
         try:
-            number, method, args = read_question(channel.receive())
+            number, method, args = read_call(channel.receive())
         except (EOFError, OSError):
             # The server let go of it, or is gone.
             os._exit(1)
@@ -132,13 +135,13 @@ def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
         if isinstance(result, wire.Answer):
-            message = messages.answer_of(number, result)
+            message = messages.answer_message(number, result)
         elif isinstance(result, _Look):
-            message = value_of(number, result.facts, result.frame)
+            message = value_message(number, result.facts, result.frame)
         else:
-            message = value_of(number, result)
+            message = value_message(number, result)
     except BaseException as error:
-        message = refusal_of(number, answer_to(error)[1])
+        message = refusal_message(number, answer_to(error)[1])
     try:
         channel.send(message)
     except (OSError, ValueError):
