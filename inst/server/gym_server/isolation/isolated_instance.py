@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.listed import Listed
 from gym_server.instances.lock import Hold
@@ -39,7 +39,7 @@ class IsolatedInstance(Listed):
 
     def __init__(
         self,
-        choices: Choices,
+        choices: EnvConfig,
         surroundings: Surroundings,
         on_end: Callable[[IsolatedInstance, GymServerError], None],
     ) -> None:
@@ -69,7 +69,7 @@ class IsolatedInstance(Listed):
             keep_instance, choices, surroundings, on_end=self._end, hint=hint
         )
 
-    def create(self, account: Account) -> None:
+    def create(self, account: MemoryReservation) -> None:
         """Wait until the environment is made.
 
         Args:

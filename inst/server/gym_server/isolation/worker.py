@@ -23,8 +23,8 @@ from pathlib import Path
 
 from gym_server.budget import Budget
 from gym_server.envs import registry
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import answer_to
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
@@ -48,7 +48,7 @@ class Surroundings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
         max_num_envs: how many sub-environments an environment may have.
-        memory: how many bytes it may be reckoned to take; see ``footprint``.
+        memory: how many bytes it may be estimated to take; see ``memory_estimate``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -62,7 +62,7 @@ class Surroundings:
 
 
 def keep_instance(
-    moves: Connection, questions: Connection, choices: Choices, surroundings: Surroundings
+    moves: Connection, questions: Connection, choices: EnvConfig, surroundings: Surroundings
 ) -> None:
     """Make an environment and serve it until it is closed.
 
@@ -157,7 +157,7 @@ class _Look:
 class _Asked:
     """What the server can ask for, by name."""
 
-    def __init__(self, choices: Choices, surroundings: Surroundings) -> None:
+    def __init__(self, choices: EnvConfig, surroundings: Surroundings) -> None:
         self._choices = choices
         self._surroundings = surroundings
         self.instance: Instance | None = None
@@ -167,7 +167,7 @@ class _Asked:
         for module in self._surroundings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
-        account = Account(Budget(self._surroundings.memory), self._choices.num_envs or 1)
+        account = MemoryReservation(Budget(self._surroundings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make_instance(
                 self._choices,
