@@ -48,7 +48,7 @@ def why_unavailable(spec: EnvSpec) -> str | None:
     if not isinstance(spec.entry_point, str):
         # For an environment that has moved to another package Gymnasium registers a function that
         # raises an error.
-        # The type ignored is Gymnasium's protocol of a creator, which names no __name__.
+        # The type ignored: Gymnasium's protocol of a creator has no __name__.
         moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")  # type: ignore[attr-defined]
         return "it is no longer part of Gymnasium" if moved else None
     extra, module = _needs(spec)

@@ -240,7 +240,8 @@ class AsyncSubEnvs(AsyncVectorEnv):
             with contextlib.suppress(ValueError):
                 process.kill()
 
-    def close_extras(self, **_: Any) -> None:  # type: ignore[override]  # it takes all that Gymnasium's takes
+    # The type ignored: Gymnasium calls it with names, all of which fit.
+    def close_extras(self, **_: Any) -> None:  # type: ignore[override]
         """Ask every process to exit, and kill those that do not."""
         for pipe in getattr(self, "parent_pipes", ()):
             # It has ended already.

@@ -184,7 +184,7 @@ class _NotPossibleError(Exception):
 def _make_entry_point(request: _Request) -> VectorEnv:
     request.memory.reserve(vector_bytes(request.spec, request.kwargs), request.spec.id)
     vector_spec = copy.copy(request.spec)
-    # load_creator() imports whatever stands here.
+    # The type ignored: load_creator() is to load the class of the vector environment.
     vector_spec.entry_point = request.spec.vector_entry_point  # type: ignore[assignment]
     creator = make.load_creator(vector_spec)
     try:

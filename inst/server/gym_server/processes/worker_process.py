@@ -82,6 +82,7 @@ class WorkerProcess:
                 theirs.close()
         # multiprocessing asks every process on this list whether it has ended when it starts
         # another one, and waits for all of them at exit. Only our own thread may wait for this one.
+        # The type ignored: the list is private.
         multiprocessing_process._children.discard(self._process)  # type: ignore[attr-defined]
 
     def first_result(self) -> Result:
