@@ -14,7 +14,7 @@ import numpy
 from gym_server import __version__
 from gym_server.api import fields, openapi
 from gym_server.api.watch_keys import WatchKeys
-from gym_server.envs.config import Choices
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance
@@ -167,7 +167,7 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    choices = Choices(**fields)
+    choices = EnvConfig(**fields)
     return {"instance_id": call.services.instances.create(choices)}
 
 
