@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol.wire import Ready
+from gym_server.protocol.answers import Ready
 from gym_server.viewing.watchable import Moves
 
 if TYPE_CHECKING:

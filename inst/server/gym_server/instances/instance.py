@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gym_server.envs.config import Choices
+from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.instances.backend import Backend, Seed
 from gym_server.instances.lock import InstanceLock
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol.wire import Ready
+from gym_server.protocol.answers import Ready
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.viewing.viewer import Viewer
 from gym_server.viewing.watchable import Moves
@@ -34,7 +34,7 @@ class Instance:
         renderer: the process's render thread.
     """
 
-    def __init__(self, backend: Backend, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(self, backend: Backend, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Args:

@@ -14,7 +14,7 @@ import time
 from typing import NamedTuple
 
 from gym_server.errors import GymServerError
-from gym_server.protocol import wire
+from gym_server.protocol.answers import dumps
 from gym_server.rendering.png import png
 from gym_server.viewing.capture import Busy, capture
 from gym_server.viewing.watchable import Watchable
@@ -124,7 +124,7 @@ class Viewer:
             with self._changed:
                 if self._ended is not None:
                     raise self._ended from None
-            return wire.dumps({"number": after, "state": "busy"})
+            return dumps({"number": after, "state": "busy"})
         finally:
             with self._changed:
                 self._waiting -= 1
@@ -195,7 +195,7 @@ class Viewer:
         facts, frame = captured.facts, captured.frame
         # The environment goes on while this is encoded.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
-        body = wire.dumps({"number": self._numbers + 1, **facts})
+        body = dumps({"number": self._numbers + 1, **facts})
         with self._changed:
             share = _PACED_SHARE if self._next_tick > captured.began - 1 else _SHARE
             # The first frame takes longer: the environment loads its fonts and colours.
