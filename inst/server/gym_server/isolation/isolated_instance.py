@@ -17,8 +17,8 @@ from gym_server.isolation.worker import Surroundings, keep_instance
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.processes.messages import Result
 from gym_server.processes.worker_process import WorkerProcess
+from gym_server.protocol.answers import Ready
 from gym_server.protocol.safetensors import Tensor
-from gym_server.protocol.wire import Ready
 from gym_server.spaces import Parts
 from gym_server.viewing.viewer import Screen
 

@@ -33,7 +33,7 @@ from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
 from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
-from gym_server.protocol import wire
+from gym_server.protocol import answers
 from gym_server.rendering.render_thread import RenderThread
 
 # Its imports take longer than the start of a process.
@@ -134,7 +134,7 @@ def _serve(channel: Pipe, asked: _Asked) -> None:
 def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
-        if isinstance(result, wire.Answer):
+        if isinstance(result, answers.Answer):
             message = messages.answer_message(number, result)
         elif isinstance(result, _Look):
             message = value_message(number, result.facts, result.frame)
@@ -187,11 +187,11 @@ class _Asked:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: object) -> wire.Answer:
-        return wire.answer(self.instance.reset(*args), None)
+    def reset(self, *args: object) -> answers.Answer:
+        return answers.answer(self.instance.reset(*args), None)
 
-    def step(self, *args: object) -> wire.Answer:
-        return wire.answer(self.instance.step(*args), None)
+    def step(self, *args: object) -> answers.Answer:
+        return answers.answer(self.instance.step(*args), None)
 
     def sample_action(self) -> object:
         return self.instance.sample_action()

@@ -20,9 +20,8 @@ import numpy as np
 
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import MalformedMessageError, Pipe
-from gym_server.protocol import wire
+from gym_server.protocol.answers import JSON, Answer, Ready, dumps
 from gym_server.protocol.safetensors import TENSORS
-from gym_server.protocol.wire import JSON, Answer, Ready
 
 # The number of the call, the kind of the result, and the length of its text.
 _HEAD = struct.Struct("<QBI")
@@ -58,14 +57,14 @@ def answer_message(number: int, answer: Answer) -> bytes:
 
 def value_message(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
     """Return the message that carries a JSON value and a frame."""
-    text = wire.dumps([value, None if frame is None else frame.shape])
+    text = dumps([value, None if frame is None else frame.shape])
     pixels = b"" if frame is None else frame.tobytes()
     return _HEAD.pack(number, _VALUE, len(text)) + text + pixels
 
 
 def refusal_message(number: int, refusal: dict[str, str]) -> bytes:
     """Return the message that carries an error; see ``errors.answer_to()``."""
-    text = wire.dumps(refusal)
+    text = dumps(refusal)
     return _HEAD.pack(number, _REFUSAL, len(text)) + text
 
 

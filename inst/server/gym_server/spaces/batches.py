@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text, Tuple
 
-from gym_server.protocol.safetensors import Tensor
+from gym_server.protocol.safetensors import Parts, Tensor
 from gym_server.spaces.arrays import (
     ArraySpace,
     bounds_of,
@@ -28,7 +28,6 @@ from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode_part, encode
 from gym_server.spaces.stacking import stack, unstack
 from gym_server.spaces.tensor_parts import (
-    Parts,
     part_name,
     put_array,
     put_part_together,

@@ -6,7 +6,6 @@ holds one of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import singledispatch
 from typing import Any
 
@@ -22,23 +21,10 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.protocol.safetensors import Tensor, has_tensor, tensor_name
+from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, tensor_name
 from gym_server.spaces.arrays import ArraySpace, bounds_of, check_bounds
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode
-
-
-@dataclass(frozen=True)
-class Parts:
-    """A member in parts.
-
-    Attributes:
-        tensors: each part that is made of numbers, by its name.
-        texts: each text, by its name.
-    """
-
-    tensors: dict[str, Tensor] = field(default_factory=dict)
-    texts: dict[str, str] = field(default_factory=dict)
 
 
 def encode_tensors(space: Space, name: str, value: object) -> Parts:
