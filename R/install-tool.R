@@ -27,7 +27,7 @@ install_log <- function() file.path(install_root(), "install.log")
 #' @noRd
 run_tool <- function(command, arguments, env = character()) {
   write_log(paste(c(">", command, arguments), collapse = " "))
-  process <- with_own_mark(tryCatch(
+  process <- with_own_tree_id(tryCatch(
     processx::process$new(
       command, arguments,
       stdout = "|", stderr = "2>&1", env = tool_environment(env),

@@ -21,7 +21,7 @@ test_that("what is no client is refused", {
   expect_error(env_list_all("http://127.0.0.1:5000"), "client", class = "gym_error_argument")
 })
 
-test_that("with no server there the error names the address and the mend", {
+test_that("with no server there the error names the address and the hint", {
   port <- free_port()
   client <- create_GymClient(paste0("http://127.0.0.1:", port))
   error <- expect_error(env_list_all(client), class = "gym_error_connection")
@@ -58,8 +58,8 @@ test_that("whatever way a server is dead, that is told within the timeout, with 
       # Where it is not noticed this test hangs for a minute.
       taken <- system.time(error <- expect_error(call(client), class = "gym_error_connection"))
       expect_lt(taken[["elapsed"]], 20)
-      mend <- switch(how, full = , cut = "gym_server_start", "timeout")
-      expect_match(conditionMessage(error), mend, info = how)
+      hint <- switch(how, full = , cut = "gym_server_start", "timeout")
+      expect_match(conditionMessage(error), hint, info = how)
     }
   }
 })

@@ -1,7 +1,7 @@
 # What the package's own tests cannot do without the network is in one test, so that packages are
 # downloaded once.
 
-test_that("an installation runs the server, takes extras and mends itself", {
+test_that("an installation runs the server, takes extras and repairs itself", {
   local_cache()
   skip_if_no_uv()
   skip_if_no_packages()

@@ -63,7 +63,7 @@ test_that("asking who listens leaves R's generator alone", {
   expect_identical(.Random.seed, before)
 })
 
-test_that("AirPlay at the port is told by its name, with the mend", {
+test_that("AirPlay at the port is told by its name, with the hint", {
   client <- create_GymClient(paste0("http://127.0.0.1:", local_stranger("AirTunes/695.5.1")))
   error <- expect_error(env_create(client, "CartPole-v0"), class = "gym_error_http_403")
   expect_match(conditionMessage(error), "AirPlay", fixed = TRUE)

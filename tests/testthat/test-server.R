@@ -50,7 +50,7 @@ test_that("a port that is taken is an error with the server's words", {
   expect_type(env_list_all(server), "list")
 })
 
-test_that("a Python that cannot run the server is named, with the mend", {
+test_that("a Python that cannot run the server is named, with the hint", {
   error <- expect_error(
     gym_server_start(python = "/no/such/python"), class = "gym_error_server_start"
   )
