@@ -77,7 +77,7 @@ test_that("two sessions never make the same folder", {
   expect_false(first == second)
   end_folder(first, complete = FALSE)
   expect_false(dir.exists(first))
-  end_folder(second, whole = TRUE)
+  end_folder(second, complete = TRUE)
   expect_identical(list.files(file.path(second, "used-by")), character())
 })
 

@@ -196,7 +196,7 @@ test_that("R that is killed while it starts a server or uses it leaves none behi
     }, NA))
   }
   for (moment in c(0.5, 1, 1.5, 3)) {
-    mark <- new_key()
+    mark <- random_key()
     session <- processx::process$new(
       file.path(R.home("bin"), "Rscript"), script, env = c("current", GYM_MARK = mark)
     )
