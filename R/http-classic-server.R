@@ -1,10 +1,10 @@
-# Servers that know the protocol of gym-http-api alone, as the original one does. They tell less of
-# an environment, ignore fields that they do not know, and carry out a repeated request twice.
+# Servers that know the protocol of gym-http-api alone, as the original one does. They say less
+# about an environment, ignore fields that they do not know, and carry out a repeated request twice.
 
 # A newer server repeats the idempotency key in its answer; `answer` is that to a creation.
 note_protocol <- function(state, answer) state$classic <- is.null(answer$request)
 
-#' Describe an instance by what the classic protocol tells of it
+#' Describe an instance by what the classic protocol has about it
 #'
 #' @param missing The server's error, that it has no route for the whole description.
 #' @return A list like a newer server's answer.

@@ -109,7 +109,7 @@ write_value <- function(space, value) UseMethod("write_value")
 #' as `$position[2]`: the element `position`, and in it the number with index 2.
 #' Indices count from 0, as on the server and in Python, so that the same place
 #' has the same name everywhere: in R it is `value$position[3]`. Only the words
-#' "Sub-environment 3" before a message count from 1, as the argument `sub_envs` of [env_step()].
+#' "Sub-environment 3" before a message count from 1, as the argument `which` of [env_step()].
 #'
 #' The distributions are Gymnasium's: uniform between two bounds, exponential
 #' from a single one, normal without any; the length of a sequence is geometric.
