@@ -81,7 +81,7 @@ abort_tool <- function(what, output, call, more = NULL) {
     c(
       paste0(what, "."),
       x = if (length(lines)) paste(lines, collapse = "\n"),
-      bullets(c(install_advice(output), more)),
+      rlang::set_names(c(install_advice(output), more), "i"),
       i = paste0("The full output is in ", install_log(), "."),
       i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
     ),
@@ -99,8 +99,6 @@ error_lines <- function(output, n = 6L) {
   }
   utils::tail(lines, n)
 }
-
-bullets <- function(texts) stats::setNames(texts, rep("i", length(texts)))
 
 # What to do about a failure, which is known by the messages of uv, pip and the system. The first
 # entry of `failures` that fits counts.

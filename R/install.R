@@ -46,7 +46,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   check_flag(ask)
   call <- rlang::current_env()
   check_named_python(call)
-  wanted <- wanted_extras(extras)
+  wanted <- server_extras[server_extras %in% c(extras, earlier_extras())]
   # A bundle that does not fit is an error also when it is not needed.
   plan <- if (!is.null(offline)) bundle_plan(offline, wanted, call)
   there <- installed_server()
@@ -79,10 +79,6 @@ with_interrupt_message <- function(code) {
   withCallingHandlers(code, interrupt = function(cnd) {
     cli::cli_inform(c("!" = "Interrupted: what was begun is removed again."))
   })
-}
-
-wanted_extras <- function(extras) {
-  server_extras[server_extras %in% c(extras, earlier_extras())]
 }
 
 # Whether an environment has the extras, and its server can really be imported.

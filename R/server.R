@@ -147,7 +147,7 @@ option_text <- function(values) {
 #' The server finishes the calls under way and closes its environments; one that
 #' does not end within 15 seconds is killed.
 #'
-#' @param server The client that [gym_server_start()] returned; `NULL`, the
+#' @param client The client that [gym_server_start()] returned; `NULL`, the
 #'   default, stands for the session's own server, that of [gym_client()].
 #' @return Nothing, invisibly. Stopping a server twice does no harm.
 #' @section Errors: `gym_error_argument` for a server that this session did not
@@ -156,8 +156,8 @@ option_text <- function(values) {
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start()
 #' gym_server_stop(server)
-gym_server_stop <- function(server = NULL) {
-  stop_server(session_server(server))
+gym_server_stop <- function(client = NULL) {
+  stop_server(session_server(client))
   invisible()
 }
 
@@ -175,8 +175,8 @@ gym_server_stop <- function(server = NULL) {
 #' server <- gym_server_start(log_level = "info")
 #' gym_server_log(server)
 #' gym_server_stop(server)
-gym_server_log <- function(server = NULL) {
-  log_tail(session_server(server)$log, n = Inf)
+gym_server_log <- function(client = NULL) {
+  log_tail(session_server(client)$log, n = Inf)
 }
 
 session_server <- function(client, call = rlang::caller_env()) {
@@ -186,7 +186,7 @@ session_server <- function(client, call = rlang::caller_env()) {
       "This session has started no server.", class = "gym_error_argument", call = call
     )
   }
-  check_client(client, arg = "server", call = call)
+  check_client(client, call = call)
   the_session$servers[[client$remote_base]] %||% gym_abort(
     c(
       paste0("The server at ", client$remote_base, " was not started by this session."),
@@ -209,14 +209,12 @@ end_session <- function(session) {
   }
   session$ended <- TRUE
   deadline <- proc.time()[["elapsed"]] + closing_time
-  servers <- if (Sys.getpid() == session$pid) running_servers(session)
+  servers <- if (Sys.getpid() == session$pid) {
+    Filter(function(server) server$process$is_alive(), session$servers)
+  }
   lapply(servers, close_server_input)
   close_session_instances(closing_time / 2)
   stop_session_servers(servers, deadline)
-}
-
-running_servers <- function(session) {
-  Filter(function(server) server$process$is_alive(), session$servers)
 }
 
 stop_session_servers <- function(servers, deadline) {

@@ -14,7 +14,7 @@ expect_quick_end <- function(run, begun) {
   expect_lt(as.numeric(Sys.time(), units = "secs") - begun, 20)
 }
 
-test_that("what a session made on another's server is closed with it, classic ids too", {
+test_that("what a session created on another's server is closed with it, classic ids too", {
   server <- local_server()
   kept <- env_create(server, "CartPole-v1")
   run <- run_session(
@@ -29,7 +29,7 @@ test_that("what a session made on another's server is closed with it, classic id
   expect_named(env_list_all(server), kept)
 })
 
-test_that("a session ends at once whatever has become of the servers where it made something", {
+test_that("a session ends at once whatever has become of the servers where it created something", {
   skip_on_os("windows")
   server <- local_server()
   pid <- the_session$servers[[server$remote_base]]$pid
@@ -49,7 +49,7 @@ test_that("a session ends at once whatever has become of the servers where it ma
   }
 })
 
-test_that("a session ends at once with a server behind a broken line, and its own stopped", {
+test_that("a session ends at once with a server behind a broken connection, and its own stopped", {
   skip_on_os("windows")
   full <- create_GymClient(local_stalling("full"))
   run <- run_session(
@@ -70,7 +70,7 @@ test_that("a session ends at once with a server behind a broken line, and its ow
   expect_false(pid_runs(words[[2]]))
 })
 
-test_that("a forked child closes what it made, and nothing of its parent's", {
+test_that("a forked child closes what it created, and nothing of its parent's", {
   skip_on_os("windows")
   server <- local_server()
   ours <- env_create(server, "CartPole-v1")

@@ -17,7 +17,7 @@ local_release <- function(uv, frame = parent.frame()) {
   archive
 }
 
-test_that("uv is looked for in the order that the help page tells", {
+test_that("uv is looked for in the order of the help page", {
   skip_on_os("windows")
   local_cache()
   folder <- withr::local_tempdir()
@@ -134,7 +134,7 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   expect_identical(suppressMessages(install_uv(NULL)), pinned)
 })
 
-test_that("a download that fails says what else there is", {
+test_that("a download that fails says what else can be done", {
   local_cache()
   dir.create(install_root(), recursive = TRUE)
   withr::local_envvar(UV_DOWNLOAD_URL = "http://127.0.0.1:9")

@@ -70,7 +70,7 @@ test_that("a Python that only ends in order cannot run the server", {
   expect_false(has_all(installed_server(), character()))
 })
 
-test_that("who says no gets nothing, and who says yes is asked once", {
+test_that("after a no nothing is installed, and a yes is asked for once", {
   local_cache()
   local_failing_uv("error: Failed to fetch")
   asked <- character()

@@ -43,7 +43,7 @@ test_that("without a Python the report names the call that fixes it", {
   expect_match(seen$text, "1 thing is wrong", fixed = TRUE)
 })
 
-test_that("whoever plays on another machine needs no Python", {
+test_that("a session that plays on another machine needs no Python", {
   url <- test_client()$remote_base
   report(runs = FALSE, reason = "No module named 'flask'")
   withr::local_envvar(GYM_SERVER_URL = url)
@@ -61,7 +61,7 @@ test_that("a Python that GYM_PYTHON names and that cannot run the server is wron
   expect_identical(row$fix, "Sys.unsetenv(\"GYM_PYTHON\")")
 })
 
-test_that("the installed environment is told: whole, damaged, or of another version", {
+test_that("the installed environment is reported: complete, damaged, or of another version", {
   report()
   folder <- withr::local_tempdir()
   writeBin(raw(3e6), file.path(folder, "x"))
@@ -93,7 +93,7 @@ test_that("an installed Python that cannot run the server is wrong", {
   expect_identical(row$fix, "gym_server_install()")
 })
 
-test_that("the session's server is told with its environments, also when it died", {
+test_that("the session's server is reported with its environments, also when it died", {
   server <- test_client()
   known <- the_session$servers
   python <- known[[server$remote_base]]$python
