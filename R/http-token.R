@@ -1,10 +1,10 @@
-# The token that a server asks for. It goes into one header and nowhere else: nothing that is
-# printed, kept of an error or deparsed shows it.
+# The token that a server requires. It is sent in one header and appears nowhere else: it is not
+# printed, and not kept in errors or deparsed code.
 
-#' Keep a token where nobody sees it by accident
+#' Keep a token where it is not seen by accident
 #' @param text The token, a string, or `NULL`.
-#' @return A function of no arguments that returns it, or `NULL`: what prints, formats or deparses
-#'   a function shows its code.
+#' @return A function without arguments that returns the token, or `NULL`. Printing, formatting or
+#'   deparsing a function shows its code only.
 #' @noRd
 new_token <- function(text) {
   if (is.null(text)) {
@@ -26,8 +26,8 @@ format.gym_token <- function(x, ...) "<token>"
 token_variable <- "GYM_SERVER_TOKEN"
 
 #' Check a token as a script gives it
-#' @param token A string; `NULL` and `""` are none.
-#' @return As [new_token()] returns it.
+#' @param token A string; `NULL` and `""` stand for no token.
+#' @return What [new_token()] returns.
 #' @noRd
 as_token <- function(token, call = rlang::caller_env()) {
   hide_token(token)
@@ -35,7 +35,7 @@ as_token <- function(token, call = rlang::caller_env()) {
     return(NULL)
   }
   token <- if (rlang::is_string(token)) trimws(token)
-  # What else there may be would end the header, or begin another.
+  # Other characters could end the header, or begin another one.
   if (is.null(token) || !grepl("^[!-~]+$", token)) {
     gym_abort(
       c(
@@ -50,11 +50,11 @@ as_token <- function(token, call = rlang::caller_env()) {
   new_token(token)
 }
 
-# The token that the session's environment has for its servers.
+# The token that the environment variable holds.
 variable_token <- function(call = rlang::caller_env()) as_token(Sys.getenv(token_variable), call)
 
-# That of a server which this session started with these options: the server reads the same file
-# and sees the same variable.
+# The token of a server that this session started with these options: the server reads the same
+# file, or the same environment variable.
 server_token <- function(options, call = rlang::caller_env()) {
   if (!is.null(options$token_file)) {
     as_token(paste(readLines(options$token_file, warn = FALSE), collapse = "\n"), call)
@@ -63,70 +63,8 @@ server_token <- function(options, call = rlang::caller_env()) {
   }
 }
 
-# The token for an address of this session's: a server that it started, or a named one.
+# The token for an address: that of a server which this session started, else the variable's.
 known_token <- function(base) {
   server <- the_session$servers[[base]]
   if (is.null(server)) variable_token() else server$token
-}
-
-# Errors --------------------------------------------------------------------------
-
-# Remember what no error may show: the call that a script wrote may hold it in clear.
-hide_token <- function(token) {
-  if (is.character(token)) {
-    the_session$hidden <- unique(c(the_session$hidden, token[nzchar(token)]))
-  }
-}
-
-#' Take the tokens out of what an error keeps
-#' @param x A call, or what stands in one.
-#' @return It, with `"<token>"` in place of each text that is or holds one.
-#' @noRd
-without_tokens <- function(x) {
-  if (!length(the_session$hidden)) {
-    x
-  } else if (is.character(x)) {
-    x[is_token_text(x)] <- "<token>"
-    x
-  } else if (is.call(x) || is.pairlist(x)) {
-    without_tokens_in_parts(x)
-  } else if (is.list(x) && !is.object(x)) {
-    # Data that do.call() has put there may be large.
-    rapply(x, without_tokens, classes = c("character", "call"), how = "replace")
-  } else {
-    x
-  }
-}
-
-without_tokens_in_parts <- function(x) {
-  # With options(keep.source = TRUE) there is the source, too, with all that was written there.
-  for (source in c("srcref", "srcfile", "wholeSrcref")) {
-    attr(x, source) <- NULL
-  }
-  if (is.call(x) && identical(x[[1L]], quote(`function`))) {
-    x <- x[1:3]
-  }
-  # An argument may be missing, as in x[1, ].
-  for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
-    x[[i]] <- without_tokens(x[[i]])
-  }
-  x
-}
-
-is_token_text <- function(texts) {
-  found <- texts %in% the_session$hidden
-  # A short one may be part of anything.
-  for (token in Filter(function(token) nchar(token) >= 8L, the_session$hidden)) {
-    found <- found | grepl(token, texts, fixed = TRUE)
-  }
-  found
-}
-
-# The calls that led to an error, without tokens; NULL leaves it to rlang, where there are none.
-hidden_trace <- function(frame) {
-  if (length(the_session$hidden)) {
-    trace <- rlang::trace_back(bottom = frame)
-    trace$call <- lapply(trace$call, without_tokens)
-    trace
-  }
 }

@@ -26,7 +26,7 @@ with_vector_env <- function(env, episodes, client, use, frames = FALSE, make = m
   finished <- FALSE
   # After a server that hung there must not be another wait.
   on.exit({
-    if (finished) close_made(env, finished) else abandon_instance(env$client, env$instance_id)
+    if (finished) close_made(env, finished) else close_unused(env$client, env$instance_id)
   })
   value <- use(vector_env_of(env, block, call, frames))
   finished <- TRUE

@@ -1,34 +1,14 @@
 # Whole numbers of up to 64 bits in R: integer where they all fit, double up to
-# 2^53, beyond it bit64's integer64. Never a rounded number, so what none of them
+# 2^53, beyond it bit64's integer64. No number is ever rounded: one that none of these
 # can hold is an error.
 
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
-# From JSON, where integers beyond 2^53 are text.
-whole_from_json <- function(json) {
-  numbers <- unlist(json, use.names = FALSE)
-  if (is.character(numbers)) {
-    if (!all(grepl("^-?[0-9]+$", numbers))) {
-      abort_answer(paste(describe_value(numbers), "is no whole number"))
-    }
-    return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
-  }
-  if (is.double(numbers)) {
-    check_exact(numbers)
-  }
-  if (is.null(numbers)) integer() else numbers
+are_whole <- function(x, min, max) {
+  is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
 }
 
-# The parser gives up on what int64 cannot hold and rounds it, as it does with
-# the least int64. Every other integer beyond 2^53 has come as text.
-check_exact <- function(numbers) {
-  lost <- abs(numbers) > 2^53
-  if (any(lost)) {
-    abort_whole(sprintf("%.0f", numbers[lost][[1L]]))
-  }
-}
-
-# From decimal digits.
+# Returns whole numbers from their decimal digits.
 whole_from_digits <- function(digits) {
   numbers <- as.numeric(digits)
   if (all(abs(numbers) < 2^53 | digits %in% c("9007199254740992", "-9007199254740992"))) {
@@ -74,7 +54,7 @@ abort_whole <- function(digits) {
   gym_abort(paste("The integer", digits, reason), class = "gym_error_space", call = NULL)
 }
 
-# Decimal digits of whole numbers, whatever holds them; text passes.
+# The decimal digits of whole numbers of any type; text is returned as it is.
 whole_text <- function(x) {
   if (is.character(x)) {
     x
@@ -92,7 +72,7 @@ as_double <- function(x) {
 
 # As two halves of 32 bits ---------------------------------------------------------
 
-# The halves are R integers that hold the bits of int32, so that NA is -2^31.
+# Reads 64-bit integers as two halves, R integers with the bits of an int32: NA is -2^31.
 whole_from_halves <- function(bytes, n, signed) {
   halves <- readBin(bytes, "integer", 2L * n, size = 4L, endian = "little")
   lower <- halves[2L * seq_len(n) - 1L]
@@ -117,7 +97,7 @@ whole_from_halves <- function(bytes, n, signed) {
   structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
 }
 
-# Are the numbers those that fit an R integer?
+# Whether all of the numbers fit R's integers.
 halves_are_narrow <- function(lower, upper, signed) {
   !anyNA(lower) && !anyNA(upper) && all(upper == (lower < 0L) * -1L) &&
     (signed || all(upper == 0L))
@@ -135,7 +115,7 @@ unsigned_half <- function(half) {
   half + (half < 0) * 2^32
 }
 
-# Division by 10^9, by hand: no number of R's has these digits.
+# The digits of a number that no type of R's can hold, by a division by 10^9 of its halves.
 digits_of_halves <- function(upper, lower, signed) {
   if (signed) {
     return("-9223372036854775808")

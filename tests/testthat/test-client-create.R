@@ -21,7 +21,7 @@ test_that("what is no client is refused", {
   expect_error(env_list_all("http://127.0.0.1:5000"), "client", class = "gym_error_argument")
 })
 
-test_that("with no server there the error names the address and the mend", {
+test_that("with no server there the error names the address and the hint", {
   port <- free_port()
   client <- create_GymClient(paste0("http://127.0.0.1:", port))
   error <- expect_error(env_list_all(client), class = "gym_error_connection")
@@ -50,7 +50,7 @@ test_that("an answer that does not come within the timeout is an error", {
   expect_error(env_step(hasty, patient$instance_id, 1), "[Tt]ime", class = "gym_error_connection")
 })
 
-test_that("whatever way a server is dead, that is told within the timeout, with what helps", {
+test_that("whatever way a server is dead, the error comes within the timeout, with what helps", {
   skip_unless_all()
   for (how in c("silent", "half", "full", "cut")) {
     client <- create_GymClient(local_stalling(how), timeout = 1)
@@ -58,8 +58,8 @@ test_that("whatever way a server is dead, that is told within the timeout, with 
       # Where it is not noticed this test hangs for a minute.
       taken <- system.time(error <- expect_error(call(client), class = "gym_error_connection"))
       expect_lt(taken[["elapsed"]], 20)
-      mend <- switch(how, full = , cut = "gym_server_start", "timeout")
-      expect_match(conditionMessage(error), mend, info = how)
+      hint <- switch(how, full = , cut = "gym_server_start", "timeout")
+      expect_match(conditionMessage(error), hint, info = how)
     }
   }
 })
@@ -86,9 +86,9 @@ test_that("a timeout of httr's goes before the client's, after a repeat too", {
   server <- local_server()
   client <- local_cut_client(server, "answered", "GET /v1/envs/ ")
   client$config <- httr::timeout(3)
-  expect_identical(patience(client), 3)
+  expect_identical(timeout_of(client), 3)
   expect_type(env_list_all(client), "list")
-  expect_identical(patience(server), 60)
+  expect_identical(timeout_of(server), 60)
 })
 
 test_that("a step whose answer was lost is not taken twice", {
@@ -156,9 +156,9 @@ test_that("a client survives saveRDS() and makes calls of its own", {
   expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
   expect_equal(env_step(client, id, 0)$reward, 1)
   # Of one process all have one key, and no number of it twice.
-  numbers <- lapply(c(list(client), copies), function(copy) copy$state$line$numbers)
-  expect_identical(numbers[[2]], numbers[[1]])
-  expect_identical(numbers[[3]], numbers[[1]])
+  keys <- lapply(c(list(client), copies), function(copy) copy$state$connection$keys)
+  expect_identical(keys[[2]], keys[[1]])
+  expect_identical(keys[[3]], keys[[1]])
 })
 
 test_that("a script may make a client for each call", {
@@ -173,7 +173,7 @@ test_that("a client works in forked workers", {
   skip_on_os("windows")
   client <- test_client()
   env_list_all(client)
-  key <- function(...) connection(client)$line$numbers$key
+  key <- function(...) client_state(client)$connection$keys$key
   keys <- c(key(), unlist(parallel::mclapply(1:2, key, mc.cores = 2)))
   expect_length(unique(keys), 3)
   answers <- parallel::mclapply(1:4, function(seed) {
@@ -230,9 +230,9 @@ test_that("a call inside another call disturbs neither", {
   env_reset(server, id)
   env_reset(server, twin)
   # curl asks R for a call's body, and there R may run finalizers: here it does.
-  line <- connection(server)$line
-  curl::handle_setopt(line$channels$post$handle, readfunction = function(nbytes, ...) {
-    if (line$sent == 0L) {
+  connection <- client_state(server)$connection
+  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {
+    if (connection$sent == 0L) {
       thrown_away <- new.env()
       reg.finalizer(thrown_away, function(x) {
         env_close(server, env_create(server, "CartPole-v1"))
@@ -240,7 +240,7 @@ test_that("a call inside another call disturbs neither", {
       rm(thrown_away)
       gc()
     }
-    read_body(line, nbytes)
+    read_body(connection, nbytes)
   })
   other <- create_GymClient(server$remote_base)
   for (action in c(1, 0, 1)) {
@@ -278,7 +278,7 @@ test_that("an answer to another call is an error, in a body and in a header", {
   sent <- list(key = "k", number = 4)
   answer <- function(status, body, headers = "") {
     list(status_code = status, content = charToRaw(body), headers = charToRaw(headers),
-         url = "http://127.0.0.1:1/v1/envs/", request = sent)
+         url = "http://127.0.0.1:1/v1/envs/", key = sent)
   }
   echo <- function(number) sprintf('{"request":{"key":"k","number":%d}}', number)
   header <- function(number) {
@@ -309,7 +309,7 @@ test_that("what is no answer of a Gym server is an error with a class", {
   expect_error(read(520, "\"oops\""), class = "gym_error_http_520")
 })
 
-test_that("another kind of server is told from a Gym server", {
+test_that("another kind of server is distinguished from a Gym server", {
   python <- working_python()
   folder <- withr::local_tempdir()
   dir.create(file.path(folder, "v1", "envs"), recursive = TRUE)
@@ -326,7 +326,7 @@ test_that("another kind of server is told from a Gym server", {
   expect_error(env_create(client, "CartPole-v1"), class = "gym_error_http_501")
 })
 
-test_that("a large body arrives, one that is too large is told", {
+test_that("a large body arrives, one that is too large is an error", {
   env <- local_env()
   # CartPole looks at two of its options and lets the others be.
   expect_length(env$reset(options = list(x = as.numeric(1:1e5))), 4)
@@ -377,7 +377,7 @@ test_that("calls leave R's generator alone", {
   expect_identical(.Random.seed, before)
 })
 
-test_that("what httr's set_config() says holds for clients, too, and their own goes before", {
+test_that("the settings of httr's set_config() hold for clients, too, and their own take precedence", {
   withr::local_options(httr_config = httr::config(cainfo = "group.pem", proxy = "a.example.org"))
   expect_identical(create_GymClient("http://a")$config$options$cainfo, "group.pem")
   own <- create_GymClient("http://a", config = httr::config(cainfo = "own.pem"))

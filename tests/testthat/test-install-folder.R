@@ -25,8 +25,8 @@ test_that("what was interrupted or damaged is no environment", {
   unlink(environment_python(second))
   expect_null(installed_server())
   third <- fake_installation(3)
-  marker <- readLines(file.path(third, "installed"))
-  writeLines(head(marker, -1L), file.path(third, "installed"))
+  manifest <- readLines(file.path(third, "installed"))
+  writeLines(head(manifest, -1L), file.path(third, "installed"))
   expect_null(installed_server())
   fourth <- fake_installation(4)
   unlink(file.path(fourth, "installed"))
@@ -75,9 +75,9 @@ test_that("two sessions never make the same folder", {
   first <- make_folder(NULL)
   second <- make_folder(NULL)
   expect_false(first == second)
-  leave_folder(first, whole = FALSE)
+  end_folder(first, complete = FALSE)
   expect_false(dir.exists(first))
-  leave_folder(second, whole = TRUE)
+  end_folder(second, complete = TRUE)
   expect_identical(list.files(file.path(second, "used-by")), character())
 })
 
@@ -100,8 +100,8 @@ test_that("the cache folder's path is whole, also before it exists", {
 test_that("what could only be renamed goes the next time", {
   local_cache()
   kept <- fake_installation(2)
-  given_up <- paste0(file.path(install_root(), paste0(lock_hash(), "-1")), "-old")
-  dir.create(file.path(given_up, "venv"), recursive = TRUE)
+  renamed <- paste0(file.path(install_root(), paste0(lock_hash(), "-1")), "-old")
+  dir.create(file.path(renamed, "venv"), recursive = TRUE)
   remove_other_folders(kept)
   expect_identical(list.files(install_root()), basename(kept))
 })
@@ -110,7 +110,7 @@ test_that("a cache folder that cannot be made is an error that says what to set"
   file <- withr::local_tempfile(lines = "not a folder")
   withr::local_envvar(R_USER_CACHE_DIR = file)
   expect_error(make_folder(NULL), "R_USER_CACHE_DIR", class = "gym_error_install")
-  expect_error(in_turn(1), "R_USER_CACHE_DIR", class = "gym_error_install")
+  expect_error(with_install_lock(1), "R_USER_CACHE_DIR", class = "gym_error_install")
 })
 
 test_that("tests see nothing of what the user has installed", {

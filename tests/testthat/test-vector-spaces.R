@@ -172,7 +172,7 @@ test_that("a nested action of a sub-environment that does not fit is named with 
                class = "gym_error_space")
 })
 
-test_that("an exception in one sub-environment is told, and the others' server goes on", {
+test_that("an exception in one sub-environment is reported, and the others' server goes on", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()

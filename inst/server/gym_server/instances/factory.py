@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Callable, Collection
 
 from gym_server.envs import make, vectorization, wrappers
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.environment import Environment
 from gym_server.instances.instance import Instance
@@ -18,12 +18,12 @@ from gym_server.rendering.render_thread import RenderThread
 
 
 def make_instance(
-    choices: Choices,
+    choices: EnvConfig,
     allowed_modules: Collection[str],
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
-    account: Account,
+    reservation: MemoryReservation,
 ) -> Instance:
     """Create an instance of what a client wants.
 
@@ -33,7 +33,7 @@ def make_instance(
         max_num_envs: how many sub-environments it may have.
         renderer: the process's render thread.
         undo: closes the environment when something goes wrong from here on.
-        account: what its memory is charged to.
+        reservation: what its memory is charged to.
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
@@ -46,19 +46,19 @@ def make_instance(
             choices.kwargs or {},
             allowed_modules,
             choices.wrappers,
-            account,
+            reservation,
         )
         undo.push(_closing_quietly(renderer, env.close))
-        wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, account)
+        wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, reservation)
         return _instance(SingleEnvironment(wrapped, choices, renderer), choices, renderer)
     sub_envs, mode = vectorization.make_vector_env(
-        choices, allowed_modules, max_num_envs, renderer, account
+        choices, allowed_modules, max_num_envs, renderer, reservation
     )
     undo.push(_closing_quietly(renderer, sub_envs.close))
     return _instance(VectorEnvironment(sub_envs, mode, choices, renderer), choices, renderer)
 
 
-def _instance(env: Environment, choices: Choices, renderer: RenderThread) -> Instance:
+def _instance(env: Environment, choices: EnvConfig, renderer: RenderThread) -> Instance:
     return Instance(LocalBackend(env, choices, renderer), choices, renderer)
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gym_server.envs.config import Choices
+from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.instances.backend import Backend, Seed
 from gym_server.instances.lock import InstanceLock
@@ -34,7 +34,7 @@ class Instance:
         renderer: the process's render thread.
     """
 
-    def __init__(self, backend: Backend, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(self, backend: Backend, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Args:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.spaces import Space
 
 from gym_server import spaces
-from gym_server.envs.config import Choices
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import ask
 from gym_server.envs.wrappers import time_limit
 from gym_server.errors import GymServerError, reset_needed
@@ -39,7 +39,7 @@ class LocalBackend:
     # No call is answered without the instance knowing of it.
     busy_since = None
 
-    def __init__(self, env: Environment, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(self, env: Environment, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Raises:

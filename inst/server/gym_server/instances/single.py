@@ -8,8 +8,8 @@ import gymnasium
 from gymnasium.spaces import Space
 
 from gym_server import spaces
-from gym_server.envs import repeats
-from gym_server.envs.config import Choices
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
@@ -28,7 +28,7 @@ class SingleEnvironment:
     autoreset_mode: str | None = None
     fails_as_a_whole = False
 
-    def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(self, env: gymnasium.Env, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment."""
         self.gym_env: Any = env
         self.env_id = env_id_of(choices, env)
@@ -44,7 +44,7 @@ class SingleEnvironment:
         self, seed: object, options: dict | None, mask: np.ndarray | None, was_reset: bool
     ) -> None:
         """Refuse options that make a loop."""
-        repeats.check_options(self.gym_env, options)
+        argument_limits.check_reset_options(self.gym_env, options)
 
     def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
         """Reset the environment."""

@@ -9,8 +9,8 @@ from gymnasium.spaces import Dict, Space, Tuple
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server import spaces
-from gym_server.envs import repeats
-from gym_server.envs.config import Choices
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, wrong_length
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
@@ -25,7 +25,9 @@ class VectorEnvironment:
     # Some sub-environments may have moved then, and others not.
     fails_as_a_whole = True
 
-    def __init__(self, env: VectorEnv, mode: str, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(
+        self, env: VectorEnv, mode: str, choices: EnvConfig, renderer: RenderThread
+    ) -> None:
         """Take over a vector environment.
 
         Args:
@@ -69,7 +71,7 @@ class VectorEnvironment:
     ) -> None:
         """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
         self._check_seed(seed)
-        repeats.check_options(self.gym_env, options)
+        argument_limits.check_reset_options(self.gym_env, options)
         if options and "reset_mask" in options:
             raise GymServerError(
                 "invalid_parameter",

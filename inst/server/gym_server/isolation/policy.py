@@ -129,16 +129,16 @@ class Isolation:
             on_end=lambda why: None,
             hint="",
         )
-        overdue = threading.Timer(seconds, worker.condemn, (_search_too_long(seconds),))
+        overdue = threading.Timer(seconds, worker.kill, (_search_too_long(seconds),))
         overdue.daemon = True
         if seconds:
             overdue.start()
         try:
-            return cast(list[dict], worker.first_word().value)
+            return cast(list[dict], worker.first_result().value)
         finally:
             overdue.cancel()
             # It has answered, and a thread that a module has started could keep it from ending.
-            worker.condemn(shutting_down())
+            worker.kill(shutting_down())
 
 
 def _search_too_long(seconds: float) -> GymServerError:

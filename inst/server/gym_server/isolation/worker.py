@@ -26,18 +26,21 @@ import numpy as np
 
 from gym_server.budget import Budget
 from gym_server.envs import registry
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import answer_to
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.monitoring.monitor_directory import claim
 from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
-from gym_server.processes.messages import read_question, refusal_of, value_of
+from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
 from gym_server.protocol import answers
 from gym_server.rendering.render_thread import RenderThread
+
+# Its imports take longer than the start of a process.
+start.preload(__name__)
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class WorkerSettings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is created.
         max_num_envs: how many sub-environments an environment may have.
-        memory: how many bytes the environment may be reckoned to take; see ``footprint``.
+        memory: how many bytes the environment may be estimated to take; see ``memory_estimate``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -62,7 +65,7 @@ class WorkerSettings:
 
 
 def serve_instance(
-    moves: Connection, questions: Connection, choices: Choices, settings: WorkerSettings
+    moves: Connection, questions: Connection, choices: EnvConfig, settings: WorkerSettings
 ) -> None:
     """Create an environment and serve it until it is closed.
 
@@ -102,7 +105,7 @@ def _set_up_process(settings: WorkerSettings) -> None:
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    start.end_with_the_server(group=True)
+    start.exit_with_parent(group=True)
     logging.basicConfig(
         level=settings.log_level,
         stream=sys.stderr,
@@ -126,7 +129,7 @@ def _limit_memory(size: int) -> None:
 def _serve(pipe: Pipe, methods: _Methods) -> None:
     while not methods.is_closed:
         try:
-            number, method, args = read_question(pipe.receive())
+            number, method, args = read_call(pipe.receive())
         except (EOFError, OSError):
             # The server has closed its end, or is gone.
             os._exit(1)
@@ -137,13 +140,13 @@ def _answer(pipe: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
         if isinstance(result, answers.Answer):
-            message = messages.answer_of(number, result)
+            message = messages.answer_message(number, result)
         elif isinstance(result, _Look):
-            message = value_of(number, result.facts, result.frame)
+            message = value_message(number, result.facts, result.frame)
         else:
-            message = value_of(number, result)
+            message = value_message(number, result)
     except BaseException as error:
-        message = refusal_of(number, answer_to(error)[1])
+        message = refusal_message(number, answer_to(error)[1])
     try:
         pipe.send(message)
     except (OSError, ValueError):
@@ -161,7 +164,7 @@ class _Methods:
 
     _instance: Instance
 
-    def __init__(self, choices: Choices, settings: WorkerSettings) -> None:
+    def __init__(self, choices: EnvConfig, settings: WorkerSettings) -> None:
         self._choices = choices
         self._settings = settings
         self.is_created = False
@@ -171,7 +174,7 @@ class _Methods:
         for module in self._settings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
-        account = Account(Budget(self._settings.memory), self._choices.num_envs or 1)
+        reservation = MemoryReservation(Budget(self._settings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make_instance(
                 self._choices,
@@ -179,7 +182,7 @@ class _Methods:
                 self._settings.max_num_envs,
                 RenderThread(),
                 undo,
-                account,
+                reservation,
             )
             undo.pop_all()
         self._instance = instance
@@ -187,7 +190,7 @@ class _Methods:
         return {
             "fps": instance.viewer.fps,
             "about": instance.about(),
-            "memory": account.taken,
+            "memory": reservation.taken,
         }
 
     # Moves and looks ------------------------------------------------------------------------

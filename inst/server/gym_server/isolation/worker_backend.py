@@ -6,16 +6,16 @@ import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING, cast
 
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.backend import Seed
 from gym_server.isolation.worker import WorkerSettings, serve_instance
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.processes.messages import Seen
+from gym_server.processes.messages import Result
 from gym_server.processes.worker_process import WorkerProcess
-from gym_server.protocol.safetensors import Tensor
 from gym_server.protocol.answers import Ready
+from gym_server.protocol.safetensors import Tensor
 from gym_server.spaces import Parts
 from gym_server.viewing.watchable import Moves
 
@@ -42,7 +42,7 @@ class WorkerBackend:
     draws_on_render_thread = False
     can_be_killed = True
 
-    def __init__(self, choices: Choices, settings: WorkerSettings) -> None:
+    def __init__(self, choices: EnvConfig, settings: WorkerSettings) -> None:
         """Start the process; ``create()`` waits for the environment.
 
         Args:
@@ -65,25 +65,25 @@ class WorkerBackend:
             serve_instance, choices, settings, on_end=lambda why: self._on_end(why), hint=hint
         )
 
-    def create(self, account: Account) -> None:
+    def create(self, reservation: MemoryReservation) -> None:
         """Wait until the environment is created.
 
         Args:
-            account: what its memory is charged to, as far as its process reports it.
+            reservation: what its memory is charged to, as far as its process reports it.
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``environment_died``.
         """
-        created = _dict(self._worker.first_word())
+        created = _dict(self._worker.first_result())
         self._about = created["about"]
-        account.take(max(0.0, float(created["memory"])), self.env_id)
+        reservation.take(max(0.0, float(created["memory"])), self.env_id)
         self.env_id = str(self._about["env_id"])
         self.fps = created["fps"]
 
     def stay(self, on_end: Callable[[GymServerError], None]) -> None:
         """Know that the instance is listed now, until its process ends."""
         self._on_end = on_end
-        self._worker.stay()
+        self._worker.report_end()
 
     # Moves ----------------------------------------------------------------------------------
 
@@ -103,10 +103,10 @@ class WorkerBackend:
 
     def _move(self, method: str, *args: object) -> Ready:
         self.moves.begin()
-        return cast(Ready, self._worker.move(method, *args))
+        return cast(Ready, self._worker.call(method, *args))
 
-    def _ask(self, method: str, *args: object) -> Seen:
-        return cast(Seen, self._worker.move(method, *args))
+    def _ask(self, method: str, *args: object) -> Result:
+        return cast(Result, self._worker.call(method, *args))
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
@@ -120,41 +120,41 @@ class WorkerBackend:
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
-        seen = self._ask("look", sub_env)
-        return dict(_dict(seen)), seen.frame
+        result = self._ask("look", sub_env)
+        return dict(_dict(result)), result.frame
 
     # At any time ----------------------------------------------------------------------------
 
     @property
     def action_space_info(self) -> dict:
         """The description of the action space."""
-        return _dict(self._worker.question("action_space_info"))
+        return _dict(self._worker.query("action_space_info"))
 
     @property
     def observation_space_info(self) -> dict:
         """The description of the observation space."""
-        return _dict(self._worker.question("observation_space_info"))
+        return _dict(self._worker.query("observation_space_info"))
 
     def action_contains(self, claim: dict) -> bool:
         """Answer a client's "contains"; see ``spaces.contains()``."""
-        return bool(self._worker.question("action_contains", claim).value)
+        return bool(self._worker.query("action_contains", claim).value)
 
     def observation_contains(self, claim: dict) -> bool:
         """Answer a client's "contains"; see ``spaces.contains()``."""
-        return bool(self._worker.question("observation_contains", claim).value)
+        return bool(self._worker.query("observation_contains", claim).value)
 
     def about(self) -> dict:
         """Return what is known of the environment, without waiting for it."""
         try:
-            self._about = _dict(self._worker.question("about", seconds=_ABOUT_SECONDS))
+            self._about = _dict(self._worker.query("about", timeout=_ABOUT_SECONDS))
         except TimeoutError:
             log.info("The process of %s does not answer at the moment", self.env_id)
         return {**self._about, "isolated": True}
 
     @property
     def busy_since(self) -> float | None:
-        """Since when the process owes an answer to a question, or None."""
-        return self._worker.questioned_since
+        """Since when the process owes an answer to a query, or None."""
+        return self._worker.query_since
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -173,22 +173,22 @@ class WorkerBackend:
 
     def close(self, why: GymServerError) -> None:
         """Finish the monitor, close the environment and let its process end."""
-        self._worker.expect_end()
+        self._worker.begin_close()
         try:
             self._ask("close")
         finally:
-            self._worker.let_go(why)
+            self._worker.close(why)
 
     def kill(self, why: GymServerError) -> None:
         """Kill the process; every call on it raises the reason, so none is stuck."""
-        self._worker.condemn(why)
+        self._worker.kill(why)
 
     def clear_away(self) -> None:
         """Do nothing: the process was killed."""
 
 
-def _dict(seen: Seen) -> dict:
-    return cast(dict, seen.value)
+def _dict(result: Result) -> dict:
+    return cast(dict, result.value)
 
 
 def _sendable(action: Parts) -> Parts:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from gym_server.budget import Budget
 from gym_server.envs import registry, vectorization, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
@@ -34,7 +34,7 @@ class _Share(NamedTuple):
     """What an environment takes of what all share, until it is gone."""
 
     room: Room
-    account: Account
+    reservation: MemoryReservation
 
 
 @dataclass(eq=False)
@@ -49,7 +49,7 @@ class _Creation:
         began: in the clock's seconds.
     """
 
-    choices: Choices
+    choices: EnvConfig
     share: _Share
     kill: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
@@ -99,7 +99,7 @@ class InstanceManager:
         self._tombstones = Tombstones()
         self._stopping = False
 
-    def create(self, choices: Choices) -> str:
+    def create(self, choices: EnvConfig) -> str:
         """Create an environment and return its instance_id, 8 hex digits.
 
         Raises:
@@ -137,10 +137,10 @@ class InstanceManager:
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, choices: Choices, isolated: bool) -> Iterator[_Creation]:
+    def _room_for(self, choices: EnvConfig, isolated: bool) -> Iterator[_Creation]:
         """Keep room for an environment while it is created."""
         room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
-        share = _Share(room, Account(self._budget, room.sub_envs))
+        share = _Share(room, MemoryReservation(self._budget, room.sub_envs))
         creation = _Creation(choices, share)
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
@@ -162,21 +162,23 @@ class InstanceManager:
         """Free the share of an environment that is gone, or was not created after all."""
         share = self._shares.pop(whose, None)
         if share is not None:
-            share.account.give_back()
+            share.reservation.give_back()
             self.left_garbage = True
 
-    def _make(self, choices: Choices, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
+    def _make(
+        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
+    ) -> Instance:
         return make_instance(
             choices,
             self._allowed_modules,
             self._limits.max_num_envs,
             self._renderer,
             undo,
-            creation.share.account,
+            creation.share.reservation,
         )
 
     def _make_isolated(
-        self, choices: Choices, creation: _Creation, undo: contextlib.ExitStack
+        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
     ) -> Instance:
         settings = self._isolation.settings(
             choices.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
@@ -184,7 +186,7 @@ class InstanceManager:
         backend = WorkerBackend(choices, settings)
         undo.callback(backend.kill, shutting_down())
         creation.kill = backend.kill
-        backend.create(creation.share.account)
+        backend.create(creation.share.reservation)
         return Instance(backend, choices, self._renderer)
 
     def registered(self, search: str | None) -> list[dict]:
@@ -378,7 +380,7 @@ class InstanceManager:
                 return instance_id
 
 
-def _processes_of(choices: Choices, isolated: bool) -> int:
+def _processes_of(choices: EnvConfig, isolated: bool) -> int:
     """Return how many processes of its own run an environment."""
     sub_envs = choices.num_envs or 1
     return isolated + (sub_envs if choices.vectorization_mode == "async" else 0)

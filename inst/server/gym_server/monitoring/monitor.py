@@ -106,6 +106,7 @@ class Monitor:
 
     def step(self, action: object) -> tuple:
         """Take a step; write the episode's row when it is done."""
+        result: tuple
         if self._recorder is not None and self._recorder.recording:
             result = self._renderer.run(self._recorder.step, action)
         else:

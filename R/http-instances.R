@@ -1,0 +1,174 @@
+# The instances that this session has created on servers. An instance is closed when it is out of
+# use: when its object was collected as garbage, when the call that created it was interrupted, and
+# at the session's end.
+
+# How long closing may take in all, in seconds, where nobody waits for it.
+closing_time <- 2
+
+#' Create an instance on the server, and remember it
+#'
+#' Creations have idempotency keys of their own, so that one whose answer was lost can be repeated
+#' later: the answer to the repeat has the id of the instance.
+#' @return The instance's id.
+#' @noRd
+create_on_server <- function(client, fields, call) {
+  state <- client_state(client)
+  key <- next_key(state$creation_keys)
+  place <- paste(key$key, key$number)
+  outcome <- "lost"
+  on.exit(end_creation(state, place, outcome))
+  remember_instance(place, client, body = padded(request_body(fields, key), handle_kinds$post))
+  answer <- withCallingHandlers(
+    post_once(client, "/v1/envs/", fields, key = key, call = call),
+    gym_error_http = function(cnd) outcome <<- "refused",
+    gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
+  )
+  check_instance_id(answer$instance_id)
+  suspendInterrupts({
+    note_protocol(state, answer)
+    remember_instance(instance_place(client, answer$instance_id), client, answer$instance_id)
+    outcome <- "created"
+  })
+  answer$instance_id
+}
+
+instance_route <- function(instance_id) {
+  paste0("/v1/envs/", curl::curl_escape(instance_id), "/")
+}
+
+# A creation whose answer was lost is repeated before the next one, to learn the instance's id and
+# close it. Until then no other request may have the same text in its key, as the server remembers
+# the last number of each only.
+end_creation <- function(state, place, outcome) {
+  if (outcome == "lost") {
+    state$creation_keys <- new_idempotency_keys()
+    state$to_close <- c(state$to_close, place)
+  } else {
+    forget_instance(place)
+  }
+}
+
+# Where an instance stands in `the_session$instances`. A creation without an answer stands there
+# under its idempotency key.
+instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
+
+# `body` is that of a creation that has no answer yet.
+remember_instance <- function(place, client, instance_id = NULL, body = NULL) {
+  assign(
+    place, list(client = client, pid = Sys.getpid(), instance_id = instance_id, body = body),
+    envir = the_session$instances
+  )
+}
+
+forget_instance <- function(place) {
+  if (exists(place, envir = the_session$instances, inherits = FALSE)) {
+    rm(list = place, envir = the_session$instances)
+  }
+}
+
+# Forgets all instances of a server that has ended.
+forget_instances_of <- function(base) {
+  places <- ls(the_session$instances, all.names = TRUE, sorted = FALSE)
+  rm(list = places[startsWith(places, paste0(base, " "))], envir = the_session$instances)
+}
+
+# Closing --------------------------------------------------------------------------
+
+#' Close an instance that nothing in R refers to any more
+#' @noRd
+close_unused <- function(client, instance_id) {
+  if (!is.null(instance_id)) {
+    queue_closing(client, instance_id)
+    close_queued(client)
+  }
+}
+
+# Puts an instance on the list of those to close. A finalizer may do no more, as it may run in the
+# middle of a request.
+queue_closing <- function(client, instance_id) {
+  place <- instance_place(client, instance_id)
+  if (exists(place, envir = the_session$instances, inherits = FALSE)) {
+    state <- client_state(client)
+    state$to_close <- c(state$to_close, place)
+  }
+}
+
+#' Close the instances that were put on the list since the last time
+#'
+#' What cannot be closed in time is tried again at the session's end only, so that a server
+#' that hangs delays a call once.
+#' @noRd
+close_queued <- function(client) {
+  state <- client_state(client)
+  if (length(state$to_close)) {
+    places <- state$to_close
+    state$to_close <- character()
+    close_together(places, closing_time)
+  }
+}
+
+# At the session's end. What is on a server of this session's ends with that server.
+close_session_instances <- function(seconds) {
+  places <- ls(the_session$instances, all.names = TRUE, sorted = FALSE)
+  is_elsewhere <- function(place) {
+    is.null(the_session$servers[[the_session$instances[[place]]$client$remote_base]])
+  }
+  close_together(Filter(is_elsewhere, places), seconds)
+}
+
+#' Close instances, all at once, in a limited time
+#'
+#' The one place beside [send()] that makes requests. It does not use a client's connection, which
+#' may be in the middle of a request, repeats nothing, and does not close one instance after the
+#' other, as each may hang. A forked child closes nothing that its parent created.
+#' @param places Where they stand in `the_session$instances`.
+#' @noRd
+close_together <- function(places, seconds) {
+  is_own <- function(place) identical(the_session$instances[[place]]$pid, Sys.getpid())
+  places <- Filter(is_own, places)
+  if (!length(places)) {
+    return(invisible())
+  }
+  pool <- curl::new_pool()
+  on.exit(lapply(curl::multi_list(pool), curl::multi_cancel))
+  deadline <- proc.time()[["elapsed"]] + seconds
+  post <- function(entry, route, body, done) {
+    handle <- closing_handle(entry$client, route, body, deadline - proc.time()[["elapsed"]])
+    curl::multi_add(handle, done = done, fail = function(reason) NULL, pool = pool)
+  }
+  close_place <- function(place) {
+    entry <- the_session$instances[[place]]
+    route <- paste0(instance_route(entry$instance_id), "close/")
+    post(entry, route, charToRaw("{}"), function(response) forget_instance(place))
+  }
+  ask_for_id <- function(place) {
+    entry <- the_session$instances[[place]]
+    post(entry, "/v1/envs/", entry$body, function(response) {
+      instance_id <- tryCatch(
+        string_or_null(parsed_body(response)$instance_id), error = function(cnd) NULL
+      )
+      forget_instance(place)
+      if (!is.null(instance_id)) {
+        known <- instance_place(entry$client, instance_id)
+        remember_instance(known, entry$client, instance_id)
+        close_place(known)
+      }
+    })
+  }
+  for (place in places) {
+    if (is.null(the_session$instances[[place]]$body)) close_place(place) else ask_for_id(place)
+  }
+  curl::multi_run(timeout = seconds, pool = pool)
+  invisible()
+}
+
+closing_handle <- function(client, route, body, seconds) {
+  handle <- new_handle(client, json_type, json_type)
+  curl::handle_setopt(
+    handle,
+    url = paste0(client$remote_base, route), post = TRUE,
+    postfieldsize = length(body), postfields = body,
+    timeout_ms = max(1, seconds * 1000), connecttimeout_ms = max(1, seconds * 1000)
+  )
+  handle
+}
