@@ -124,7 +124,7 @@ class GymApp(Flask):
         self.register_error_handler(Exception, lambda error: _response(failure(error, None)))
         self.answer_for = lambda *_: None
         self._watchdog = Watchdog(
-            self._instances, config.limits, self._give_up, exactly_once.forget_in_time
+            self._instances, config.limits, self._answer_for, exactly_once.forget_in_time
         )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
@@ -167,11 +167,10 @@ class GymApp(Flask):
         refusal = refusals[status]() if status in refusals else malformed_request(reason)
         return _wsgi(failure(refusal, None))
 
-    def _give_up(self, thread: int, why: GymServerError) -> None:
+    def _answer_for(self, thread: int, why: GymServerError) -> None:
         """Answer what a thread does that is stuck in an environment."""
-        answer = self._exactly_once.give_up(thread, lambda number: failure(why, number))
-        answer = answer or failure(why, None)
-        self.answer_for(thread, *_wsgi(answer))
+        answer = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
+        self.answer_for(thread, *_wsgi(answer or failure(why, None)))
 
     def end_watching(self) -> None:
         """Send all watchers away, who would wait for more than the server's last moment."""

@@ -245,7 +245,7 @@ def test_what_never_comes_back_is_answered_by_another_thread():
         target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
     )
     waiting.start()
-    assert once.give_up(thread.ident, lambda request_id: f"gave up {request_id.number}") == (
+    assert once.abandon(thread.ident, lambda request_id: f"gave up {request_id.number}") == (
         "gave up 1"
     )
     waiting.join(10)
@@ -255,7 +255,7 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     thread.join(10)
     # What came too late is nobody's answer.
     assert once.answer(RequestId("a", 2), "step", act) == 1
-    assert once.give_up(thread.ident, str) is None
+    assert once.abandon(thread.ident, str) is None
 
 
 def test_what_all_keep_together_is_bounded():
@@ -286,6 +286,6 @@ def test_what_is_kept_is_looked_through_from_time_to_time_and_when_much_came(mon
         once.answer(RequestId("a", number), "step", Counter())
         once.forget_in_time()
     assert len(looks) == 1
-    monkeypatch.setattr("gym_server.api.exactly_once._LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("gym_server.api.exactly_once._SEARCH_SECONDS", 0.0)
     once.forget_in_time()
     assert len(looks) == 2
