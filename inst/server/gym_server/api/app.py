@@ -1,6 +1,6 @@
-"""The Flask application: it has the services, lets requests in, and finds their routes.
+"""The Flask application: it has the services, checks requests, and finds their routes.
 
-Flask itself has the settings, the client that tests use, and the answers to what has no route.
+Of Flask it uses the test client, and the answers to requests that have no route.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class Config:
         temporary_monitors: whether they may also write below the system's temporary directory.
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
-        limits: how much of everything there is for all clients together.
+        limits: of all clients together.
         isolate: which environments get a process of their own: "none", "foreign" (those of
             other modules than Gymnasium's and ale_py's) or "all".
         max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
-        access: whom the server lets in.
+        access: which requests the server lets pass.
         client_stop: whether clients may stop it.
         allowed_paths: directories that kwargs may name paths in; None for any path.
     """
@@ -76,11 +76,11 @@ class Config:
 
 
 class GymApp(Flask):
-    """The application, with what it has to put in order at the end.
+    """The application, which must be closed at the end.
 
     Attributes:
-        answer_for: sends a status, headers and a body on behalf of a thread that is stuck in an
-            environment, to the client that it serves; set by what has the connections.
+        answer_for: sends a status, headers and a body to the client of a thread that is stuck in
+            an environment; set by the owner of the connections.
     """
 
     answer_for: Callable[[int, str, list[tuple[str, str]], bytes], None]
@@ -113,7 +113,7 @@ class GymApp(Flask):
         self._endpoints = {}
         for route in ROUTES:
             self._endpoints[route] = Endpoint(route, services, exactly_once, config.max_body_bytes)
-            # By these Flask tells what is wrong with a request that has no route.
+            # With these rules Flask makes the answers to requests that have no route.
             self.add_url_rule(
                 route.path,
                 endpoint=route.handler.__name__,
@@ -124,7 +124,7 @@ class GymApp(Flask):
         self.register_error_handler(Exception, lambda error: _response(failure(error, None)))
         self.answer_for = lambda *_: None
         self._watchdog = Watchdog(
-            self._instances, config.limits, self._answer_for, exactly_once.forget_in_time
+            self._instances, config.limits, self._abandon, exactly_once.forget_in_time
         )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
@@ -133,7 +133,7 @@ class GymApp(Flask):
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
-            status, headers, body = _wsgi(_turn_away(refusal, environ, match))
+            status, headers, body = _wsgi(_refused(refusal, environ, match))
             start_response(status, headers)
             return (body,)
         if match is None:
@@ -167,13 +167,13 @@ class GymApp(Flask):
         refusal = refusals[status]() if status in refusals else malformed_request(reason)
         return _wsgi(failure(refusal, None))
 
-    def _answer_for(self, thread: int, why: GymServerError) -> None:
-        """Answer what a thread does that is stuck in an environment."""
+    def _abandon(self, thread: int, why: GymServerError) -> None:
+        """Abandon the call of a thread that is stuck in an environment, and answer it."""
         answer = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
         self.answer_for(thread, *_wsgi(answer or failure(why, None)))
 
     def end_watching(self) -> None:
-        """Send all watchers away, who would wait for more than the server's last moment."""
+        """Answer all watchers, who would otherwise wait for longer than the stop may take."""
         self._instances.end_watching()
 
     def close(self) -> None:
@@ -189,12 +189,11 @@ def create_app(config: Config | None = None) -> GymApp:
     return GymApp(config or Config())
 
 
-def _turn_away(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
-    """Answer a request that may not pass; people get the reason on the page that they wanted."""
+def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
+    """Answer a request that may not pass; people get the reason on the page that they asked for."""
     wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
-    page_of = match.route.refusal_page if match is not None else None
-    if refusal.code == "unauthorized" and wants_page and page_of is not None:
-        page = answers.answer(page_of(match.path, refusal.status), None)
+    if match and match.route.refusal_page and refusal.code == "unauthorized" and wants_page:
+        page = answers.answer(match.route.refusal_page(match.path, refusal.status), None)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return failure(refusal, None)
 

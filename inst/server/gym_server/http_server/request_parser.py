@@ -164,7 +164,8 @@ class RequestParser:
         """
         self._bodies.give_all_back()
         self._parser = HttpRequestParser(None)
-        self._send = self._refusal = lambda _: None
+        self._send = lambda data: None
+        self._refusal = lambda request: None
         self._request = Request()
         self._complete = []
 

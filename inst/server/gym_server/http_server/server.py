@@ -6,9 +6,9 @@ import contextlib
 import errno
 import logging
 import math
-import os
 import select
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -46,12 +46,12 @@ def bind(host: str, port: int) -> socket.socket:
     )[0]
     listener = socket.socket(family, kind, protocol)
     try:
-        if os.name == "nt":
-            # There SO_REUSEADDR would let another process take the port over.
+        if sys.platform == "win32":
+            # On Windows SO_REUSEADDR would let another process take the port over.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         else:
-            # Lets a new server start while the old one's connections linger; a port that
-            # somebody listens on stays refused.
+            # A new server can start while connections of the old one linger. A port on which
+            # another process listens stays refused.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(1024)
