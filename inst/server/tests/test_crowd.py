@@ -80,7 +80,7 @@ def test_half_sent_requests_leave_as_well(crowded):
     assert is_well(crowded())
 
 
-def test_those_who_do_not_read_their_answers_leave_before_those_who_are_silent(crowded, eventually):
+def test_connections_whose_answer_is_not_read_are_evicted_before_silent_ones(crowded, eventually):
     silent = crowded()
     assert is_well(silent)
     for _ in range(MOST - 1):
@@ -90,7 +90,7 @@ def test_those_who_do_not_read_their_answers_leave_before_those_who_are_silent(c
     assert is_well(silent)
 
 
-def test_those_who_have_not_shown_that_they_belong_here_leave_first(crowded, eventually):
+def test_connections_whose_client_is_not_recognized_are_evicted_first(crowded, eventually):
     silent = crowded()
     assert is_well(silent)
     for _ in range(MOST - 1):

@@ -156,7 +156,7 @@ NUMBER_1 = RequestId("a", 1)
 
 def test_numbers_grow_for_each_instance_by_itself():
     once, act = Once(living=["i", "j"]), Counter()
-    # Who guessed a key blocks nobody's but his own instance.
+    # A guessed key blocks only the instance on which it is used.
     once.answer(RequestId("a", 2**62), "step", Counter(), "j")
     assert once.answer(NUMBER_1, "step", act) == 1
     assert once.answer(NUMBER_1, "step", act) == 1
@@ -245,15 +245,15 @@ def test_what_never_comes_back_is_answered_by_another_thread():
         target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
     )
     waiting.start()
-    assert once.abandon(thread.ident, lambda request_id: f"gave up {request_id.number}") == (
-        "gave up 1"
+    assert once.abandon(thread.ident, lambda request_id: f"abandoned {request_id.number}") == (
+        "abandoned 1"
     )
     waiting.join(10)
-    assert repetition == ["gave up 1"]
+    assert repetition == ["abandoned 1"]
     assert once.answer(RequestId("a", 2), "step", act) == 1
     may_end.set()
     thread.join(10)
-    # What came too late is nobody's answer.
+    # The answer that came too late is dropped.
     assert once.answer(RequestId("a", 2), "step", act) == 1
     assert once.abandon(thread.ident, str) is None
 

@@ -80,7 +80,7 @@ def test_a_network_of_one_owner_is_one_address(few, one, other, same):
     assert few.add(Fake(None), other) is not same
 
 
-def test_answers_that_nobody_reads_do_not_pile_up(few, monkeypatch):
+def test_answers_that_are_not_read_do_not_pile_up(few, monkeypatch):
     monkeypatch.setattr(module, "MOST_UNSENT_BYTES", 100)
     sizes = {5.0: 60, 1.0: 60, 3.0: 60, 9.0: 0}
     fakes = [Fake((1, since), size) for since, size in sizes.items()]
