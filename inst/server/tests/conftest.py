@@ -27,7 +27,7 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    # Here, where a test can look inside; test_isolated_instance.py has the others.
+    # In this process, where a test can look inside; test_worker_backend.py tests the others.
     app = create_app(
         Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
     )
@@ -232,13 +232,14 @@ def watch(app):
     def watch(url):
         instance = app._instances.get(url.rsplit("/", 1)[1])
         drawn = []
-        draw = instance._draw
+        env = instance._backend.env
+        draw = env.draw
 
         def counting(sub_env):
             drawn.append(sub_env)
             return draw(sub_env)
 
-        instance._draw = counting
+        env.draw = counting
         return instance, drawn
 
     return watch

@@ -22,7 +22,7 @@ from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.errors import GymServerError, shutdown_disabled
 from gym_server.isolation.policy import Isolation
-from gym_server.manager.instance_manager import Instances
+from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits, Watchers
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
@@ -82,7 +82,7 @@ class GymApp(Flask):
         super().__init__("gym_server", static_folder=None)
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
-        self._instances = Instances(
+        self._instances = InstanceManager(
             config.allowed_modules,
             self._renderer,
             config.limits,

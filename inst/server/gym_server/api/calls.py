@@ -9,7 +9,7 @@ from typing import NamedTuple
 from gym_server.api.routing import Route
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.instances.instance import Instance
-from gym_server.manager.instance_manager import Instances
+from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Watchers
 from gym_server.monitoring.monitor_directory import MonitorRoot
 
@@ -27,7 +27,7 @@ class Services:
         watch_keys: the keys that open watch pages; None where no page asks for one.
     """
 
-    instances: Instances
+    instances: InstanceManager
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers

@@ -16,7 +16,7 @@ from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
-from gym_server.protocol.answers import HTML, Content
+from gym_server.protocol.answers import HTML, Content, Ready
 from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.safetensors import TENSORS, Tensor
@@ -126,7 +126,7 @@ def env_about(call: Call) -> dict:
         {"observation": schemas.ANYTHING, "info": {"type": "object"}}, request=schemas.REQUEST
     ),
 )
-def env_reset(call: Call) -> dict:
+def env_reset(call: Call) -> dict | Ready:
     """Start an episode."""
     fields = call.fields
     return call.instance.reset(
@@ -169,7 +169,7 @@ def env_reset(call: Call) -> dict:
         request=schemas.REQUEST,
     ),
 )
-def env_step(call: Call) -> dict:
+def env_step(call: Call) -> dict | Ready:
     """Take one step."""
     fields = call.fields
     return call.instance.step(

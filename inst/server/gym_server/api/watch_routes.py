@@ -135,7 +135,7 @@ def env_watch_state(call: Call) -> Content:
     sub_env = call.fields["sub_env"] or 0
     call.instance.check_sub_env(sub_env)
     with call.services.watchers.one_more():
-        body = call.instance.screen.see(sub_env, call.fields["after"])
+        body = call.instance.viewer.next_frame(sub_env, call.fields["after"])
     return Content(body, JSON, headers=(_NOT_KEPT,))
 
 
@@ -148,7 +148,7 @@ def env_watch_state(call: Call) -> Content:
 )
 def env_watch_presence(call: Call) -> dict:
     """Say that somebody goes on watching, without a picture for now."""
-    call.instance.screen.attend()
+    call.instance.viewer.note_presence()
     return {"watched": True}
 
 

@@ -1,4 +1,4 @@
-"""Read the actions that clients send, and say more where an environment refuses one."""
+"""Read the actions that clients send, and add a hint where an environment refuses one."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ _CLIP = (
 class ActionReader:
     """Reads what is sent as an action of one space.
 
-    A Box's bounds are the environment's affair, as they are in Gymnasium; everything else that
-    makes a member is asked for.
+    The bounds of a Box are left to the environment, as in Gymnasium; everything else that makes a
+    member of the space is checked.
     """
 
-    def __init__(self, space: Space, sub_envs: int) -> None:
+    def __init__(self, space: Space, num_envs: int) -> None:
         """Name the space.
 
         Args:
             space: of one action.
-            sub_envs: how many sub-environments there are.
+            num_envs: how many sub-environments there are.
         """
         self._space = space
         self._taken = spaces.with_wide_boxes(space)
-        self._sub_envs = sub_envs
+        self._num_envs = num_envs
 
     def read(self, action: object, rows: int | None = None) -> object:
         """Return the action, or with sub-environments the batch of actions, that was sent.
@@ -45,7 +45,7 @@ class ActionReader:
             return self._decode(self._taken, action, rows)
         except spaces.NotInSpace as refusal:
             raise GymServerError(
-                "action_not_in_space", f"The action {refusal}", _which_there_are(self._space)
+                "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)
             ) from None
 
     def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
@@ -58,21 +58,20 @@ class ActionReader:
             failure.hint = _CLIP
 
     def _decode(self, space: Space, action: object, rows: int | None) -> object:
-        is_parts = isinstance(action, spaces.Parts)
         if rows is None:
-            if is_parts:
+            if isinstance(action, spaces.Parts):
                 return spaces.decode_tensors(space, "action", action)
             return spaces.decode(space, action)
         whose = f"the {rows} sub-environments"
-        if rows != self._sub_envs:
+        if rows != self._num_envs:
             whose += " that step"
-        if is_parts:
+        if isinstance(action, spaces.Parts):
             return spaces.decode_sub_envs_tensors(space, "action", action, rows, whose)
         return spaces.decode_sub_envs(space, action, rows, whose)
 
 
-def _which_there_are(space: Space) -> str | None:
-    """Return the actions of a Discrete space in words, for those who count from 1."""
+def _possible_actions(space: Space) -> str | None:
+    """Return the actions of a Discrete space in words, as users may count from 1."""
     if not isinstance(space, Discrete):
         return None
     first, last = int(space.start), int(space.start) + int(space.n) - 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -28,7 +28,26 @@ class Standing(NamedTuple):
     ended: bool
 
 
-class Tally:
+class Statistics(Protocol):
+    """Counts episodes.
+
+    Attributes:
+        returns: of the last episodes that ended, in any sub-environment.
+    """
+
+    returns: deque[float]
+
+    def begin(self, mask: np.ndarray | None) -> None:
+        """Count the episodes that begin in the sub-environments of a mask; None for all."""
+
+    def step(self, reward: Any, done: Any, which: np.ndarray | None) -> None:
+        """Count a step of some sub-environments, one row for each; None for all of them."""
+
+    def of(self, sub_env: int) -> Standing:
+        """Return where the episode of a sub-environment stands."""
+
+
+class EpisodeStatistics:
     """Counts the episodes of a single environment.
 
     Attributes:
@@ -43,7 +62,7 @@ class Tally:
         self._return = 0.0
         self._ended = False
 
-    def begin(self) -> None:
+    def begin(self, mask: np.ndarray | None = None) -> None:
         """Count an episode that begins; one without steps before it was none."""
         if self._step or not self._episode:
             self._episode += 1
@@ -51,7 +70,7 @@ class Tally:
         self._return = 0.0
         self._ended = False
 
-    def step(self, reward: float, done: bool) -> None:
+    def step(self, reward: float, done: bool, which: np.ndarray | None = None) -> None:
         """Count a step; what an environment does after an episode's end is no part of it."""
         if self._ended:
             return
@@ -66,22 +85,22 @@ class Tally:
         return Standing(self._episode, self._step, self._return, self._ended)
 
 
-class SubEnvTally:
+class VectorEpisodeStatistics:
     """Counts the episodes of many sub-environments.
 
     Attributes:
         returns: of the last episodes that ended, in any sub-environment.
     """
 
-    def __init__(self, sub_envs: int, mode: AutoresetMode) -> None:
+    def __init__(self, num_envs: int, mode: AutoresetMode) -> None:
         """Begin before the first episode of each sub-environment."""
         self.returns: deque[float] = deque(maxlen=_KEPT)
         self._mode = mode
-        self._episodes = np.zeros(sub_envs, dtype=np.int64)
-        self._steps = np.zeros(sub_envs, dtype=np.int64)
-        self._returns = np.zeros(sub_envs)
+        self._episodes = np.zeros(num_envs, dtype=np.int64)
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._returns = np.zeros(num_envs)
         # Sub-environments whose next step is a reset, or that wait for one.
-        self._ended = np.zeros(sub_envs, dtype=bool)
+        self._ended = np.zeros(num_envs, dtype=bool)
 
     def begin(self, mask: np.ndarray | None) -> None:
         """Count the episodes that begin in the sub-environments of a mask; None for all of them."""
@@ -94,18 +113,18 @@ class SubEnvTally:
         self._returns[sub_envs] = 0.0
         self._ended[sub_envs] = False
 
-    def step(self, reward: np.ndarray, ended: np.ndarray, sub_envs: np.ndarray | None) -> None:
+    def step(self, reward: np.ndarray, done: np.ndarray, which: np.ndarray | None) -> None:
         """Count a step of some sub-environments, one row for each; None for all of them."""
-        rows = slice(None) if sub_envs is None else sub_envs
+        rows = slice(None) if which is None else which
         again = self._ended[rows]
         self._steps[rows] += 1
         self._returns[rows] += reward
         if again.any():
-            begun = np.flatnonzero(again) if sub_envs is None else sub_envs[again]
+            begun = np.flatnonzero(again) if which is None else which[again]
             self._episodes[begun] += 1
             self._clear(begun)
-        if ended.any():
-            over = np.flatnonzero(ended) if sub_envs is None else sub_envs[ended]
+        if done.any():
+            over = np.flatnonzero(done) if which is None else which[done]
             self.returns.extend(self._returns[over].tolist())
             if self._mode is AutoresetMode.SAME_STEP:
                 self._episodes[over] += 1
@@ -123,13 +142,13 @@ class SubEnvTally:
         )
 
 
-def told(tally: Tally | SubEnvTally, sub_env: int) -> dict:
-    """Return as JSON values what watchers of a sub-environment are told of its episodes."""
-    standing = tally.of(sub_env)
+def facts_of(statistics: Statistics, sub_env: int) -> dict:
+    """Return the statistics of a sub-environment's episodes as JSON values for its watchers."""
+    standing = statistics.of(sub_env)
     return {
         "state": "ended" if standing.ended else "running",
         "episode": standing.episode,
         "step": standing.step,
         "return": standing.episode_return,
-        "returns": list(tally.returns),
+        "returns": list(statistics.returns),
     }

@@ -1,4 +1,4 @@
-"""Make an environment and what keeps it, here in this process."""
+"""Create instances whose environment runs in this process."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from gym_server.envs import make, vectorization, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
+from gym_server.instances.environment import Environment
 from gym_server.instances.instance import Instance
-from gym_server.instances.vector_instance import VectorInstance
+from gym_server.instances.local import LocalBackend
+from gym_server.instances.single import SingleEnvironment
+from gym_server.instances.vector import VectorEnvironment
 from gym_server.rendering.render_thread import RenderThread
 
 
@@ -20,9 +23,9 @@ def make_instance(
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
-    account: MemoryReservation,
+    reservation: MemoryReservation,
 ) -> Instance:
-    """Make an instance of what a client wants.
+    """Create an instance of what a client wants.
 
     Args:
         choices: what that is.
@@ -30,11 +33,11 @@ def make_instance(
         max_num_envs: how many sub-environments it may have.
         renderer: the process's render thread.
         undo: closes the environment when something goes wrong from here on.
-        account: what its memory is charged to.
+        reservation: what its memory is charged to.
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
-            and ``Instance``.
+            and ``LocalBackend``.
     """
     if choices.num_envs is None:
         env = make.make_env(
@@ -43,25 +46,29 @@ def make_instance(
             choices.kwargs or {},
             allowed_modules,
             choices.wrappers,
-            account,
+            reservation,
         )
         undo.push(_closing_quietly(renderer, env.close))
-        wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, account)
-        return Instance(wrapped, choices, renderer)
+        wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, reservation)
+        return _instance(SingleEnvironment(wrapped, choices, renderer), choices, renderer)
     sub_envs, mode = vectorization.make_vector_env(
-        choices, allowed_modules, max_num_envs, renderer, account
+        choices, allowed_modules, max_num_envs, renderer, reservation
     )
     undo.push(_closing_quietly(renderer, sub_envs.close))
-    return VectorInstance(sub_envs, mode, choices, renderer)
+    return _instance(VectorEnvironment(sub_envs, mode, choices, renderer), choices, renderer)
+
+
+def _instance(env: Environment, choices: EnvConfig, renderer: RenderThread) -> Instance:
+    return Instance(LocalBackend(env, choices, renderer), choices, renderer)
 
 
 def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:
-    def leave(kind: type | None, error: BaseException | None, *_: object) -> None:
-        # The render thread hangs in it, and must be left to that.
+    def close_it(kind: type | None, error: BaseException | None, *_: object) -> None:
+        # Where the render thread hangs in the environment, it must be left alone.
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
-        # What the client must hear of is why it gets no instance.
+        # The error for the client is the one that was raised, not one of closing.
         with contextlib.suppress(BaseException):
             renderer.run(close)
 
-    return leave
+    return close_it

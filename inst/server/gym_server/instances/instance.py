@@ -1,227 +1,139 @@
-"""One environment, its lock, and what the server knows of it."""
+"""One environment on the server, with its lock and its viewer, whatever runs it."""
 
 from __future__ import annotations
 
-import contextlib
 import threading
+import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-import gymnasium
-import numpy as np
-
-from gym_server import spaces
-from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.make import ask
-from gym_server.envs.wrappers import draws_when_stepped, time_limit
-from gym_server.errors import GymServerError, invalid_parameter, reset_needed
-from gym_server.instances.actions import ActionReader
-from gym_server.instances.episode_statistics import SubEnvTally, Tally, told
-from gym_server.instances.listed import Listed
-from gym_server.instances.lock import Hold
-from gym_server.json_values import plain
-from gym_server.monitoring.monitor import Monitor
+from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
+from gym_server.instances.backend import Backend, Seed
+from gym_server.instances.lock import InstanceLock
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.rendering.png import picture
+from gym_server.protocol.answers import Ready
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.viewing.observation_summary import entries
-from gym_server.viewing.viewer import Screen
+from gym_server.viewing.viewer import Viewer
+from gym_server.viewing.watchable import Moves
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
-class Instance(Listed):
-    """One environment.
+class Instance:
+    """One environment that a client has created.
 
-    Every method that moves the environment waits for its hold; one that waited while the
+    Every method that moves the environment waits for its lock; one that waited while the
     instance was being closed raises ``unknown_instance``, or why it was closed.
+
+    Attributes:
+        instance_id: given when the instance is listed, "" before.
+        lock: what a thread needs to move the environment, or to look at it.
+        viewer: shows it to watchers.
+        renderer: the process's render thread.
     """
 
-    def __init__(self, env: gymnasium.Env, choices: EnvConfig, renderer: RenderThread) -> None:
+    def __init__(self, backend: Backend, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
-        Raises:
-            GymServerError: ``unsupported_space``.
+        Args:
+            backend: what runs it.
+            choices: what its client wanted.
+            renderer: the process's render thread.
         """
-        self._env = env
-        self._learn_spaces()
-        self._sub_env_action_space_info = spaces.describe(self._sub_env_action_space)
-        self._sub_env_observation_space_info = spaces.describe(self._sub_env_observation_space)
-        self._actions = ActionReader(self._sub_env_action_space, self._sub_envs)
-        self._observes_tensors = spaces.travels_as_tensors(self._sub_env_observation_space)
-        # Whoever reads it can create another: with the module, and with the version found.
-        module, colon, name = str(choices.env_id).rpartition(":")
-        self.env_id = f"{module}{colon}{env.spec.id if env.spec else name}"
+        self.instance_id = ""
+        self._backend = backend
         self._choices = choices
         self.renderer = renderer
-        self.draws_when_stepped = self._find_out_whether_it_draws()
-        self.hold = Hold(self, renderer)
-        self._monitor: Monitor | None = None
-        self._seed_for_reset = choices.seed
-        self._was_reset = False
-        self._done = False
-        self._steps = 0
-        self._tally = self._make_tally()
-        self._observation: object = None
-        self.screen = Screen(self, (env.metadata or {}).get("render_fps"))
-        self._max_episode_steps = time_limit(env)
-        self._for_eyes = choices.render_mode == "human"
-        self._made = self.hold.used
-        if choices.seed is not None:
-            self._seed_actions(choices.seed)
+        self.lock = InstanceLock(
+            lambda: unknown_instance(self.instance_id), backend.clear_away, renderer
+        )
+        self.viewer = Viewer(self, backend.fps)
+        self._is_single = choices.num_envs is None
+        self._in_real_time = choices.render_mode == "human"
+        self._created = self.lock.used
 
-    def _learn_spaces(self) -> None:
-        self.action_space = self._sub_env_action_space = self._env.action_space
-        self.observation_space = self._sub_env_observation_space = self._env.observation_space
-
-    def _find_out_whether_it_draws(self) -> bool:
-        return draws_when_stepped(self._env)
-
-    def _make_tally(self) -> Tally | SubEnvTally:
-        return Tally()
-
-    def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
-        # One generator serves all sub-environments.
-        seeds = seed if isinstance(seed, tuple) else (seed,)
-        first = next((one for one in seeds if one is not None), None)
-        if first is not None:
-            self.action_space.seed(first)
-
-    @property
-    def action_space_info(self) -> dict:
-        """The description of the action space."""
-        return self._sub_env_action_space_info
-
-    @property
-    def observation_space_info(self) -> dict:
-        """The description of the observation space."""
-        return self._sub_env_observation_space_info
+    # Moves ----------------------------------------------------------------------------------
 
     def reset(
         self,
-        seed: int | tuple[int | None, ...] | None,
+        seed: Seed,
         options: dict | None,
         tensors: bool = False,
         mask: np.ndarray | None = None,
-    ) -> dict:
-        """Start an episode.
+    ) -> dict | Ready:
+        """Start an episode; in every sub-environment, or in those of a mask.
 
         Args:
             seed: seeds the environment and the action space; None leaves both as they are, or
-                takes the seed given at creation the first time.
+                takes the seed given at creation the first time. For sub-environments one for all,
+                each of which makes its own of it, or one for each.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
-            mask: for environments with sub-environments only.
+            mask: a boolean a sub-environment; None for all of them.
 
         Returns:
             ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
-            are wanted and its space can travel so.
+            are wanted and its space can travel so; with sub-environments a batch. ``Ready`` from
+            the process of an isolated environment.
 
         Raises:
-            GymServerError: ``invalid_parameter``, ``not_supported``; ``environment_error``.
+            GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
+                before the first reset); ``environment_error``.
         """
-        _refuse_mask("reset_mask", mask)
-        if isinstance(seed, tuple):
-            raise invalid_parameter("seed", seed, "an integer, 0 or greater")
-        if self._for_eyes:
-            self.screen.pace()
-        argument_limits.check_reset_options(self._env, options)
-        with self.hold:
-            reset = self._monitor.reset if self._monitor else self._env.reset
-            seed_to_use = self._seed_for_reset if seed is None else seed
-            self._was_reset = False
-            observation, info = ask(self._move, lambda: reset(seed=seed_to_use, options=options))
-            if seed is None:
-                self._seed_for_reset = None
-            else:
-                self.action_space.seed(seed)
-            self._was_reset = True
-            self._done = False
-            self._tally.begin()
-            self._observation = observation
-            return {
-                "observation": ask(self._encode, observation, tensors),
-                "info": ask(plain, info) if info else {},
-            }
+        if self._is_single:
+            _refuse_mask("reset_mask", mask)
+            if isinstance(seed, tuple):
+                raise invalid_parameter("seed", seed, "an integer, 0 or greater")
+        if self._in_real_time:
+            self.viewer.pace()
+        with self.lock:
+            return self._backend.reset(seed, options, tensors, mask)
 
     def step(
         self,
         action: object,
         tensors: bool = False,
         mask: np.ndarray | None = None,
-        for_eyes: bool = False,
-    ) -> dict:
-        """Take one step.
+        in_real_time: bool = False,
+    ) -> dict | Ready:
+        """Take one step; in every sub-environment, or in those of a mask.
 
         Args:
             action: the JSON value of an action, or the action as ``Parts``; the bounds of a
-                Box are the environment's affair.
-            tensors: whether the observation is wanted as tensors.
-            mask: for environments with sub-environments only.
-            for_eyes: whether people want to see it: not faster than in real time, then, while
+                Box are the environment's affair. With sub-environments a list of one JSON value
+                for each that steps, or a batch as ``Parts``.
+            tensors: whether the answer is wanted as tensors.
+            mask: a boolean a sub-environment; None for all of them.
+            in_real_time: whether people want to see it: not faster than in real time, then, while
                 somebody watches.
 
         Returns:
             ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
-            values; the observation as for ``reset()``.
+            values; the observation as for ``reset()``. With sub-environments one row for each
+            that stepped: arrays where the observation is ``Parts``, else lists. When
+            sub-environments ended and were reset at once also ``final_obs``, a batch of their last
+            observations, and ``final_sub_envs``, the rows that they are.
 
         Raises:
-            GymServerError: ``reset_needed``, ``action_not_in_space`` or ``not_supported``, each
-                before the environment moves; ``environment_error``.
+            GymServerError: ``reset_needed`` (also for a sub-environment that ended and is not
+                reset by itself), ``action_not_in_space``, ``invalid_parameter`` or
+                ``not_supported``, each before the environment moves; ``environment_error``.
         """
-        _refuse_mask("step_mask", mask)
-        if for_eyes or self._for_eyes:
-            self.screen.pace()
-        with self.hold:
-            if not self._was_reset:
-                raise reset_needed("step()")
-            decoded = self._actions.read(action)
-            try:
-                return ask(self._step, decoded, tensors)
-            except GymServerError as failure:
-                self._actions.explain(failure, action)
-                raise
-
-    def _step(self, action: object, tensors: bool) -> dict:
-        step = self._monitor.step if self._monitor else self._env.step
-        observation, reward, terminated, truncated, info = self._move(step, action)
-        terminated, truncated = bool(terminated), bool(truncated)
-        reward = float(reward)
-        self._steps += 1
-        self._done = terminated or truncated
-        self._tally.step(reward, self._done)
-        self._observation = observation
-        return {
-            "observation": self._encode(observation, tensors),
-            "reward": reward,
-            "done": self._done,
-            "terminated": terminated,
-            "truncated": truncated,
-            # Converted while the environment cannot change it.
-            "info": plain(info) if info else {},
-        }
-
-    def _move(self, move: Callable, *args: object) -> tuple:
-        self._tell_of_move()
-        if self.draws_when_stepped:
-            return self.renderer.run(move, *args)
-        return move(*args)
-
-    def _encode(self, observation: object, tensors: bool) -> object:
-        if tensors and self._observes_tensors:
-            return spaces.encode_tensors(self.observation_space, "observation", observation)
-        return spaces.encode(self.observation_space, observation)
+        if mask is not None and self._is_single:
+            _refuse_mask("step_mask", mask)
+        if in_real_time or self._in_real_time:
+            self.viewer.pace()
+        with self.lock:
+            return self._backend.step(action, tensors, mask)
 
     def sample_action(self) -> object:
-        """Draw an action from the action space's own generator."""
-        with self.hold:
-            return spaces.encode(self.action_space, self.action_space.sample())
+        """Draw an action, for each sub-environment, from the action space's own generator."""
+        with self.lock:
+            return self._backend.sample_action()
 
-    def action_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``spaces.contains()``."""
-        return spaces.contains(self.action_space, self.action_space_info, claim)
-
-    def observation_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``spaces.contains()``."""
-        return spaces.contains(self.observation_space, self.observation_space_info, claim)
+    # Looks ----------------------------------------------------------------------------------
 
     def render(self, sub_env: int = 0) -> np.ndarray:
         """Draw the current state of a sub-environment; see ``png.picture()`` for the array.
@@ -230,159 +142,159 @@ class Instance(Listed):
             GymServerError: ``cannot_render``, ``reset_needed``, ``invalid_parameter``.
         """
         self.check_sub_env(sub_env)
-        with self.hold:
-            return self._picture(sub_env)
+        with self.lock:
+            return self._backend.render(sub_env)
 
-    def _picture(self, sub_env: int) -> np.ndarray:
-        if self._env.render_mode != "rgb_array":
-            raise GymServerError(
-                "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
-            )
-        if not self._was_reset:
-            raise reset_needed("render()")
-        frame = ask(self._draw, sub_env)
-        try:
-            return picture(frame)
-        except ValueError as error:
-            raise GymServerError(
-                "cannot_render", f"What {self.env_id} draws is no picture: {error}"
-            ) from error
+    def check_sub_env(self, sub_env: int) -> None:
+        """Raise ``invalid_parameter`` for a sub-environment that does not exist."""
+        num_envs = self._choices.num_envs or 1
+        if sub_env >= num_envs:
+            last = f"an integer from 0 to {num_envs - 1}" if num_envs > 1 else "0"
+            raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
 
+    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
+        return self._backend.look(sub_env)
+
+    @property
+    def moves(self) -> Moves:
+        """How often the environment has begun to move."""
+        return self._backend.moves
+
+    @property
+    def draws_when_stepped(self) -> bool:
+        """Whether its steps run on the render thread."""
+        return self._backend.draws_when_stepped
+
+    @property
     def draws_on_render_thread(self) -> bool:
-        """Tell whether a picture takes the render thread."""
-        return self._env.render_mode == "rgb_array"
+        """Whether its frames are drawn on the render thread."""
+        return self._backend.draws_on_render_thread
 
-    def _draw(self, sub_env: int) -> object:
-        return self.renderer.run(self._env.render)
+    # At any time ----------------------------------------------------------------------------
+
+    @property
+    def env_id(self) -> str:
+        """What the environment can be created by again."""
+        return self._backend.env_id
+
+    @property
+    def action_space_info(self) -> dict:
+        """The description of the action space, of sub-environments that of the batched one."""
+        return self._backend.action_space_info
+
+    @property
+    def observation_space_info(self) -> dict:
+        """The description of the observation space, batched as for actions."""
+        return self._backend.observation_space_info
+
+    def action_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; a value has an entry for each sub-environment."""
+        return self._backend.action_contains(claim)
+
+    def observation_contains(self, claim: dict) -> bool:
+        """Answer a client's "contains"; a value has an entry for each sub-environment."""
+        return self._backend.observation_contains(claim)
+
+    def list_entry(self) -> dict:
+        """Return what the list of instances shows of it."""
+        now = time.monotonic()
+        return {
+            "instance_id": self.instance_id,
+            "env_id": self.env_id,
+            "name": self._choices.name,
+            "num_envs": self._choices.num_envs,
+            "age_seconds": now - self._created,
+            "idle_seconds": now - self.lock.used,
+            "steps": self._backend.steps,
+            "watched": self.viewer.is_watched,
+        }
+
+    def about(self) -> dict:
+        """Return all that is known of the instance, without waiting for its environment."""
+        about = self._backend.about()
+        entry = self.list_entry()
+        # The backend of an isolated environment answers with an entry of its own, which does not
+        # count: it knows neither the id nor the watchers.
+        return {**entry, **about, **entry}
+
+    @property
+    def busy_since(self) -> float | None:
+        """Since when a call has waited for the environment, in the clock's seconds, or None."""
+        since = (self.lock.busy_since, self._backend.busy_since)
+        return min((one for one in since if one is not None), default=None)
+
+    # Monitors -------------------------------------------------------------------------------
 
     def start_monitor(
         self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
         """Record the episodes that start from now on; see ``Monitor``."""
-        with self.hold:
-            if self._monitor is not None:
-                raise GymServerError(
-                    "monitor_active",
-                    f"Instance {self.instance_id} is already monitored",
-                    "close that monitor first",
-                )
-            self._monitor = Monitor.start(
-                self._env,
-                root,
-                directory,
-                self.instance_id,
-                force,
-                resume,
-                video_every,
-                self.renderer,
+        if not self._is_single:
+            raise GymServerError(
+                "not_supported",
+                f"Instance {self.instance_id} has sub-environments, and a monitor records single "
+                "environments",
+                "create it without num_envs",
+            )
+        with self.lock:
+            self._backend.start_monitor(
+                self.instance_id, root, directory, force, resume, video_every
             )
 
     def close_monitor(self) -> None:
         """Stop recording and finish the files, if it is recorded."""
-        with self.hold:
-            if self._monitor is not None:
-                self._finish_monitor()
+        with self.lock:
+            self._backend.close_monitor()
 
-    def close(self) -> None:
-        """Finish the monitor and close the environment; whoever waits learns that it is gone."""
-        with self.hold:
-            self.hold.closed = True
-            self.screen.end(self.hold.gone())
-            try:
-                if self._monitor is not None:
-                    self._finish_monitor()
-            finally:
-                ask(self._close_env)
+    # Beginning and end ----------------------------------------------------------------------
 
-    def condemn(self, why: GymServerError) -> int | None:
-        """Give the instance up: a call on it has taken too long.
+    def stay(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Know that the instance is listed now.
 
         Args:
-            why: what everybody hears who waits for it.
+            on_end: called with the reason when the environment's process ends by itself.
+        """
+
+        def end(why: GymServerError) -> None:
+            self.viewer.end(why)
+            on_end(why)
+
+        self._backend.stay(end)
+
+    def close(self) -> None:
+        """Finish the monitor and close the environment; waiting calls get an error."""
+        with self.lock:
+            why = self.lock.refusal()
+            self.lock.closed = True
+            self.viewer.end(why)
+            self._backend.close(why)
+
+    def abandon(self, why: GymServerError) -> int | None:
+        """Close the instance without waiting for its lock: a call on it has taken too long.
+
+        Args:
+            why: the error for every call that waits for the instance.
 
         Returns:
             The thread that is stuck in the environment and cannot answer for itself, or None.
         """
-        stuck = self.hold.condemn(why)
-        self.screen.end(why)
-        self._end_processes()
+        if self._backend.can_be_killed:
+            self._backend.kill(why)
+            self.viewer.end(why)
+            return None
+        stuck = self.lock.abandon(why)
+        self.viewer.end(why)
+        self._backend.kill(why)
         if stuck is None:
-            # It has just come back.
+            # The call has just come back.
             threading.Thread(target=self._clear_away_when_free, daemon=True).start()
             return None
-        return None if self.renderer.give_up(stuck, why) else stuck
+        return None if self.renderer.abandon(stuck, why) else stuck
 
     def _clear_away_when_free(self) -> None:
-        with self.hold.when_free():
-            self.clear_away()
-
-    def clear_away(self) -> None:
-        """Close what was condemned, once the call that took too long has come back."""
-        with contextlib.suppress(BaseException):
-            if self._monitor is not None:
-                self._finish_monitor()
-        with contextlib.suppress(BaseException):
-            self._close_env()
-
-    def _end_processes(self) -> None:
-        """End the processes that the environment runs in, which ends what hangs in them."""
-
-    def _close_env(self) -> None:
-        self.renderer.run(self._env.close)
-
-    def _finish_monitor(self) -> None:
-        monitor, self._monitor = self._monitor, None
-        monitor.close()
-
-    def about(self) -> dict:
-        """Return all that is known of the instance, without waiting for its environment."""
-        spec = self._env.spec
-        monitor = self._monitor
-        return {
-            **self.line(),
-            "observation_space": self._sub_env_observation_space_info,
-            "action_space": self._sub_env_action_space_info,
-            "reward_threshold": spec.reward_threshold if spec else None,
-            "max_episode_steps": self._max_episode_steps,
-            "render_fps": plain((self._env.metadata or {}).get("render_fps")),
-            "vectorization_mode": None,
-            "autoreset_mode": None,
-            "render_mode": self._choices.render_mode or self._env.render_mode,
-            "kwargs": self._choices.kwargs or {},
-            "wrappers": [wrapper._asdict() for wrapper in self._choices.wrappers],
-            "seed": self._choices.seed,
-            "episode_steps": self._tally.of(0).step,
-            "needs_reset": self._done or not self._was_reset,
-            "monitor": monitor.about() if monitor else None,
-            "isolated": False,
-        }
-
-    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a sub-environment; whoever calls it has the hold.
-
-        Returns:
-            JSON values, among them the observation where there is no picture and the reason
-            why there is none; the picture or None.
-        """
-        facts = {
-            "env_id": self.env_id,
-            "sub_env": sub_env,
-            "num_envs": self._num_envs,
-            **told(self._tally, sub_env),
-            "reward_threshold": getattr(self._env.spec, "reward_threshold", None),
-            "steps": self._steps,
-            "fps": self.screen.fps if self._for_eyes else None,
-        }
-        if not self._was_reset:
-            return {**facts, "state": "not_reset"}, None
-        try:
-            return facts, self._picture(sub_env)
-        except GymServerError as refusal:
-            reason = {"why_no_picture": refusal.message, "hint": refusal.hint}
-            return {**facts, **reason, "observation": entries(self._observed(sub_env))}, None
-
-    def _observed(self, sub_env: int) -> object:
-        return self._observation
+        with self.lock.when_free():
+            self._backend.clear_away()
 
 
 def _refuse_mask(name: str, mask: np.ndarray | None) -> None:

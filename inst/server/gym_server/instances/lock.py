@@ -1,143 +1,148 @@
-"""The right to move an environment, or to look at it while it stands still."""
+"""The lock of an instance: one thread at a time moves the environment, or looks at it."""
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-from gym_server.errors import GymServerError, unknown_instance
-
-if TYPE_CHECKING:
-    from gym_server.instances.instance import Instance
-    from gym_server.rendering.render_thread import RenderThread
+from gym_server.errors import GymServerError
+from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads.in_progress import InProgress
 
 
-# Longer than it takes to send a short answer to somebody who does not read.
-SETTLED_SECONDS = 5.0
-
-
-class Hold:
-    """What one thread at a time has; a context for those that move the environment.
+class InstanceLock:
+    """A lock that can be taken away from a thread that is stuck; a context for moves.
 
     Attributes:
         closed: whether the environment is gone.
-        why: the reason, for those who still ask for it; None where its owner closed it.
-        used: when it was last moved, in the clock's seconds.
+        why: why the server closed it; None while it is open, or where its owner closed it.
+        used: when the environment was last moved, in the clock's seconds.
         watched: when somebody was last found to watch it, in the clock's seconds.
     """
 
-    def __init__(self, instance: Instance, renderer: RenderThread | None = None) -> None:
-        """Belong to nobody yet.
+    def __init__(
+        self,
+        unknown: Callable[[], GymServerError],
+        clear_away: Callable[[], None],
+        renderer: RenderThread | None = None,
+    ) -> None:
+        """Make a lock that no thread has.
 
         Args:
-            instance: what it is the right to.
-            renderer: where those who have it may have to wait for their turn.
+            unknown: returns the error for an environment that its owner closed.
+            clear_away: closes the environment; called in a thread that comes back after the lock
+                was taken away from it.
+            renderer: the render thread that threads with the lock may wait for.
         """
-        self._instance = instance
+        self._unknown = unknown
+        self._clear_away = clear_away
         self._renderer = renderer
         self._lock = threading.Lock()
-        # Who has it, since when. Whoever takes the entry out, which only one thread can, is the
-        # one to release the lock.
-        self._held: dict[int, float] = {}
+        # The thread that has the lock, and since when. The thread that ends this work, its own or
+        # the watchdog's, releases the lock.
+        self._held: InProgress[int, float] = InProgress()
+        self._abandoned: int | None = None
         self.closed = False
         self.why: GymServerError | None = None
         self.used = time.monotonic()
         self.watched = 0.0
-        self._settled = threading.Event()
 
     def __enter__(self) -> None:
-        """Wait for it.
+        """Wait for the lock, to move the environment.
 
         Raises:
-            GymServerError: when the environment was closed meanwhile, ``gone()``.
+            GymServerError: when the environment was closed meanwhile, see ``refusal()``.
         """
         self._lock.acquire()
         self.used = now = time.monotonic()
-        self._held[threading.get_ident()] = now
+        self._held.begin(threading.get_ident(), now)
         if self.closed:
             self._refuse()
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.used = time.monotonic()
-        self._let_go(error)
+        self._release(error)
 
-    def take(self, seconds: float) -> bool:
-        """Have it to look only, which is no use of the environment.
+    def acquire(self, timeout: float) -> bool:
+        """Take the lock only to look, which does not count as using the environment.
 
         Args:
-            seconds: how long to wait for it.
+            timeout: how long to wait for it, in seconds.
 
         Returns:
-            Whether the caller has it now, and must ``give_back()``.
+            Whether the caller has the lock now, and must ``release()`` it.
 
         Raises:
-            GymServerError: as to move it.
+            GymServerError: when the environment was closed meanwhile, see ``refusal()``.
         """
-        taken = self._lock.acquire(timeout=seconds)
-        if taken:
-            self._held[threading.get_ident()] = time.monotonic()
+        acquired = self._lock.acquire(timeout=timeout)
+        if acquired:
+            self._held.begin(threading.get_ident(), time.monotonic())
             if self.closed:
                 self._refuse()
-        return taken
+        return acquired
 
-    def give_back(self) -> None:
-        """End the look."""
-        self._let_go(None)
+    def release(self) -> None:
+        """Release the lock after ``acquire()``."""
+        self._release(None)
 
     @property
     def busy_since(self) -> float | None:
-        """Since when somebody has it and does something with it, or None.
+        """Since when the thread with the lock has been working, in the clock's seconds, or None.
 
-        Whoever waits for the render thread has not begun.
+        The work of a thread that waits for the render thread has not begun.
         """
-        for thread, since in tuple(self._held.items()):
+        for thread, since in self._held.items():
             began = self._renderer.began(thread) if self._renderer else None
             return since if began is None else began
         return None
 
-    def condemn(self, why: GymServerError) -> int | None:
-        """Take it away from whoever has it, for good.
+    def abandon(self, why: GymServerError) -> int | None:
+        """Close the environment, and take the lock away from the thread that has it.
 
         Args:
-            why: what everybody hears who wants it from now on, or waits for it.
+            why: the error for every thread that waits for the lock, or will.
 
         Returns:
-            The thread that had it, which will hear of it when it comes back; None when nobody
-            had it.
+            The thread that had the lock, which gets the error when it comes back; None when no
+            thread had it.
         """
         self.why, self.closed = why, True
-        for thread in tuple(self._held):
-            if self._held.pop(thread, None) is not None:
+        for thread, _ in self._held.items():
+            if self._held.abandon(thread):
+                self._abandoned = thread
                 self._lock.release()
                 return thread
         return None
 
-    def gone(self) -> GymServerError:
-        """Return what to tell whoever asks for an environment that is gone."""
-        return self.why.again() if self.why else unknown_instance(self._instance.instance_id)
+    def answered(self) -> None:
+        """Let the thread go on from which the lock was taken, as it was answered for."""
+        if self._abandoned is not None:
+            self._held.answered(self._abandoned)
 
-    def settle(self) -> None:
-        """Say that what was condemned was answered for: its thread may go on to other things."""
-        self._settled.set()
+    def refusal(self) -> GymServerError:
+        """Return the error for calls on an environment that is gone."""
+        return self.why.again() if self.why else self._unknown()
 
     def when_free(self) -> threading.Lock:
-        """Return the bare lock, for what happens after the end."""
+        """Return the bare lock, for what is done after the end."""
         return self._lock
 
-    def _let_go(self, error: object) -> None:
-        if self._held.pop(threading.get_ident(), None) is not None:
+    def _release(self, error: object) -> None:
+        thread = threading.get_ident()
+        if self._held.finish(thread):
             self._lock.release()
             return
-        # Condemned meanwhile. When it is the render thread that hangs in the environment, it
-        # must be left to that.
+        # The lock was taken away from this thread meanwhile. Where the error is the reason for
+        # that, the render thread is the one that hangs in the environment, and the environment
+        # must be left to it.
         if error is not self.why:
-            self._instance.clear_away()
-        # Else the answer that is given on its behalf might go to its next request.
-        self._settled.wait(SETTLED_SECONDS)
-        raise self.gone()
+            self._clear_away()
+        self._held.wait_until_answered(thread)
+        raise self.refusal()
 
     def _refuse(self) -> None:
-        if self._held.pop(threading.get_ident(), None) is not None:
+        if self._held.finish(threading.get_ident()):
             self._lock.release()
-        raise self.gone()
+        raise self.refusal()

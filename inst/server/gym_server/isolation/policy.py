@@ -1,6 +1,6 @@
 """Which environments get a process of their own, and why not all or none.
 
-A thread cannot be ended, and code in C that crashes, or ``os._exit``, ends its whole process. So
+A thread cannot be killed, and code in C that crashes, or ``os._exit``, ends its whole process. So
 what is not trusted needs a process. Gymnasium's own environments and ale_py's do not do that, and
 in the server's process they are faster and need no memory of their own; an environment that an
 operator allowed by ``--allow-module`` may be anybody's first one. Hence "foreign". One process
@@ -19,7 +19,7 @@ single steps a second from R           420             384 (9.6 % lost)
 steps of 1,024 sub-environments a second from R   235,000         203,000 (14.5 % lost)
 =====================================  ==============  =====================  ================
 
-(Rates: medians of 60 interleaved rounds of 300 and 60 calls, and of the ratios of their pairs;
+(Rates: medians of 60 interleaved runs of 300 and 60 calls, and of the ratios of their pairs;
 six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the sub-environments'.
 Waking another process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a
 step does so twice; with an environment that takes its time itself the share is smaller.)
@@ -31,12 +31,13 @@ import logging
 import math
 import threading
 from collections.abc import Collection
+from typing import cast
 
 from gymnasium import error
 
 from gym_server.envs import registry
 from gym_server.errors import GymServerError, call_too_long, shutting_down
-from gym_server.isolation.worker import Surroundings, list_registry
+from gym_server.isolation.worker import WorkerSettings, list_registry
 from gym_server.processes.worker_process import WorkerProcess
 
 log = logging.getLogger(__name__)
@@ -45,7 +46,7 @@ MODES = ("none", "foreign", "all")
 
 
 class Isolation:
-    """Says what runs where, and what processes are told.
+    """Decides which environments get a process, and what the processes know of the server.
 
     Attributes:
         mode: one of ``MODES``.
@@ -66,31 +67,33 @@ class Isolation:
         """Tell whether an environment gets a process, without importing its module.
 
         Args:
-            env_id: what is to be made; also nonsense, which gets none.
+            env_id: what is to be created; whatever is no id gets no process.
             allowed_modules: names of the modules that an env_id may import.
         """
-        # Looking for what is near one that is too long would take minutes.
-        is_id = isinstance(env_id, str) and len(env_id) <= registry.LONGEST_ID
-        if self.mode == "none" or not is_id:
+        # Looking for ids that resemble a very long one would take minutes.
+        if self.mode == "none" or not isinstance(env_id, str) or len(env_id) > registry.LONGEST_ID:
             return False
         module, colon, name = env_id.rpartition(":")
         if colon and module not in allowed_modules:
             return False
         return self.mode == "all" or _is_foreign(module or _home(name, allowed_modules))
 
-    def surroundings(
+    def settings(
         self,
         env_id: object,
         allowed_modules: Collection[str],
         max_num_envs: int,
         memory: float = math.inf,
-    ) -> Surroundings:
-        """Return what the process of an environment is told; see ``Surroundings``."""
+    ) -> WorkerSettings:
+        """Return what the process of an environment is to know; see ``WorkerSettings``."""
         allowed = frozenset(allowed_modules)
-        # An id of the registry's list has no module, and any of them may have registered it.
-        bare = isinstance(env_id, str) and ":" not in env_id
-        imported = allowed if bare and _home(env_id, allowed) is _UNKNOWN else frozenset()
-        return Surroundings(
+        # An id from the registry's list names no module, and any of the modules may have
+        # registered it.
+        is_unknown = (
+            isinstance(env_id, str) and ":" not in env_id and _home(env_id, allowed) is _UNKNOWN
+        )
+        imported = allowed if is_unknown else frozenset()
+        return WorkerSettings(
             allowed, imported, max_num_envs, memory, self._max_mb, logging.getLogger().level
         )
 
@@ -105,7 +108,7 @@ class Isolation:
             seconds: how long that may take; 0 for as long as it takes.
         """
         try:
-            # One at a time: everybody may ask, and each takes a process.
+            # One at a time: anybody may search, and each search takes a process.
             if not self._searching.acquire(timeout=seconds or -1):
                 raise _search_too_long(seconds)
             try:
@@ -122,7 +125,7 @@ class Isolation:
         worker = WorkerProcess(
             list_registry,
             text,
-            self.surroundings(None, allowed_modules, 0),
+            self.settings(None, allowed_modules, 0),
             on_end=lambda why: None,
             hint="",
         )
@@ -131,10 +134,10 @@ class Isolation:
         if seconds:
             overdue.start()
         try:
-            return worker.first_result().value
+            return cast(list[dict], worker.first_result().value)
         finally:
             overdue.cancel()
-            # It has no more to say, and a thread of a module's would keep it.
+            # It has answered, and a thread that a module has started could keep it from ending.
             worker.kill(shutting_down())
 
 
@@ -152,7 +155,7 @@ def _home(name: str, allowed_modules: Collection[str]) -> str:
     try:
         spec = registry.look_up(name)
     except (error.NameNotFound, error.NamespaceNotFound, error.VersionNotFound):
-        # One of these may register it, and the server's process does not import them.
+        # One of the modules may register it, and the server's process does not import them.
         return _UNKNOWN if allowed_modules else ""
     except (error.Error, GymServerError):
         return ""

@@ -1,7 +1,7 @@
-"""The process of an isolated environment: it makes it and does what the server asks.
+"""The process of an isolated environment: it creates it and does what the server asks.
 
-The environment's own ``Instance`` lives here, with its render thread and its monitor; the server
-has an ``IsolatedInstance`` in its place.
+The process has an ordinary ``Instance`` of the environment, with a render thread and a monitor of
+its own; the server has an ``Instance`` with a ``WorkerBackend``, which asks this one.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from gym_server.budget import Budget
 from gym_server.envs import registry
@@ -41,14 +44,14 @@ start.preload(__name__)
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """What a process is told at its start.
+class WorkerSettings:
+    """What a process is to know of the server.
 
     Attributes:
         allowed_modules: names of the modules that an env_id may import.
-        imported: those that are imported before anything is made.
+        imported: those that are imported before anything is created.
         max_num_envs: how many sub-environments an environment may have.
-        memory: how many bytes it may be estimated to take; see ``memory_estimate``.
+        memory: how many bytes the environment may be estimated to take; see ``memory_estimate``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -61,57 +64,59 @@ class Surroundings:
     log_level: int = logging.WARNING
 
 
-def keep_instance(
-    moves: Connection, questions: Connection, choices: EnvConfig, surroundings: Surroundings
+def serve_instance(
+    moves: Connection, questions: Connection, choices: EnvConfig, settings: WorkerSettings
 ) -> None:
-    """Make an environment and serve it until it is closed.
+    """Create an environment and serve it until it is closed.
 
-    What keeps this process from its end then, a thread of the environment's or an exit handler,
-    is ended by the server.
+    Where a thread of the environment's or an exit handler keeps this process from ending then,
+    the server kills it.
 
     Args:
-        moves: asks for one move or look after the other; the first answer is how it was made.
-        questions: asks what can be said while it moves.
+        moves: brings one call after the other that needs the environment's lock; the first answer
+            is about its creation.
+        questions: brings calls that can be answered while the environment moves.
         choices: what the client wants.
-        surroundings: what is to be known of the server.
+        settings: what is to be known of the server.
     """
-    _settle(surroundings)
-    asked = _Asked(choices, surroundings)
-    channel = Pipe(moves)
-    _answer(channel, 0, asked.make)
-    if asked.instance is not None:
-        threading.Thread(target=_serve, args=(Pipe(questions), asked), daemon=True).start()
-        _serve(channel, asked)
+    _set_up_process(settings)
+    methods = _Methods(choices, settings)
+    pipe = Pipe(moves)
+    _answer(pipe, 0, methods.create)
+    if methods.is_created:
+        threading.Thread(target=_serve, args=(Pipe(questions), methods), daemon=True).start()
+        _serve(pipe, methods)
 
 
 def list_registry(
-    answers: Connection, _: Connection, search: str | None, surroundings: Surroundings
+    answers: Connection, _: Connection, search: str | None, settings: WorkerSettings
 ) -> None:
     """Answer what can be created with the allowed modules."""
-    _settle(surroundings)
-    _answer(Pipe(answers), 0, partial(registry.search, search, surroundings.allowed_modules))
+    _set_up_process(settings)
+    _answer(Pipe(answers), 0, partial(registry.search, search, settings.allowed_modules))
 
 
-def _settle(surroundings: Surroundings) -> None:
-    """Become a process that ends with the server, and when the server says so."""
+def _set_up_process(settings: WorkerSettings) -> None:
+    """Become a process that ends with the server, logs as it does, and has a memory limit."""
     if hasattr(os, "setsid"):
-        # What the environment starts can be ended with it, and Ctrl-C is the server's affair.
+        # The processes that the environment starts can be killed with it, and Ctrl-C reaches the
+        # server only.
         os.setsid()
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     start.exit_with_parent(group=True)
     logging.basicConfig(
-        level=surroundings.log_level,
+        level=settings.log_level,
         stream=sys.stderr,
         format="%(asctime)s %(levelname)s %(name)s (process %(process)d): %(message)s",
     )
     logging.captureWarnings(True)
     with contextlib.suppress(OSError, ValueError, AttributeError):
-        # A crash in C says where it was.
+        # A crash in C prints where it happened.
         faulthandler.enable()
-    if surroundings.max_mb:
-        _limit_memory(surroundings.max_mb * 2**20)
+    if settings.max_mb:
+        _limit_memory(settings.max_mb * 2**20)
 
 
 def _limit_memory(size: int) -> None:
@@ -121,17 +126,17 @@ def _limit_memory(size: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (size, size))
 
 
-def _serve(channel: Pipe, asked: _Asked) -> None:
-    while not asked.is_closed:
+def _serve(pipe: Pipe, methods: _Methods) -> None:
+    while not methods.is_closed:
         try:
-            number, method, args = read_call(channel.receive())
+            number, method, args = read_call(pipe.receive())
         except (EOFError, OSError):
-            # The server let go of it, or is gone.
+            # The server has closed its end, or is gone.
             os._exit(1)
-        _answer(channel, number, getattr(asked, method), *args)
+        _answer(pipe, number, getattr(methods, method), *args)
 
 
-def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
+def _answer(pipe: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
         if isinstance(result, answers.Answer):
@@ -143,7 +148,7 @@ def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
     except BaseException as error:
         message = refusal_message(number, answer_to(error)[1])
     try:
-        channel.send(message)
+        pipe.send(message)
     except (OSError, ValueError):
         os._exit(1)
 
@@ -151,84 +156,88 @@ def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
 @dataclass(frozen=True)
 class _Look:
     facts: object
-    frame: object
+    frame: np.ndarray | None
 
 
-class _Asked:
-    """What the server can ask for, by name."""
+class _Methods:
+    """The methods that the server can call, by name."""
 
-    def __init__(self, choices: EnvConfig, surroundings: Surroundings) -> None:
+    _instance: Instance
+
+    def __init__(self, choices: EnvConfig, settings: WorkerSettings) -> None:
         self._choices = choices
-        self._surroundings = surroundings
-        self.instance: Instance | None = None
+        self._settings = settings
+        self.is_created = False
         self.is_closed = False
 
-    def make(self) -> dict:
-        for module in self._surroundings.imported:
+    def create(self) -> dict:
+        for module in self._settings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
-        account = MemoryReservation(Budget(self._surroundings.memory), self._choices.num_envs or 1)
+        reservation = MemoryReservation(Budget(self._settings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make_instance(
                 self._choices,
-                self._surroundings.allowed_modules,
-                self._surroundings.max_num_envs,
+                self._settings.allowed_modules,
+                self._settings.max_num_envs,
                 RenderThread(),
                 undo,
-                account,
+                reservation,
             )
             undo.pop_all()
-        self.instance = instance
+        self._instance = instance
+        self.is_created = True
         return {
-            "fps": instance.screen.fps,
+            "fps": instance.viewer.fps,
             "about": instance.about(),
-            "memory": account.taken,
+            "memory": reservation.taken,
         }
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: object) -> answers.Answer:
-        return answers.answer(self.instance.reset(*args), None)
+    def reset(self, *args: Any) -> answers.Answer:
+        return answers.answer(self._instance.reset(*args), None)
 
-    def step(self, *args: object) -> answers.Answer:
-        return answers.answer(self.instance.step(*args), None)
+    def step(self, *args: Any) -> answers.Answer:
+        return answers.answer(self._instance.step(*args), None)
 
     def sample_action(self) -> object:
-        return self.instance.sample_action()
+        return self._instance.sample_action()
 
     def render(self, sub_env: int) -> _Look:
-        return _Look(None, self.instance.render(sub_env))
+        return _Look(None, self._instance.render(sub_env))
 
     def look(self, sub_env: int) -> _Look:
-        return _Look(*self.instance.look(sub_env))
+        return _Look(*self._instance.look(sub_env))
 
-    def start_monitor(self, instance_id: str, path: Path, *args: object) -> None:
-        self.instance.instance_id = instance_id
-        self.instance.start_monitor(_Resolved(path), *args)
+    def start_monitor(self, instance_id: str, path: Path, *args: Any) -> None:
+        self._instance.instance_id = instance_id
+        root: Any = _Resolved(path)
+        self._instance.start_monitor(root, *args)
 
     def close_monitor(self) -> None:
-        self.instance.close_monitor()
+        self._instance.close_monitor()
 
     def close(self) -> None:
         self.is_closed = True
-        self.instance.close()
+        self._instance.close()
 
     # While it moves -------------------------------------------------------------------------
 
     def about(self) -> dict:
-        return self.instance.about()
+        return self._instance.about()
 
     def action_space_info(self) -> dict:
-        return self.instance.action_space_info
+        return self._instance.action_space_info
 
     def observation_space_info(self) -> dict:
-        return self.instance.observation_space_info
+        return self._instance.observation_space_info
 
     def action_contains(self, claim: dict) -> bool:
-        return self.instance.action_contains(claim)
+        return self._instance.action_contains(claim)
 
     def observation_contains(self, claim: dict) -> bool:
-        return self.instance.observation_contains(claim)
+        return self._instance.observation_contains(claim)
 
 
 class _Resolved:
@@ -237,5 +246,5 @@ class _Resolved:
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def claim(self, directory: str, *how: object) -> MonitorFiles:
+    def claim(self, directory: str, *how: Any) -> MonitorFiles:
         return claim(self._path, directory, *how)

@@ -1,4 +1,4 @@
-"""The environments that clients made, by instance_id."""
+"""Creates, lists, closes and evicts the environments of all clients."""
 
 from __future__ import annotations
 
@@ -19,42 +19,40 @@ from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
-from gym_server.instances.lock import SETTLED_SECONDS
-from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.isolation.policy import Isolation
+from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.limits import Limits, Room
-from gym_server.manager.tombstones import Departed
+from gym_server.manager.tombstones import Tombstones
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt
 
 log = logging.getLogger(__name__)
 
 
 class _Share(NamedTuple):
-    """What an environment takes of what there is for all, until it is gone."""
+    """What an environment takes of what all share, until it is gone."""
 
     room: Room
-    account: MemoryReservation
+    reservation: MemoryReservation
 
 
-@dataclass
-class _Making:
-    """An environment that is being made.
+@dataclass(eq=False)
+class _Creation:
+    """An environment that is being created.
 
     Attributes:
         choices: what its client wants.
-        share: what it takes of what there is for all.
-        condemn: ends what the making thread waits for, so that it answers for itself; None
-            where that cannot be done.
+        share: what it takes of what all share.
+        kill: kills the process that the creating thread waits for, so that the thread answers for
+            itself; None where there is no such process.
         began: in the clock's seconds.
-        settled: whether it was answered for, once it is given up.
     """
 
     choices: EnvConfig
     share: _Share
-    condemn: Callable[[GymServerError], None] | None = None
+    kill: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
-    settled: threading.Event = field(default_factory=threading.Event)
 
     def too_long(self, seconds: float) -> GymServerError:
         return call_too_long(
@@ -62,7 +60,7 @@ class _Making:
         )
 
 
-class Instances:
+class InstanceManager:
     """All instances of a server."""
 
     def __init__(
@@ -88,110 +86,108 @@ class Instances:
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
-        self._instances: dict[str, Instance | IsolatedInstance] = {}
-        # Whether environments are gone since somebody, who then changes it, looked for garbage.
+        self._instances: dict[str, Instance] = {}
+        # Whether an environment has gone since garbage was last collected; the watchdog, which
+        # collects it, sets this back.
         self.left_garbage = False
         self._budget = Budget(self._limits.max_memory_mb * 2**20)
-        # By the thread that makes it until it comes back, then by instance_id until it is closed.
-        self._shares: dict[int | str, _Share] = {}
-        # By the thread that makes it; by instance_id.
-        self._creating: dict[int, _Making] = {}
-        self._closing: dict[str, Instance | IsolatedInstance] = {}
-        self._departed = Departed()
+        # By creation until it ends, then by instance_id until the instance is closed.
+        self._shares: dict[_Creation | str, _Share] = {}
+        # The creations, each with the thread that does it; the instances that are being closed.
+        self._creating: InProgress[_Creation, int] = InProgress()
+        self._closing: dict[str, Instance] = {}
+        self._tombstones = Tombstones()
         self._stopping = False
 
     def create(self, choices: EnvConfig) -> str:
-        """Make an environment and return its instance_id, 8 hex digits.
+        """Create an environment and return its instance_id, 8 hex digits.
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``invalid_kwargs``, ``shutting_down``,
                 ``environment_died``, ``too_many_instances``, ``too_many_sub_envs``,
                 ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
-        # Before an environment is made for nothing.
+        # Before an environment is created for nothing.
         self._allowed_paths.check(choices)
         wrappers.check(choices.wrappers)
         if choices.num_envs is None:
             vectorization.check_single(choices)
         isolated = self._isolation.wants(choices.env_id, self._allowed_modules)
         make_it = self._make_isolated if isolated else self._make
-        with self._room_for(choices, isolated) as making, contextlib.ExitStack() as undo:
-            instance = make_it(choices, making, undo)
-            if not self._enlist(instance, making):
+        with self._room_for(choices, isolated) as creation, contextlib.ExitStack() as undo:
+            instance = make_it(choices, creation, undo)
+            if not self._enlist(instance, creation):
                 undo.close()
-                raise making.too_long(self._limits.max_call_seconds)
+                raise creation.too_long(self._limits.max_call_seconds)
             undo.pop_all()
-        instance.stay()
-        log.info("Made instance %s of %s", instance.instance_id, instance.env_id)
+        instance.stay(lambda why: self._remove(instance.instance_id, why))
+        log.info("Created instance %s of %s", instance.instance_id, instance.env_id)
         return instance.instance_id
 
-    def _enlist(self, instance: Instance, making: _Making) -> bool:
-        """Put an instance on the list, unless its making was given up meanwhile."""
+    def _enlist(self, instance: Instance, creation: _Creation) -> bool:
+        """Put an instance on the list, unless its creation was abandoned meanwhile."""
         with self._lock:
             if self._stopping:
                 raise shutting_down()
-            thread = threading.get_ident()
-            if self._creating.pop(thread, None) is None:
+            if not self._creating.finish(creation):
                 return False
             instance.instance_id = self._new_id()
             self._instances[instance.instance_id] = instance
-            self._shares[instance.instance_id] = self._shares.pop(thread)
+            self._shares[instance.instance_id] = self._shares.pop(creation)
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, choices: EnvConfig, isolated: bool) -> Iterator[_Making]:
-        """Keep room for an environment while it is made."""
+    def _room_for(self, choices: EnvConfig, isolated: bool) -> Iterator[_Creation]:
+        """Keep room for an environment while it is created."""
         room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
         share = _Share(room, MemoryReservation(self._budget, room.sub_envs))
-        making, thread = _Making(choices, share), threading.get_ident()
+        creation = _Creation(choices, share)
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
             instances = len(self._instances) + len(self._creating)
             self._limits.check_room(instances, taken, room)
-            self._creating[thread] = making
-            self._shares[thread] = share
+            self._creating.begin(creation, threading.get_ident())
+            self._shares[creation] = share
         try:
-            yield making
+            yield creation
         except BaseException:
-            if self._creating.pop(thread, None) is None:
-                # Given up. Else the answer that is given on its behalf might go to its next
-                # request.
-                making.settled.wait(SETTLED_SECONDS)
-                raise making.too_long(self._limits.max_call_seconds) from None
+            if not self._creating.finish(creation):
+                self._creating.wait_until_answered(creation)
+                raise creation.too_long(self._limits.max_call_seconds) from None
             raise
         finally:
-            self._release(thread)
+            self._release(creation)
 
-    def _release(self, whose: int | str) -> None:
-        """Give the share of an environment that is gone, or came to nothing, to the others."""
+    def _release(self, whose: _Creation | str) -> None:
+        """Free the share of an environment that is gone, or was not created after all."""
         share = self._shares.pop(whose, None)
         if share is not None:
-            share.account.give_back()
+            share.reservation.give_back()
             self.left_garbage = True
 
-    def _make(self, choices: EnvConfig, making: _Making, undo: contextlib.ExitStack) -> Instance:
+    def _make(
+        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
+    ) -> Instance:
         return make_instance(
             choices,
             self._allowed_modules,
             self._limits.max_num_envs,
             self._renderer,
             undo,
-            making.share.account,
+            creation.share.reservation,
         )
 
     def _make_isolated(
-        self, choices: EnvConfig, making: _Making, undo: contextlib.ExitStack
-    ) -> IsolatedInstance:
-        surroundings = self._isolation.surroundings(
+        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
+    ) -> Instance:
+        settings = self._isolation.settings(
             choices.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        instance = IsolatedInstance(
-            choices, surroundings, lambda one, why: self.bury(one.instance_id, why)
-        )
-        undo.callback(instance.condemn, shutting_down())
-        making.condemn = instance.condemn
-        instance.create(making.share.account)
-        return instance
+        backend = WorkerBackend(choices, settings)
+        undo.callback(backend.kill, shutting_down())
+        creation.kill = backend.kill
+        backend.create(creation.share.reservation)
+        return Instance(backend, choices, self._renderer)
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
@@ -201,7 +197,7 @@ class Instances:
             )
         return registry.search(search, self._allowed_modules)
 
-    def get(self, instance_id: str) -> Instance | IsolatedInstance:
+    def get(self, instance_id: str) -> Instance:
         """Return an instance.
 
         Raises:
@@ -210,7 +206,7 @@ class Instances:
         try:
             return self._instances[instance_id]
         except KeyError:
-            raise self._departed.why(instance_id) from None
+            raise self._tombstones.why(instance_id) from None
 
     def lives(self, instance_id: str) -> bool:
         """Tell whether there is an instance of this id."""
@@ -222,23 +218,23 @@ class Instances:
             return {key: instance.env_id for key, instance in self._instances.items()}
 
     def close(self, instance_id: str) -> None:
-        """Close an instance; from now on it is unknown."""
-        instance = self._take_off(instance_id)
+        """Close an instance for its owner; from now on it is unknown."""
+        instance = self._unlist(instance_id)
         if instance is None:
-            raise self._departed.why(instance_id)
+            raise self._tombstones.why(instance_id)
         self._close(instance)
         log.info("Closed instance %s", instance_id)
 
-    def _take_off(self, instance_id: str, why: GymServerError | None = None) -> Instance | None:
-        """Take an instance off the list, with the reason for those who will ask for it."""
+    def _unlist(self, instance_id: str, why: GymServerError | None = None) -> Instance | None:
+        """Take an instance off the list; the reason is for later calls on it."""
         with self._lock:
             instance = self._instances.pop(instance_id, None)
             if instance is None:
                 return None
             if why is not None:
-                instance.hold.why = why
-                self._departed.add(instance_id, why)
-            # From now on nobody else would notice that this takes too long.
+                instance.lock.why = why
+                self._tombstones.add(instance_id, why)
+            # The watchdog looks here for a call that takes too long: closing it may.
             self._closing[instance_id] = instance
             return instance
 
@@ -256,105 +252,110 @@ class Instances:
             log.warning("Closing instance %s: %s", instance.instance_id, error)
 
     def list(self) -> list[dict]:
-        """Return what can be told of every instance at once, the oldest first."""
+        """Return the list entries of all instances, the oldest first, without waiting for any."""
         with self._lock:
             instances = list(self._instances.values())
-        return [instance.line() for instance in instances]
+        return [instance.list_entry() for instance in instances]
 
-    def give_up_overdue(
+    def evict_overdue(
         self, seconds: float, answer_for: Callable[[int, GymServerError], None]
     ) -> None:
-        """Give up the instances on which a call takes too long; the others go on.
+        """Evict the instances on which a call takes too long; the others go on.
 
         Args:
-            seconds: how long it may take.
+            seconds: how long a call may take.
             answer_for: answers for a thread that is stuck and cannot.
         """
         before = time.monotonic() - seconds
-        for thread, making in list(self._creating.items()):
-            began = self._renderer.began(thread) or making.began
-            if began < before and self._is_taken_off(thread, making):
-                why = making.too_long(seconds)
-                log.warning("%s", why.message)
-                if making.condemn is not None:
-                    making.condemn(why)
-                elif not self._renderer.give_up(thread, why):
-                    answer_for(thread, why)
-                    # Broken off while it asks for a process, it would break the fork server, and
-                    # that all processes of others.
-                    if not making.share.room.processes:
-                        interrupt(thread)
-                making.settled.set()
+        for creation, thread in self._creating.items():
+            began = self._renderer.began(thread) or creation.began
+            if began < before and self._creating.abandon(creation):
+                self._answer_creation(creation, thread, seconds, answer_for)
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
         for instance in instances:
             since = instance.busy_since
             if since is not None and since < before:
-                why = self._dismiss(instance, seconds)
-                stuck = instance.condemn(why)
-                if stuck is not None:
-                    answer_for(stuck, why)
-                    # Until this is settled it does not go on to other things.
-                    interrupt(stuck)
-                instance.hold.settle()
-        # The closing of what was given up may hang, too, and no instance stands for it any more.
-        nobodys = call_too_long("Closing an environment", seconds, "the server leaves it alone")
-        if self._renderer.give_up_what_began_before(before - seconds, nobodys):
-            log.warning("%s", nobodys.message)
+                self._evict(instance, seconds, answer_for)
+        # An instance that was evicted may hang once more while it is closed, on the render thread
+        # and without being listed any more.
+        why = call_too_long("Closing an environment", seconds, "the server leaves it alone")
+        if self._renderer.abandon_if_began_before(before - seconds, why):
+            log.warning("%s", why.message)
 
-    def _is_taken_off(self, thread: int, making: _Making) -> bool:
-        """Take a creation off the list; tell whether it was still there."""
-        with self._lock:
-            # The thread may be at its next one by now.
-            if self._creating.get(thread) is not making:
-                return False
-            del self._creating[thread]
-            return True
+    def _answer_creation(
+        self,
+        creation: _Creation,
+        thread: int,
+        seconds: float,
+        answer_for: Callable[[int, GymServerError], None],
+    ) -> None:
+        """See that the client of a creation that was abandoned gets an answer."""
+        why = creation.too_long(seconds)
+        log.warning("%s", why.message)
+        if creation.kill is not None:
+            creation.kill(why)
+        elif not self._renderer.abandon(thread, why):
+            answer_for(thread, why)
+            # Where the thread starts processes it must go on: an interrupt while it talks to the
+            # fork server would break that, and with it the processes of all others.
+            if not creation.share.room.processes:
+                interrupt(thread)
+        self._creating.answered(creation)
 
-    def _dismiss(self, instance: Instance, seconds: float) -> GymServerError:
-        """Take an instance off the list on which a call takes too long; return what to say."""
-        instance_id = instance.instance_id
+    def _evict(
+        self,
+        instance: Instance,
+        seconds: float,
+        answer_for: Callable[[int, GymServerError], None],
+    ) -> None:
+        """Evict an instance on which a call takes too long, and answer its client."""
         why = call_too_long(
-            f"A call on instance {instance_id} of {instance.env_id}",
+            f"A call on instance {instance.instance_id} of {instance.env_id}",
             seconds,
             "the instance is gone",
         )
         log.warning("%s", why.message)
-        self.bury(instance_id, why)
-        return why
+        self._remove(instance.instance_id, why)
+        stuck = instance.abandon(why)
+        if stuck is not None:
+            answer_for(stuck, why)
+            # The thread has not gone on to other work: it waits until it was answered for.
+            interrupt(stuck)
+        instance.lock.answered()
 
-    def bury(self, instance_id: str, why: GymServerError) -> None:
-        """Take an instance off the list that is not to be closed any more; keep the reason."""
-        self._take_off(instance_id, why)
-        # Also where it was being closed.
-        self._departed.add(instance_id, why)
+    def _remove(self, instance_id: str, why: GymServerError) -> None:
+        """Remove an instance that is not to be closed any more; keep the reason."""
+        self._unlist(instance_id, why)
+        # Also when it was being closed, and was not listed any more.
+        self._tombstones.add(instance_id, why)
         self._closing.pop(instance_id, None)
         self._release(instance_id)
 
-    def close_idle(self, minutes: float) -> None:
-        """Close the instances that nobody has used or watched for so long."""
+    def evict_idle(self, minutes: float) -> None:
+        """Evict the instances that nobody has used or watched for so long, and close them."""
         now = time.monotonic()
         with self._lock:
             instances = list(self._instances.values())
         for instance in instances:
-            hold = instance.hold
-            if max(hold.used, hold.watched) > now - minutes * 60 or hold.busy_since is not None:
+            lock = instance.lock
+            if max(lock.used, lock.watched) > now - minutes * 60 or lock.busy_since is not None:
                 continue
-            if instance.screen.is_watched:
-                hold.watched = now
+            if instance.viewer.is_watched:
+                lock.watched = now
                 continue
             why = idle_closed(instance.instance_id, instance.env_id, minutes)
-            if self._take_off(instance.instance_id, why) is not None:
+            if self._unlist(instance.instance_id, why) is not None:
                 log.info("%s", why.message)
                 closer = threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
                 closer.start()
 
     def end_watching(self) -> None:
-        """Send all watchers away: the server is about to stop."""
+        """Answer all watchers with an error: the server is about to stop."""
         with self._lock:
             instances = list(self._instances.values())
         for instance in instances:
-            instance.screen.end(shutting_down())
+            instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
         """Close every instance and take no more."""
@@ -362,7 +363,7 @@ class Instances:
             self._stopping = True
             instances = list(self._instances.values())
             self._instances.clear()
-        # One that never comes back must not keep the others from finishing their monitors.
+        # At the same time: one that hangs must not keep the others from finishing their monitors.
         threads = [
             threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
             for instance in instances
@@ -375,7 +376,7 @@ class Instances:
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
-            if instance_id not in self._instances and instance_id not in self._departed:
+            if instance_id not in self._instances and instance_id not in self._tombstones:
                 return instance_id
 
 

@@ -1,4 +1,4 @@
-"""How much of everything a server gives to those who use it together."""
+"""Limits on what all clients of a server use together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gym_server.errors import GymServerError
 
 @dataclass(frozen=True)
 class Room:
-    """What an environment takes of what there is for all.
+    """What an environment takes of what all share.
 
     Attributes:
         sub_envs: how many it has; one without sub-environments counts as one.
@@ -37,17 +37,17 @@ class Limits:
         max_total_sub_envs: how many all of them may have together, where one without
             sub-environments counts as one; None for four times as many as one may have.
         max_processes: how many processes all of them may have together. However many processors
-            there are, each takes 7 MB of its own when it is made and 20 MB in use, two threads
+            there are, each takes 7 MB of its own when it is created and 20 MB in use, two threads
             and 15 files, whether it is used or not; this is two environments of as many as one
             may have, or a class in which everybody has some isolated ones.
         max_memory_mb: how much memory all of them may be estimated to take together at their most,
             in MiB; see ``memory_estimate``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
-        max_call_seconds: how long one call may take before its instance is given up; 0 for ever.
-            Longer than any one call that means well, and short enough that somebody who comes
-            back from a coffee finds it said.
-        idle_minutes: how long nobody may have used or watched an instance before it is closed;
-            0 for ever. A day: what is left in the evening is still there in the morning.
+        max_call_seconds: how long one call may take before its instance is evicted; 0 for no limit.
+            Longer than an ordinary call takes, and short enough that somebody who comes back from
+            a coffee finds the error.
+        idle_minutes: how long nobody may have used or watched an instance before it is evicted;
+            0 for no limit. A day: what is left in the evening is still there in the morning.
     """
 
     max_instances: int = 1000
@@ -78,7 +78,7 @@ class Limits:
                 "sets the limit",
             )
         most = self.max_total_sub_envs or 4 * self.max_num_envs
-        # One that is too large for itself hears of that.
+        # An environment that is larger than any may be is refused for that when it is created.
         if taken.sub_envs + more.sub_envs > most and more.sub_envs <= self.max_num_envs:
             raise GymServerError(
                 "too_many_sub_envs",
@@ -99,17 +99,17 @@ class Limits:
 
 
 class Watchers:
-    """Those who wait for a picture, of whatever environment."""
+    """Counts the watchers that wait for a frame, of all environments."""
 
     def __init__(self, most: int) -> None:
-        """Let in so many at a time."""
+        """Allow so many at a time."""
         self._most = most
         self._lock = threading.Lock()
         self._count = 0
 
     @contextlib.contextmanager
     def one_more(self) -> Iterator[None]:
-        """Let another one in for a while.
+        """Count one more watcher for a while.
 
         Raises:
             GymServerError: ``too_many_watchers``.

@@ -1,4 +1,4 @@
-"""Why instances are gone that their owners did not close, for those who still ask for them."""
+"""Why the server removed instances, for clients that still ask for them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import threading
 from gym_server.errors import GymServerError, unknown_instance
 
 
-class Departed:
-    """The reasons, by instance_id; only the latest ones are kept."""
+class Tombstones:
+    """The reasons by instance_id; only the latest ones are kept."""
 
     def __init__(self, most: int = 10_000) -> None:
         """Keep so many."""
@@ -17,16 +17,16 @@ class Departed:
         self._reasons: dict[str, GymServerError] = {}
 
     def add(self, instance_id: str, why: GymServerError) -> None:
-        """Note why an instance is gone."""
+        """Keep the reason why an instance is gone."""
         with self._lock:
-            # A copy: what is raised keeps the frames that it came through, and with them the
-            # environment.
+            # A copy: an exception that was raised refers to the stack that it came through, and
+            # that to the environment.
             self._reasons[instance_id] = why.again()
             while len(self._reasons) > self._most:
                 del self._reasons[next(iter(self._reasons))]
 
     def why(self, instance_id: str) -> GymServerError:
-        """Return what to tell who asks for an instance; ``unknown_instance`` without a reason."""
+        """Return the error for a client that asks for an instance, else ``unknown_instance``."""
         reason = self._reasons.get(instance_id)
         return unknown_instance(instance_id) if reason is None else reason.again()
 

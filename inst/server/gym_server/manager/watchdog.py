@@ -1,7 +1,7 @@
-"""Looks after what nobody else would: calls without end, instances without a user, free memory.
+"""Looks for calls that take too long and instances that nobody uses, and returns free memory.
 
-It is a thread of its own, because a thread that is stuck in an environment can do nothing about
-it, and so that no call pays for it.
+The watchdog is a thread of its own, because a thread that is stuck in an environment can do nothing
+about it, and so that no call pays for the looking.
 """
 
 from __future__ import annotations
@@ -12,38 +12,38 @@ import time
 from collections.abc import Callable
 
 from gym_server.errors import GymServerError
-from gym_server.manager.instance_manager import Instances
+from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
 from gym_server.processes import memory
 
 log = logging.getLogger(__name__)
 
-# Between two looks, at most; short limits are looked at more often.
+# The longest time between two checks; where limits are short they are checked more often.
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
 
-# Between two times that memory is given back; it costs some milliseconds, and where there are many
-# thousands of sub-environments some tenths of a second.
+# How often memory is given back to the system, which costs some milliseconds, and where there are
+# many thousands of sub-environments some tenths of a second.
 _GIVE_BACK_SECONDS = 30.0
 
 
 class Watchdog:
-    """Applies the limits of time."""
+    """Enforces the limits of time."""
 
     def __init__(
         self,
-        instances: Instances,
+        instances: InstanceManager,
         limits: Limits,
         answer_for: Callable[[int, GymServerError], None],
         forget: Callable[[], None],
     ) -> None:
-        """Start to look.
+        """Start to watch.
 
         Args:
-            instances: what to look after.
+            instances: those to watch.
             limits: how long things may take.
             answer_for: answers for a thread that cannot any more.
-            forget: drops what nobody will ask for again.
+            forget: drops answers that nobody will ask for again.
         """
         self._instances = instances
         self._limits = limits
@@ -55,7 +55,7 @@ class Watchdog:
         thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Watch no more."""
         self._stopped.set()
 
     def _run(self) -> None:
@@ -63,15 +63,15 @@ class Watchdog:
         tick = min([_LONGEST_TICK, *(_SHARE_OF_LIMIT * limit for limit in limits if limit)])
         while not self._stopped.wait(tick):
             try:
-                self._look()
+                self._check()
             except Exception:
                 log.exception("A fault of the server's own")
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         if self._limits.max_call_seconds:
-            self._instances.give_up_overdue(self._limits.max_call_seconds, self._answer_for)
+            self._instances.evict_overdue(self._limits.max_call_seconds, self._answer_for)
         if self._limits.idle_minutes:
-            self._instances.close_idle(self._limits.idle_minutes)
+            self._instances.evict_idle(self._limits.idle_minutes)
         self._forget()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
             garbage, self._instances.left_garbage = self._instances.left_garbage, False

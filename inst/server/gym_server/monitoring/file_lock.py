@@ -1,12 +1,13 @@
-"""Lock a file until it is closed: for one process alone, and gone with it however it ends."""
+"""Lock a file for one process alone, until the file is closed or the process ends somehow."""
 
 from __future__ import annotations
 
 import errno
 import os
+import sys
 from typing import IO
 
-if os.name == "nt":
+if sys.platform == "win32":
     import msvcrt
 
     # Windows keeps others from reading what is locked, so that lies far behind the file's end.
@@ -23,13 +24,13 @@ else:
     import fcntl
 
     def _lock(descriptor: int) -> None:
-        # Not lockf(): its locks are the process's, who could take them twice, and end when any
-        # other handle of the file is closed.
+        # Not lockf(): its locks belong to the process, which could take them twice, and they end
+        # when any other handle of the file is closed.
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def try_lock(file: IO) -> bool:
-    """Lock an open file until it is closed; tell whether nobody else had.
+    """Lock an open file until it is closed; return False when another process has.
 
     Raises:
         OSError: the file system has no locks.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import logging
 import time
+from typing import Any
 
 import gymnasium
 
@@ -23,19 +24,20 @@ class Monitor:
 
     The table gets a row when an episode is done: its number, the sum of its rewards, its steps
     and its duration in seconds.  Numbers count the resets since the start of monitoring,
-    from 0, so an episode that is given up leaves a gap and a video's number is its episode's.
+    from 0, so an episode that a reset cuts short leaves a gap, and a video has the number of its
+    episode.
 
-    The caller sees to it that only one call at a time is under way.
+    The caller makes only one call at a time.
     """
 
     def __init__(
         self,
         env: gymnasium.Env,
         files: MonitorFiles,
-        recorder: gymnasium.wrappers.RecordVideo | None,
+        recorder: Any,
         renderer: RenderThread,
     ) -> None:
-        """Take over files that are taken; see ``start()``."""
+        """Take over files that are taken, and a RecordVideo or None; see ``start()``."""
         self._env = env
         self._files = files
         self._rows = csv.writer(files.table, lineterminator="\n")
@@ -104,6 +106,7 @@ class Monitor:
 
     def step(self, action: object) -> tuple:
         """Take a step; write the episode's row when it is done."""
+        result: tuple
         if self._recorder is not None and self._recorder.recording:
             result = self._renderer.run(self._recorder.step, action)
         else:
@@ -147,7 +150,7 @@ class Monitor:
         self._episode = None
         try:
             self._rows.writerow(row)
-            # A reader, or a crash, finds every episode that is done.
+            # So that the file has every episode that is done, for readers and after a crash.
             self._files.table.flush()
             self._episodes += 1
         except OSError as error:
@@ -156,7 +159,7 @@ class Monitor:
 
     def _reset_recorder(self, number: int, seed: int | None, options: dict | None) -> tuple:
         recorder = self._recorder
-        # RecordVideo counts for itself; it shall count as the table does, also after a reset
+        # RecordVideo has a count of its own; it must agree with the table's, also after a reset
         # that failed and after resuming.
         recorder.episode_id = number - 1
         if recorder.episode_trigger(number):
@@ -170,7 +173,7 @@ class Monitor:
         if self._recorder is None or not self._recorder.recording:
             return
         try:
-            # Encoding draws nothing: the render thread stays free for the others.
+            # Not on the render thread: encoding draws nothing, and others may need the thread.
             self._recorder.stop_recording()
         except Exception as error:
             self._remember(error)
@@ -178,7 +181,7 @@ class Monitor:
             self._recorder.recorded_frames = []
 
     def _remember(self, error: Exception) -> None:
-        # The step or reset that ends an episode was taken and must be answered; close() tells.
+        # The step or reset that ends an episode was taken and must be answered; close() raises.
         self._failure = self._failure or error
         log.error("A monitor in %s lost something", self._files.path, exc_info=error)
 

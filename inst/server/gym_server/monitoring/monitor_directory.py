@@ -20,7 +20,7 @@ class MonitorRoot:
 
         Args:
             root: relative directories lie below it, and absolute ones may; None for a temporary
-                directory, made when the first monitor starts.
+                directory, created when the first monitor starts.
             allow_temporary: whether absolute ones may also lie below the system's temporary
                 directory, as the classic examples have it.
         """
@@ -138,7 +138,7 @@ def _is_left_behind(files: MonitorFiles) -> bool:
 
 @contextlib.contextmanager
 def _taken_if_gone(files: MonitorFiles) -> Iterator[bool]:
-    """Take the files of another monitor for a moment; tell whether it is gone."""
+    """Take the files of another monitor for a moment; yield whether it is gone."""
     is_gone = files.take()
     try:
         if is_gone:

@@ -1,4 +1,4 @@
-"""The files that one monitor writes: their names, which are ours, and who writes them now."""
+"""The files that one monitor writes: their names, and whether a monitor is writing them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class MonitorFiles:
     The first monitor there has the plain names, ``episodes.csv`` and so on.  The names of every
     further one, while others write there, carry its instance's id.
 
-    Who writes has the table locked.  The system takes a lock away with the process that has it,
+    A monitor that writes has the table locked. The system releases the lock when the process ends,
     so files whose table can be locked are those of a monitor that is gone.
 
     Attributes:
@@ -79,7 +79,7 @@ class MonitorFiles:
             if _is_at(table, path):
                 self.table = table
                 return True
-            # Who had it deleted it after it was opened here.
+            # The monitor that had it deleted it after it was opened here.
             table.close()
 
     def leave(self) -> None:
@@ -106,7 +106,7 @@ class MonitorFiles:
         try:
             manifest = json.loads(self._manifest.read_text(encoding="utf-8"))
             self._listed = {str(name) for name in manifest["files"]}
-            # A server that was killed could not write the last number.
+            # A server that was killed did not write the last number.
             self.next_episode = max([int(manifest["next_episode"]), *self._episodes_in_table()])
         except FileNotFoundError:
             return
@@ -167,14 +167,14 @@ class MonitorFiles:
         # Whatever the list says, a monitor writes and deletes files of these names only.
         video = re.compile(rf"{self.video_prefix}-episode-\d+\.mp4")
         names = {name for name in os.listdir(self.path) if video.fullmatch(name)}
-        # An empty table holds nobody's data: take() makes one before anything is known.
+        # An empty table has no data: take() creates one before it is known what else is there.
         return names | {self.table_name} if self._table_size() else names
 
     def _table_size(self) -> int:
         return os.fstat(self.table.fileno()).st_size
 
     def _delete_table(self) -> None:
-        # While it is locked, so that nobody can have taken it; Windows deletes no open file.
+        # While it is locked, so that no other monitor has it; Windows deletes no open file.
         if os.name == "nt":
             self.table.close()
         (self.path / self.table_name).unlink(missing_ok=True)
@@ -185,7 +185,7 @@ class MonitorFiles:
 
     def _write_manifest(self) -> None:
         if not _is_at(self.table, self.path / self.table_name):
-            # Another monitor may write here under these names meanwhile.
+            # Another monitor may be writing under these names by now.
             raise FileNotFoundError(f"{self.table_name} was taken away")
         manifest = {
             "written_by": "gym_server",
@@ -193,7 +193,7 @@ class MonitorFiles:
             "files": sorted(self._listed),
         }
         new = self._manifest.with_name(f"{self._manifest.name}.new")
-        # Made anew, so that no link of that name is followed.
+        # A new file, so that no link of that name is followed.
         new.unlink(missing_ok=True)
         with open(new, "x", encoding="utf-8") as file:
             json.dump(manifest, file, indent=1)
@@ -228,7 +228,7 @@ def _open_locked(path: Path) -> TextIO | None:
 
 
 def _open_no_link(path: str, flags: int) -> int:
-    # Nor waits for anybody to read from a pipe of that name.
+    # Follow no link, and do not wait for a reader of a pipe of that name.
     careful = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     return os.open(path, flags | careful, 0o666)
 

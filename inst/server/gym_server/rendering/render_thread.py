@@ -1,7 +1,7 @@
 """The one thread that draws.
 
-pygame is one per process: an environment's ``close()`` calls ``pygame.quit()``, which takes
-the fonts of all the others away, and an OpenGL context belongs to the thread that made it.
+There is one pygame per process: an environment's ``close()`` calls ``pygame.quit()``, which takes
+the fonts of all the others away; and an OpenGL context belongs to the thread that created it.
 So everything that draws or closes runs here, and pygame ends with the process.
 """
 
@@ -13,16 +13,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, InvalidStateError, wait
+from concurrent.futures import Future, wait
 from typing import TypeVar
 
+from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt
 
 ResultT = TypeVar("ResultT")
 
 
-# How often who waits for the render thread is asked whether to wait on.
-_BETWEEN_QUESTIONS = 0.02
+# How often a thread that waits for its turn looks whether it may wait on.
+_POLL_SECONDS = 0.02
 
 
 class Occupied(Exception):  # noqa: N818
@@ -33,31 +34,17 @@ class _Job:
     """One piece of work for the render thread.
 
     Attributes:
-        asker: the thread that waits for it.
-        future: what becomes of it.
+        caller: the thread that waits for the result.
+        draw: what is to be done.
+        future: the result.
         began: since when it runs, in the clock's seconds; None while it waits for its turn.
     """
 
     def __init__(self, draw: Callable[[], object]) -> None:
-        self.asker = threading.get_ident()
+        self.caller = threading.get_ident()
+        self.draw = draw
         self.future: Future = Future()
         self.began: float | None = None
-        self._draw = draw
-
-    def do(self) -> bool:
-        """Do it; return whether anybody still wanted to know when it was done."""
-        self.began = time.monotonic()
-        if not self.future.set_running_or_notify_cancel():
-            return True
-        with contextlib.suppress(InvalidStateError):
-            try:
-                result = self._draw()
-            except BaseException as error:
-                self.future.set_exception(error)
-            else:
-                self.future.set_result(result)
-            return True
-        return False
 
 
 class RenderThread:
@@ -69,51 +56,54 @@ class RenderThread:
         self._queue: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
         self._running: _Job | None = None
+        self._in_progress: InProgress[_Job, None] = InProgress()
         self._stopped = False
-        # What each thread waits for.
-        self._asked: dict[int, _Job] = {}
+        # By the thread that waits for the result.
+        self._jobs: dict[int, _Job] = {}
 
     def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
         """Run a function on the render thread; return its result or raise what it raises."""
         if threading.current_thread() is self._thread:
             # Drawing calls for drawing, as a monitor does of an environment that always draws.
             return draw(*args)
-        with self._ask(draw, *args) as job:
-            return job.future.result()
+        with self._job(draw, *args) as job:
+            result: ResultT = job.future.result()
+            return result
 
     def run_while(
-        self, patient: Callable[[], bool], draw: Callable[..., ResultT], *args: object
+        self, may_wait: Callable[[], bool], draw: Callable[..., ResultT], *args: object
     ) -> ResultT:
         """Run a function on the render thread, unless its turn takes too long to come.
 
         Args:
-            patient: tells whether to wait on; asked every 20 ms until the function begins.
+            may_wait: tells whether to wait on; asked every 20 ms until the function begins.
             draw: the function.
             *args: what it is called with.
 
         Raises:
-            Occupied: it does not run.
+            Occupied: its turn did not come, and it will not run.
         """
-        with self._ask(draw, *args) as job:
-            while not wait([job.future], _BETWEEN_QUESTIONS).done:
-                if not patient() and job.future.cancel():
+        with self._job(draw, *args) as job:
+            while not wait([job.future], _POLL_SECONDS).done:
+                if not may_wait() and job.future.cancel():
                     raise Occupied
-            return job.future.result()
+            result: ResultT = job.future.result()
+            return result
 
     @contextlib.contextmanager
-    def _ask(self, draw: Callable, *args: object) -> Iterator[_Job]:
+    def _job(self, draw: Callable, *args: object) -> Iterator[_Job]:
         job = _Job(lambda: _keep_pygame_and(draw, *args))
         with self._lock:
             if self._stopped:
                 raise RuntimeError("nothing is drawn any more")
             if self._thread is None:
                 self._start()
-            self._asked[job.asker] = job
+            self._jobs[job.caller] = job
             self._queue.put(job)
         try:
             yield job
         finally:
-            self._asked.pop(job.asker, None)
+            self._jobs.pop(job.caller, None)
 
     def _start(self) -> None:
         # A daemon: drawing that never ends must not keep the process.
@@ -123,59 +113,79 @@ class RenderThread:
     def _work(self) -> None:
         while (job := self._queue.get()) is not None:
             self._running = job
-            if not job.do():
-                # Another thread has taken over.
+            if not self._do(job):
                 return
-            # What it drew must not stay until the next one comes.
+            # The picture must not be kept until the next job comes.
             self._running = job = None
 
-    def began(self, thread: int) -> float | None:
-        """Return since when what a thread waits for is being done, in the clock's seconds.
+    def _do(self, job: _Job) -> bool:
+        """Do a job; return False when another thread has become the render thread meanwhile."""
+        job.began = time.monotonic()
+        if not job.future.set_running_or_notify_cancel():
+            return True
+        self._in_progress.begin(job, None)
+        try:
+            result = job.draw()
+        except BaseException as error:
+            if not self._in_progress.finish(job):
+                return False
+            job.future.set_exception(error)
+        else:
+            if not self._in_progress.finish(job):
+                return False
+            job.future.set_result(result)
+        return True
 
-        None when it does not wait for the render thread, now when it waits for its turn.
+    def began(self, thread: int) -> float | None:
+        """Return since when the job that a thread waits for has been running.
+
+        In the clock's seconds; None when it does not wait for the render thread, now when it
+        waits for its turn.
         """
-        job = self._asked.get(thread)
+        job = self._jobs.get(thread)
         if job is None:
             return None
         return time.monotonic() if job.began is None else job.began
 
-    def give_up(self, thread: int, why: Exception) -> bool:
-        """Draw the rest on another thread, if this one hangs on a thread's behalf.
+    def abandon(self, thread: int, why: Exception) -> bool:
+        """Leave the render thread alone if it hangs in a thread's job; another one does the rest.
 
         Args:
-            thread: the one that waits for what is being drawn, or the render thread itself.
-            why: what is raised where the drawing was asked for.
+            thread: the one that waits for the job's result, or the render thread itself.
+            why: what is raised in the thread that waits.
 
         Returns:
             Whether it was so.
         """
         with self._lock:
-            job, hanging = self._running, self._thread
-            if job is None or hanging is None or thread not in (job.asker, hanging.ident):
+            job = self._running
+            hanging = self._thread.ident if self._thread else None
+            if job is None or hanging is None or thread not in (job.caller, hanging):
                 return False
-            try:
-                job.future.set_exception(why)
-            except InvalidStateError:
+            if not self._in_progress.abandon(job):
                 return False
+            job.future.set_exception(why)
             self._running = None
-            # Before anything that waits, in which it could end and another get its identity.
-            interrupt(hanging.ident)
+            # Before anything that waits: the thread could end then, and another get its identity.
+            interrupt(hanging)
+            self._in_progress.answered(job)
             self._start()
             return True
 
-    def give_up_what_began_before(self, moment: float, why: Exception) -> bool:
-        """Draw the rest on another thread, if this one has been at one thing for too long.
+    def abandon_if_began_before(self, moment: float, why: Exception) -> bool:
+        """Leave the render thread alone if its job takes too long; another one does the rest.
 
         Args:
-            moment: what has run since before it is given up, in the clock's seconds.
-            why: what is raised where it was asked for.
+            moment: a job that began before it takes too long, in the clock's seconds.
+            why: what is raised in the thread that waits for the result.
 
         Returns:
             Whether it was so.
         """
         job = self._running
-        began = None if job is None else job.began
-        return began is not None and began < moment and self.give_up(job.asker, why)
+        if job is None or job.began is None or job.began >= moment:
+            return False
+        return self.abandon(job.caller, why)
 
     def stop(self) -> None:
         """Let what is queued finish, and end the thread."""

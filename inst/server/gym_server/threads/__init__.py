@@ -1,1 +1,1 @@
-"""What one thread does to another one that is stuck."""
+"""What one thread can do about another one that is stuck."""

@@ -1,4 +1,4 @@
-"""Break off what a thread does in an environment, once nobody waits for it any more."""
+"""Break off what a thread does in an environment, once nobody waits for its result any more."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import ctypes
 
 
 def interrupt(thread: int) -> None:
-    """Raise ``SystemExit``, by which a thread ends without a word, in one that was answered for.
+    """Raise ``SystemExit`` in a thread whose work was abandoned, so that it ends silently.
 
-    It comes at the next step of Python code: a loop ends at once, a call into C that never comes
-    back does not. Whoever calls this must know that the thread has not gone on to other things.
+    The exception comes at the next step of Python code: a loop ends at once, a call into C that
+    never comes back does not. The caller must know that the thread has not gone on to other work.
 
     Args:
         thread: its identity.

@@ -1,6 +1,6 @@
-"""A look at an environment between two of its moves, which keeps it from none for long.
+"""Capture what an environment shows between two of its moves, without delaying it for long.
 
-It takes two things that others have, too: the right to the environment, which a step has, and
+A capture needs two things that others need, too: the environment's lock, which a step takes, and
 the render thread, where other environments are drawn, closed and, some of them, stepped.
 """
 
@@ -12,99 +12,101 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from gym_server.rendering.render_thread import Occupied
+from gym_server.viewing.watchable import Watchable
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from gym_server.instances.instance import Instance
-
-# How long a step may keep a watcher waiting before it hears of that.
-_PATIENCE = 2.0
+# How long a step may keep a watcher waiting before the watcher gets the answer "busy".
+_LOCK_TIMEOUT = 2.0
 
 
 class Busy(Exception):  # noqa: N818
-    """A step, or what others draw, takes so long that nothing can be seen."""
+    """A step, or other drawing, takes so long that nothing can be captured."""
 
 
-class Glimpse(NamedTuple):
+class Capture(NamedTuple):
     """An environment at one moment.
 
     Attributes:
         moves: how often it had moved.
-        facts: what ``Instance.look()`` tells.
+        facts: the JSON values of ``Watchable.look()``.
         frame: the picture, or None.
         began: since when it could not move, in the clock's seconds.
-        held: for how many seconds.
+        seconds: for how long it could not.
     """
 
     moves: int
     facts: dict
     frame: np.ndarray | None
     began: float
-    held: float
+    seconds: float
 
 
-def glimpse(
-    instance: Instance, sub_env: int, deadline: float, is_patient: Callable[[float], bool]
-) -> Glimpse:
-    """Look at a sub-environment of an instance.
+def capture(
+    watchable: Watchable, sub_env: int, deadline: float, may_wait_until: Callable[[float], bool]
+) -> Capture:
+    """Capture a sub-environment.
 
     Args:
-        instance: what to look at.
+        watchable: what to look at.
         sub_env: its number, from 0.
         deadline: until when to wait for the render thread, in the clock's seconds.
-        is_patient: tells, given such a deadline, whether to wait on.
+        may_wait_until: tells, given a deadline, whether to wait on.
 
     Raises:
-        Busy: there is nothing to be seen.
+        Busy: the lock or the render thread did not become free in time.
         GymServerError: ``unknown_instance``.
     """
-    if not instance.draws_on_render_thread():
-        with _holding(instance, is_patient) as began:
-            return _look(instance, sub_env, began)
+    if not watchable.draws_on_render_thread:
+        with _locked(watchable, may_wait_until) as began:
+            return _look(watchable, sub_env, began)
     while True:
-        # First the render thread: who has the hold and then waits for it keeps the environment
-        # from its steps while others are drawn.
+        # First the render thread, then the lock: a thread that had the lock and then waited for
+        # the render thread would keep the environment from its steps while others are drawn.
         try:
-            seen = instance.renderer.run_while(
-                lambda: is_patient(deadline), _look_if_free, instance, sub_env
+            captured = watchable.renderer.run_while(
+                lambda: may_wait_until(deadline), _look_if_free, watchable, sub_env
             )
         except Occupied:
             raise Busy from None
-        if seen is not None:
-            return seen
-        # It is being stepped, maybe all the time: then no moment is better than right after a
-        # step. If its steps wait for the render thread themselves, this may wait there as they do.
-        goes_on = (lambda: is_patient(deadline)) if instance.draws_when_stepped else (lambda: False)
-        with _holding(instance, is_patient) as began, contextlib.suppress(Occupied):
-            return instance.renderer.run_while(goes_on, _look, instance, sub_env, began)
+        if captured is not None:
+            return captured
+        # It is being stepped, maybe all the time; then no moment is better than right after a
+        # step. Environments whose steps wait for the render thread with the lock lose nothing
+        # when a capture does so as well.
+        may_wait: Callable[[], bool] = (
+            (lambda: may_wait_until(deadline)) if watchable.draws_when_stepped else (lambda: False)
+        )
+        with _locked(watchable, may_wait_until) as began, contextlib.suppress(Occupied):
+            return watchable.renderer.run_while(may_wait, _look, watchable, sub_env, began)
 
 
-def _look_if_free(instance: Instance, sub_env: int) -> Glimpse | None:
-    # No waiting here: the step that has the hold may wait for the render thread.
-    if not instance.hold.take(0):
+def _look_if_free(watchable: Watchable, sub_env: int) -> Capture | None:
+    # Without waiting: the step that has the lock may itself wait for the render thread.
+    if not watchable.lock.acquire(0):
         return None
     try:
-        return _look(instance, sub_env, time.monotonic())
+        return _look(watchable, sub_env, time.monotonic())
     finally:
-        instance.hold.give_back()
+        watchable.lock.release()
 
 
-def _look(instance: Instance, sub_env: int, began: float) -> Glimpse:
-    moves = instance.moves
-    facts, frame = instance.look(sub_env)
-    return Glimpse(moves, facts, frame, began, time.monotonic() - began)
+def _look(watchable: Watchable, sub_env: int, began: float) -> Capture:
+    moves = watchable.moves.count
+    facts, frame = watchable.look(sub_env)
+    return Capture(moves, facts, frame, began, time.monotonic() - began)
 
 
 @contextlib.contextmanager
-def _holding(instance: Instance, is_patient: Callable[[float], bool]) -> Iterator[float]:
-    """Have the hold, unless a step has it for too long; give the time when it was taken."""
-    deadline = time.monotonic() + _PATIENCE
-    # In short waits: a step that hangs must not keep the server from its end.
-    while not instance.hold.take(0.1):
-        if not is_patient(deadline):
+def _locked(watchable: Watchable, may_wait_until: Callable[[float], bool]) -> Iterator[float]:
+    """Have the lock, unless a step has it for too long; yield the time when it was taken."""
+    deadline = time.monotonic() + _LOCK_TIMEOUT
+    # In short waits: a step that hangs must not delay the end of the server.
+    while not watchable.lock.acquire(0.1):
+        if not may_wait_until(deadline):
             raise Busy
     try:
         yield time.monotonic()
     finally:
-        instance.hold.give_back()
+        watchable.lock.release()

@@ -1,18 +1,19 @@
-"""An observation as a list of numbers and texts with names, for eyes."""
+"""An observation as a list of numbers and texts with names, for watchers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
 
-# More of them nobody can look at.
+# More of them are not shown.
 _MOST = 64
 _LONGEST_TEXT = 200
 
 
-def sub_env_of(space: Space, batch: object, sub_env: int) -> object:
+def sub_env_of(space: Space, batch: Any, sub_env: int) -> object:
     """Return the observation of one sub-environment out of a batch.
 
     Args:
@@ -33,7 +34,7 @@ def sub_env_of(space: Space, batch: object, sub_env: int) -> object:
 
 
 def entries(observation: object) -> dict:
-    """Return the numbers and texts of an observation, whatever holds them.
+    """Return the numbers and texts of an observation of any structure.
 
     Returns:
         ``{"names", "values", "size"}``: at most 64 of each, and how many there are in all.  A

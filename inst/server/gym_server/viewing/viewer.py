@@ -1,9 +1,9 @@
-"""What the watchers of an environment see: drawn only while one of them asks.
+"""Shows an environment to its watchers; it is drawn only while one of them waits for a frame.
 
-A watcher asks for something newer than what it has (a long poll), and in the thread of that
-request the environment is drawn, for all who ask.  So whoever leaves stops the drawing by not
-asking again, what one reads slowly is its own affair, and the thread that steps the environment
-only counts its moves.
+A watcher asks for a newer frame than the one it has (a long poll), and the thread of that request
+draws the environment, for all watchers who wait. So the drawing stops when nobody asks any more,
+a watcher that reads slowly delays only itself, and the thread that steps the environment does no
+more than count its moves.
 """
 
 from __future__ import annotations
@@ -11,74 +11,78 @@ from __future__ import annotations
 import base64
 import threading
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from gym_server.errors import GymServerError
 from gym_server.protocol.answers import dumps
 from gym_server.rendering.png import png
-from gym_server.viewing.capture import Busy, glimpse
+from gym_server.viewing.capture import Busy, capture
+from gym_server.viewing.watchable import Watchable
 
-if TYPE_CHECKING:
-    from gym_server.instances.instance import Instance
-
-# Between two pictures of one environment, however many watch it.
+# Between two frames of one environment, however many watch it.
 _LEAST_SECONDS = 1 / 30
 
 # The share of the time in which drawing may keep an environment from its steps.
 _SHARE = 0.2
-# Where they wait for people's eyes anyway.
+# The same where the steps wait for real time anyway.
 _PACED_SHARE = 0.5
 
-# A watcher hears after this long that nothing has moved; shorter than proxies are patient.
+# A watcher gets an answer after this long, also when nothing has moved; proxies wait longer.
 _LONGEST_WAIT = 15.0
 
-# How long after its last question a watcher is taken to be still there.
+# How long after its last request a watcher counts as still watching.
 _STAYS_SECONDS = 2.0
 
-# Pictures of sub-environments that nobody has asked for since.
+# Frames of sub-environments that nobody has asked for in this time are dropped.
 _KEPT_SECONDS = 10.0
 
-# What environments without a speed of their own move at, and the longest that one step waits.
+# The pace of environments without a render_fps, and the longest that one step waits.
 _USUAL_FPS = 30.0
 _LONGEST_PACE = 1.0
 
 
-class Shot(NamedTuple):
-    """What was seen of a sub-environment.
+def usable_fps(fps: object) -> float:
+    """Return how many steps a second to show, given the environment's render_fps."""
+    if isinstance(fps, (int, float)) and 1 / _LONGEST_PACE <= fps <= 10_000:
+        return float(fps)
+    return _USUAL_FPS
+
+
+class Frame(NamedTuple):
+    """What watchers get of a sub-environment at one moment.
 
     Attributes:
-        number: tells it from every other of this environment.
+        number: tells it from every other frame of this environment.
         moves: how often the environment had moved.
         body: the answer for watchers, JSON.
-        seen: when it was last asked for, in the clock's seconds.
+        used: when it was last asked for, in the clock's seconds.
     """
 
     number: int
     moves: int
     body: bytes
-    seen: float
+    used: float
 
 
-class Screen:
+class Viewer:
     """Shows one environment to its watchers, and keeps its pace where that is wanted."""
 
-    def __init__(self, instance: Instance, fps: object) -> None:
+    def __init__(self, watchable: Watchable, fps: object) -> None:
         """Show nothing yet.
 
         Args:
-            instance: what is watched.
-            fps: how many steps a second the environment takes for human eyes.
+            watchable: what is watched.
+            fps: the environment's render_fps, see ``usable_fps()``.
         """
-        self._instance = instance
-        good = isinstance(fps, (int, float)) and 1 / _LONGEST_PACE <= fps <= 10_000
-        self.fps = float(fps) if good else _USUAL_FPS  # type: ignore[arg-type]
-        # Guards what follows; never held while drawing, sending or waiting for the instance.
+        self._watchable = watchable
+        self.fps = usable_fps(fps)
+        # Guards what follows; never held while drawing, sending or waiting for the environment.
         self._changed = threading.Condition()
-        self._shots: dict[int, Shot] = {}
+        self._frames: dict[int, Frame] = {}
         self._numbers = 0
         self._drawing = False
         self._due = 0.0
-        self._asking = 0
+        self._waiting = 0
         self._stays_until = 0.0
         self._ended: GymServerError | None = None
         self._ending = threading.Event()
@@ -86,17 +90,17 @@ class Screen:
 
     # For watchers ---------------------------------------------------------------------------
 
-    def see(self, sub_env: int, after: int | None) -> bytes:
-        """Wait for something that a watcher has not seen.
+    def next_frame(self, sub_env: int, after: int | None) -> bytes:
+        """Wait for a frame that a watcher has not seen.
 
         Args:
             sub_env: which sub-environment to look at.
-            after: the number of what it saw last.
+            after: the number of the frame that it saw last.
 
         Returns:
-            What there is to see, as JSON: what ``Instance.look()`` tells, a "number" and a
-            "frame", a PNG in Base64.  What it has seen already when nothing moves for long; of
-            an environment that cannot be drawn for long only the "state".
+            The frame as JSON: the values of ``Watchable.look()``, a "number" and a "frame", a PNG
+            in Base64. The frame that it has seen already when nothing moves for long; only the
+            "state" when the environment cannot be drawn for long.
 
         Raises:
             GymServerError: ``unknown_instance`` when the environment is closed meanwhile,
@@ -104,12 +108,12 @@ class Screen:
         """
         deadline = time.monotonic() + _LONGEST_WAIT
         with self._changed:
-            self._asking += 1
+            self._waiting += 1
         try:
             while True:
-                shot = self._await(sub_env, after, deadline)
-                if shot is not None:
-                    return shot.body
+                frame = self._await(sub_env, after, deadline)
+                if frame is not None:
+                    return frame.body
                 try:
                     self._draw(sub_env, deadline)
                 finally:
@@ -123,11 +127,11 @@ class Screen:
             return dumps({"number": after, "state": "busy"})
         finally:
             with self._changed:
-                self._asking -= 1
+                self._waiting -= 1
                 self._stay()
 
-    def attend(self) -> None:
-        """Count as watching for a while, without a look."""
+    def note_presence(self) -> None:
+        """Count a watcher as watching for a while, without a frame."""
         with self._changed:
             if self._ended is not None:
                 raise self._ended
@@ -136,68 +140,76 @@ class Screen:
     @property
     def is_watched(self) -> bool:
         """Whether somebody watches."""
-        return self._asking > 0 or time.monotonic() < self._stays_until
+        return self._waiting > 0 or time.monotonic() < self._stays_until
 
     def _stay(self) -> None:
         self._stays_until = time.monotonic() + _STAYS_SECONDS
 
-    def _await(self, sub_env: int, after: int | None, deadline: float) -> Shot | None:
-        """Return what answers a watcher, or None when it has to draw."""
+    def _await(self, sub_env: int, after: int | None, deadline: float) -> Frame | None:
+        """Return the frame for a watcher, or None when the caller has to draw it."""
         with self._changed:
             while True:
                 if self._ended is not None:
                     raise self._ended
                 now = time.monotonic()
-                shot = self._shots.get(sub_env)
-                stale = shot is None or shot.moves != self._instance.moves
+                frame = self._frames.get(sub_env)
+                stale = frame is None or frame.moves != self._watchable.moves.count
                 due = now >= self._due
-                if shot is not None:
-                    new = shot.number != after and not (stale and due)
+                if frame is not None:
+                    new = frame.number != after and not (stale and due)
                     if new or now >= deadline:
-                        self._shots[sub_env] = shot._replace(seen=now)
-                        return shot
+                        self._frames[sub_env] = frame._replace(used=now)
+                        return frame
                 if stale and due and not self._drawing:
                     self._drawing = True
                     return None
                 if now >= deadline:
-                    # One that was never drawn waits no longer than others.
+                    # No frame was ever drawn; the wait ends as it does with one that is old.
                     raise Busy
                 if stale and not self._drawing:
                     self._changed.wait(min(self._due, deadline) - now)
-                elif self._drawing or self._wants_call(shot):
+                elif self._drawing or self._waits_for_move(frame):
                     self._changed.wait(deadline - now)
 
-    def _wants_call(self, shot: Shot | None) -> bool:
-        """Ask to be called at the next move; return False when that was just now."""
-        self._instance.on_move = self.call
-        return shot is not None and shot.moves == self._instance.moves
+    def _waits_for_move(self, frame: Frame | None) -> bool:
+        """Arrange to be called at the next move; return False when that may have come already.
 
-    def call(self) -> None:
-        """Wake those that wait for a move."""
+        1. A watcher finds that its frame shows the last move.
+        2. The environment moves; nobody is to be called yet.
+        3. The watcher arranges to be called, and would wait for a move that has been.
+
+        So the moves are compared once more after 3.
+        """
+        self._watchable.moves.on_next = self._on_move
+        return frame is not None and frame.moves == self._watchable.moves.count
+
+    def _on_move(self) -> None:
+        """Wake the threads that wait for a move."""
         with self._changed:
             self._changed.notify_all()
 
     # Drawing --------------------------------------------------------------------------------
 
     def _draw(self, sub_env: int, deadline: float) -> None:
-        seen = glimpse(self._instance, sub_env, deadline, self._is_patient)
-        facts, frame = seen.facts, seen.frame
-        # The instance goes on while this is put into words.
+        captured = capture(self._watchable, sub_env, deadline, self._may_wait_until)
+        facts, frame = captured.facts, captured.frame
+        # The environment goes on while this is encoded.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
         body = dumps({"number": self._numbers + 1, **facts})
         with self._changed:
-            share = _PACED_SHARE if self._next_tick > seen.began - 1 else _SHARE
-            # The first time it finds its screen, its fonts, its colours.
-            wait = seen.held / share if self._numbers else 0.0
-            self._due = seen.began + max(_LEAST_SECONDS, wait)
+            share = _PACED_SHARE if self._next_tick > captured.began - 1 else _SHARE
+            # The first frame takes longer: the environment loads its fonts and colours.
+            wait = captured.seconds / share if self._numbers else 0.0
+            self._due = captured.began + max(_LEAST_SECONDS, wait)
             self._numbers += 1
             now = time.monotonic()
-            self._shots[sub_env] = Shot(self._numbers, seen.moves, body, now)
-            for other in [key for key, s in self._shots.items() if s.seen < now - _KEPT_SECONDS]:
-                del self._shots[other]
+            self._frames[sub_env] = Frame(self._numbers, captured.moves, body, now)
+            old = [key for key, one in self._frames.items() if one.used < now - _KEPT_SECONDS]
+            for other in old:
+                del self._frames[other]
 
-    def _is_patient(self, until: float) -> bool:
-        return self._ended is None and time.monotonic() < until
+    def _may_wait_until(self, deadline: float) -> bool:
+        return self._ended is None and time.monotonic() < deadline
 
     # For the instance -----------------------------------------------------------------------
 
@@ -215,7 +227,7 @@ class Screen:
             self._ending.wait(tick - now)
 
     def end(self, why: GymServerError) -> None:
-        """Send every watcher away."""
+        """Answer every watcher with an error from now on."""
         with self._changed:
             self._ended = why
             self._changed.notify_all()

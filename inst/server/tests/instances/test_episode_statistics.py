@@ -2,32 +2,37 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from gym_server.instances.episode_statistics import Standing, SubEnvTally, Tally, told
+from gym_server.instances.episode_statistics import (
+    EpisodeStatistics,
+    Standing,
+    VectorEpisodeStatistics,
+    facts_of,
+)
 
 
-def play(tally, rewards, ends=True):
-    tally.begin()
+def play(statistics, rewards, ends=True):
+    statistics.begin()
     for index, reward in enumerate(rewards):
-        tally.step(reward, ends and index == len(rewards) - 1)
+        statistics.step(reward, ends and index == len(rewards) - 1)
 
 
 def test_an_episode_is_counted_from_its_reset():
-    tally = Tally()
-    assert tally.of(0) == Standing(0, 0, 0.0, False)
-    tally.begin()
-    assert tally.of(0) == Standing(1, 0, 0.0, False)
-    tally.step(1.5, False)
-    tally.step(2.0, True)
-    assert tally.of(0) == Standing(1, 2, 3.5, True)
-    tally.begin()
-    assert tally.of(0) == Standing(2, 0, 0.0, False)
+    statistics = EpisodeStatistics()
+    assert statistics.of(0) == Standing(0, 0, 0.0, False)
+    statistics.begin()
+    assert statistics.of(0) == Standing(1, 0, 0.0, False)
+    statistics.step(1.5, False)
+    statistics.step(2.0, True)
+    assert statistics.of(0) == Standing(1, 2, 3.5, True)
+    statistics.begin()
+    assert statistics.of(0) == Standing(2, 0, 0.0, False)
 
 
 def test_watchers_are_told_of_the_episode_and_the_returns_before_it():
-    tally = Tally()
-    play(tally, [1, 2])
-    play(tally, [5], ends=False)
-    assert told(tally, 0) == {
+    statistics = EpisodeStatistics()
+    play(statistics, [1, 2])
+    play(statistics, [5], ends=False)
+    assert facts_of(statistics, 0) == {
         "state": "running",
         "episode": 2,
         "step": 1,
@@ -37,78 +42,78 @@ def test_watchers_are_told_of_the_episode_and_the_returns_before_it():
 
 
 def test_a_reset_that_follows_a_reset_begins_no_other_episode():
-    tally = Tally()
-    tally.begin()
-    tally.begin()
-    assert tally.of(0).episode == 1
+    statistics = EpisodeStatistics()
+    statistics.begin()
+    statistics.begin()
+    assert statistics.of(0).episode == 1
 
 
 def test_returns_are_of_episodes_that_ended():
-    tally = Tally()
-    play(tally, [1, 2])
-    play(tally, [5], ends=False)
-    play(tally, [4])
-    assert list(tally.returns) == [3, 4]
-    assert tally.of(0).episode == 3
+    statistics = EpisodeStatistics()
+    play(statistics, [1, 2])
+    play(statistics, [5], ends=False)
+    play(statistics, [4])
+    assert list(statistics.returns) == [3, 4]
+    assert statistics.of(0).episode == 3
 
 
 def test_steps_after_the_end_count_for_nothing():
-    tally = Tally()
-    play(tally, [1])
-    tally.step(7, True)
-    assert tally.of(0) == Standing(1, 1, 1.0, True)
-    assert list(tally.returns) == [1]
+    statistics = EpisodeStatistics()
+    play(statistics, [1])
+    statistics.step(7, True)
+    assert statistics.of(0) == Standing(1, 1, 1.0, True)
+    assert list(statistics.returns) == [1]
 
 
 def test_the_last_hundred_returns_are_kept():
-    tally = Tally()
+    statistics = EpisodeStatistics()
     for number in range(130):
-        play(tally, [number])
-    assert list(tally.returns) == list(range(30, 130))
+        play(statistics, [number])
+    assert list(statistics.returns) == list(range(30, 130))
 
 
 def sub_envs_of(mode, sub_envs=3):
-    tally = SubEnvTally(sub_envs, mode)
-    tally.begin(None)
-    return tally
+    statistics = VectorEpisodeStatistics(sub_envs, mode)
+    statistics.begin(None)
+    return statistics
 
 
-def step(tally, rewards, ended, sub_envs=None):
+def step(statistics, rewards, ended, sub_envs=None):
     rows = None if sub_envs is None else np.array(sub_envs)
-    tally.step(np.array(rewards, dtype=float), np.array(ended, dtype=bool), rows)
+    statistics.step(np.array(rewards, dtype=float), np.array(ended, dtype=bool), rows)
 
 
 def test_the_step_that_resets_a_sub_env_is_no_step_of_its_episode():
-    tally = sub_envs_of(AutoresetMode.NEXT_STEP)
-    step(tally, [1, 1, 1], [0, 1, 0])
-    assert tally.of(1) == Standing(1, 1, 1.0, True)
-    step(tally, [1, 0, 1], [0, 0, 0])
-    assert tally.of(1) == Standing(2, 0, 0.0, False)
-    assert tally.of(0) == Standing(1, 2, 2.0, False)
-    step(tally, [1, 1, 1], [1, 0, 0])
-    assert tally.of(1) == Standing(2, 1, 1.0, False)
-    assert list(tally.returns) == [1, 3]
+    statistics = sub_envs_of(AutoresetMode.NEXT_STEP)
+    step(statistics, [1, 1, 1], [0, 1, 0])
+    assert statistics.of(1) == Standing(1, 1, 1.0, True)
+    step(statistics, [1, 0, 1], [0, 0, 0])
+    assert statistics.of(1) == Standing(2, 0, 0.0, False)
+    assert statistics.of(0) == Standing(1, 2, 2.0, False)
+    step(statistics, [1, 1, 1], [1, 0, 0])
+    assert statistics.of(1) == Standing(2, 1, 1.0, False)
+    assert list(statistics.returns) == [1, 3]
 
 
 def test_a_sub_env_that_resets_at_once_is_in_its_next_episode():
-    tally = sub_envs_of(AutoresetMode.SAME_STEP)
-    step(tally, [2, 1, 1], [1, 0, 0])
-    assert tally.of(0) == Standing(2, 0, 0.0, False)
-    step(tally, [3, 1, 1], [1, 1, 0])
-    assert list(tally.returns) == [2, 3, 2]
+    statistics = sub_envs_of(AutoresetMode.SAME_STEP)
+    step(statistics, [2, 1, 1], [1, 0, 0])
+    assert statistics.of(0) == Standing(2, 0, 0.0, False)
+    step(statistics, [3, 1, 1], [1, 1, 0])
+    assert list(statistics.returns) == [2, 3, 2]
 
 
 def test_sub_envs_reset_by_a_mask_begin_anew_and_others_go_on():
-    tally = sub_envs_of(AutoresetMode.DISABLED)
-    step(tally, [1, 1, 1], [1, 0, 0])
-    step(tally, [5, 6], [0, 1], sub_envs=[1, 2])
-    tally.begin(np.array([True, False, False]))
-    assert [tally.of(sub_env) for sub_env in range(3)] == [
+    statistics = sub_envs_of(AutoresetMode.DISABLED)
+    step(statistics, [1, 1, 1], [1, 0, 0])
+    step(statistics, [5, 6], [0, 1], sub_envs=[1, 2])
+    statistics.begin(np.array([True, False, False]))
+    assert [statistics.of(sub_env) for sub_env in range(3)] == [
         Standing(2, 0, 0.0, False),
         Standing(1, 2, 6.0, False),
         Standing(1, 2, 7.0, True),
     ]
-    assert list(tally.returns) == [1, 7]
+    assert list(statistics.returns) == [1, 7]
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
@@ -126,6 +131,6 @@ def test_sub_envs_return_what_the_environment_gave(client, sub_envs, app, mode):
         over = done if mode == "NextStep" else np.zeros(3, dtype=bool)
         if mode == "SameStep":
             so_far[done] = 0
-    tally = app._instances.get(url.rsplit("/", 1)[1])._tally
+    statistics = app._instances.get(url.rsplit("/", 1)[1])._backend.env.statistics
     assert len(returns) > 10
-    assert list(tally.returns) == pytest.approx(returns)
+    assert list(statistics.returns) == pytest.approx(returns)

@@ -1,51 +1,52 @@
-"""The right to an environment."""
+"""The lock of an instance."""
 
 import threading
 import time
-from types import SimpleNamespace
 
 import pytest
 
-from gym_server.errors import GymServerError
-from gym_server.instances.lock import Hold
+from gym_server.errors import GymServerError, unknown_instance
+from gym_server.instances.lock import InstanceLock
 from gym_server.rendering.render_thread import RenderThread
 
 
 @pytest.fixture
-def hold():
-    cleared = []
-    instance = SimpleNamespace(
-        instance_id="12345678", cleared=cleared, clear_away=lambda: cleared.append(True)
-    )
-    return Hold(instance)
+def cleared():
+    """Return what the lock has cleared away so far."""
+    return []
 
 
-def test_one_has_it_at_a_time(hold):
-    with hold:
-        assert not hold.take(0)
-    assert hold.take(0)
-    assert not hold.take(0)
-    hold.give_back()
+@pytest.fixture
+def lock(cleared):
+    return InstanceLock(lambda: unknown_instance("12345678"), lambda: cleared.append(True))
 
 
-def test_to_move_is_a_use_and_to_look_is_none(hold):
-    hold.used = 0.0
-    assert hold.take(0)
-    hold.give_back()
-    assert hold.used == 0.0
-    with hold:
-        assert hold.used > 0.0
+def test_one_has_it_at_a_time(lock):
+    with lock:
+        assert not lock.acquire(0)
+    assert lock.acquire(0)
+    assert not lock.acquire(0)
+    lock.release()
 
 
-def test_nobody_has_it_once_the_environment_is_closed(hold):
-    waiting = threading.Thread(target=lambda: refused(hold.__enter__))
-    with hold:
+def test_to_move_is_a_use_and_to_look_is_none(lock):
+    lock.used = 0.0
+    assert lock.acquire(0)
+    lock.release()
+    assert lock.used == 0.0
+    with lock:
+        assert lock.used > 0.0
+
+
+def test_nobody_has_it_once_the_environment_is_closed(lock):
+    waiting = threading.Thread(target=lambda: refused(lock.__enter__))
+    with lock:
         waiting.start()
-        hold.closed = True
+        lock.closed = True
     waiting.join(5)
     assert not waiting.is_alive()
     for _ in range(2):
-        refused(hold.take, 0)
+        refused(lock.acquire, 0)
 
 
 def refused(call, *args):
@@ -53,50 +54,51 @@ def refused(call, *args):
         call(*args)
 
 
-def test_it_tells_since_when_it_is_taken(hold):
-    assert hold.busy_since is None
+def test_it_tells_since_when_it_is_taken(lock):
+    assert lock.busy_since is None
     before = time.monotonic()
-    with hold:
-        assert before <= hold.busy_since <= time.monotonic()
-    assert hold.busy_since is None
-    assert hold.take(0)
-    assert hold.busy_since is not None
-    hold.give_back()
-    assert hold.busy_since is None
+    with lock:
+        assert before <= lock.busy_since <= time.monotonic()
+    assert lock.busy_since is None
+    assert lock.acquire(0)
+    assert lock.busy_since is not None
+    lock.release()
+    assert lock.busy_since is None
 
 
 def test_who_waits_for_the_render_thread_has_not_begun():
     renderer = RenderThread()
-    hold, may_end = Hold(SimpleNamespace(instance_id="12345678"), renderer), threading.Event()
+    lock = InstanceLock(lambda: unknown_instance("12345678"), lambda: None, renderer)
+    may_end = threading.Event()
     occupying = threading.Thread(target=renderer.run, args=(may_end.wait, 10))
     occupying.start()
 
     def draw():
-        with hold:
+        with lock:
             renderer.run(lambda: None)
 
     drawing = threading.Thread(target=draw)
     drawing.start()
-    while hold.busy_since is None:
+    while lock.busy_since is None:
         time.sleep(0.01)
-    since = hold.busy_since
+    since = lock.busy_since
     time.sleep(0.05)
-    assert hold.busy_since > since
+    assert lock.busy_since > since
     may_end.set()
     drawing.join(10)
     occupying.join(10)
-    assert hold.busy_since is None
+    assert lock.busy_since is None
     renderer.stop()
 
 
-def test_it_can_be_taken_away_from_a_thread_that_is_stuck(hold):
+def test_it_can_be_taken_away_from_a_thread_that_is_stuck(lock, cleared):
     why = GymServerError("call_too_long", "too long")
     entered, may_end = threading.Event(), threading.Event()
     outcomes = []
 
     def have(do):
         try:
-            with hold:
+            with lock:
                 do()
         except GymServerError as refusal:
             outcomes.append(refusal.message)
@@ -106,18 +108,18 @@ def test_it_can_be_taken_away_from_a_thread_that_is_stuck(hold):
     assert entered.wait(10)
     queued = threading.Thread(target=have, args=(lambda: outcomes.append("entered"),))
     queued.start()
-    assert hold.condemn(why) == stuck.ident
+    assert lock.abandon(why) == stuck.ident
     queued.join(10)
     assert outcomes == ["too long"]
-    assert hold._instance.cleared == []
+    assert cleared == []
     with pytest.raises(GymServerError, match="too long"):
-        hold.take(0)
+        lock.acquire(0)
     may_end.set()
     # Its next request might get the answer that is still on its way for this one.
     stuck.join(0.2)
     assert stuck.is_alive()
-    hold.settle()
+    lock.answered()
     stuck.join(10)
     assert outcomes == ["too long", "too long"]
-    assert hold._instance.cleared == [True]
-    assert hold.condemn(why) is None
+    assert cleared == [True]
+    assert lock.abandon(why) is None

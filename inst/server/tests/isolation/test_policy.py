@@ -36,5 +36,5 @@ def test_only_an_id_that_nobody_knows_imports_all_modules():
         ("faulty_envs:Counting-v0", set()),
         ("Nobody-v0", set(ALLOWED)),
     ]:
-        told = isolation.surroundings(env_id, ALLOWED, 5)
-        assert (told.imported, told.max_num_envs, told.max_mb) == (imported, 5, 100)
+        settings = isolation.settings(env_id, ALLOWED, 5)
+        assert (settings.imported, settings.max_num_envs, settings.max_mb) == (imported, 5, 100)

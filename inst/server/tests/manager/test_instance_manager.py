@@ -7,7 +7,7 @@ import time
 import pytest
 
 from gym_server.api.app import Config, create_app
-from gym_server.manager.instance_manager import Instances
+from gym_server.manager.instance_manager import InstanceManager
 
 
 @pytest.fixture
@@ -62,10 +62,10 @@ def test_who_waits_for_an_instance_that_closes_learns_that_it_is_gone(
     url = faulty("Counting")
     client.post(f"{url}/reset/")
     instance = app._instances.get(url.rsplit("/", 1)[1])
-    with instance.hold:
+    with instance.lock:
         waiting = in_background(f"{url}/step/", {"action": 0})
         time.sleep(0.2)
-        instance.hold.closed = True
+        instance.lock.closed = True
     assert waiting().json["message"] == f"Instance_id {instance.instance_id} unknown"
     assert instance.about()["steps"] == 0
 
@@ -134,14 +134,14 @@ def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
     monkeypatch, eventually
 ):
     app = create_app(Config(isolate="all"))
-    enlist = Instances._enlist
+    enlist = InstanceManager._enlist
 
-    def end_it_and_enlist(self, instance, making):
-        os.kill(instance._worker.pid, signal.SIGKILL)
-        eventually(lambda: instance._worker.why is not None)
-        return enlist(self, instance, making)
+    def end_it_and_enlist(self, instance, creation):
+        os.kill(instance._backend._worker.pid, signal.SIGKILL)
+        eventually(lambda: instance._backend._worker.why is not None)
+        return enlist(self, instance, creation)
 
-    monkeypatch.setattr(Instances, "_enlist", end_it_and_enlist)
+    monkeypatch.setattr(InstanceManager, "_enlist", end_it_and_enlist)
     client = app.test_client()
     instance_id = client.post("/v1/envs/", json={"env_id": "CartPole-v1"}).json["instance_id"]
     assert client.get("/v1/envs/").json["all_envs"] == {}

@@ -3,7 +3,7 @@ import gc
 import weakref
 
 from gym_server.errors import GymServerError
-from gym_server.manager.tombstones import Departed
+from gym_server.manager.tombstones import Tombstones
 
 
 def reason(number):
@@ -11,13 +11,13 @@ def reason(number):
 
 
 def test_a_reason_is_kept():
-    departed = Departed()
-    departed.add("a", reason(1))
-    found = departed.why("a")
+    tombstones = Tombstones()
+    tombstones.add("a", reason(1))
+    found = tombstones.why("a")
     assert (found.code, found.message, found.hint) == ("call_too_long", "reason 1", "hint")
     # What is raised over and over must not grow.
-    assert departed.why("a") is not found
-    assert "a" in departed
+    assert tombstones.why("a") is not found
+    assert "a" in tombstones
 
 
 def test_a_reason_keeps_nothing_of_where_it_was_raised():
@@ -25,8 +25,8 @@ def test_a_reason_keeps_nothing_of_where_it_was_raised():
         def step(self, why):
             raise why
 
-    departed, why, environment = Departed(), reason(1), Environment()
-    departed.add("a", why)
+    tombstones, why, environment = Tombstones(), reason(1), Environment()
+    tombstones.add("a", why)
     with contextlib.suppress(GymServerError):
         environment.step(why)
     gone = weakref.ref(environment)
@@ -36,11 +36,11 @@ def test_a_reason_keeps_nothing_of_where_it_was_raised():
 
 
 def test_without_one_an_instance_is_unknown():
-    assert Departed().why("b").code == "unknown_instance"
+    assert Tombstones().why("b").code == "unknown_instance"
 
 
 def test_only_the_latest_are_kept():
-    departed = Departed(most=3)
+    tombstones = Tombstones(most=3)
     for number in range(5):
-        departed.add(str(number), reason(number))
-    assert [str(number) in departed for number in range(5)] == [False, False, True, True, True]
+        tombstones.add(str(number), reason(number))
+    assert [str(number) in tombstones for number in range(5)] == [False, False, True, True, True]

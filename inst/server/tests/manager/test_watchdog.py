@@ -169,7 +169,7 @@ def test_sub_envs_in_processes_end_with_it(quick, eventually):
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}
     url = created(client, "faulty_envs:Hanging-v0", **fields)
-    processes = app._instances.get(url.rsplit("/", 1)[1])._env.processes
+    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.processes
     client.post(f"{url}/reset/")
     # Their start takes its time.
     app._watchdog._limits = Limits(max_call_seconds=0.2)
@@ -241,7 +241,7 @@ def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, ev
     assert client.get("/v1/envs/").json["all_envs"] == {}
 
 
-def test_one_that_was_given_up_may_hang_once_more_and_others_are_drawn(quick, monkeypatch):
+def test_one_that_was_evicted_may_hang_once_more_and_others_are_drawn(quick, monkeypatch):
     app = quick(max_call_seconds=0.3)
     closing, released, drawn = threading.Event(), threading.Event(), []
 
@@ -337,14 +337,14 @@ def test_an_answer_for_another_never_reaches_the_next_request(strict):
 
 def test_an_answer_for_one_whose_making_fails_never_reaches_its_next_request(quick, monkeypatch):
     app = quick(max_call_seconds=0.2)
-    given_up, came_back, waited = threading.Event(), threading.Event(), []
+    abandoned, came_back, waited = threading.Event(), threading.Event(), []
 
     def fail(*_):
-        given_up.wait(SOON)
+        abandoned.wait(SOON)
         raise ValueError("too late")
 
     def answer_for(*_):
-        given_up.set()
+        abandoned.set()
         # Whoever makes it must not come back before this is done.
         waited.append(not came_back.wait(0.5))
 

@@ -56,7 +56,7 @@ def occupied():
     renderer.stop()
 
 
-def test_who_loses_patience_is_not_drawn(occupied):
+def test_a_job_whose_turn_takes_too_long_is_not_drawn(occupied):
     renderer, go_on = occupied
     drawn = []
     with pytest.raises(Occupied):
@@ -66,14 +66,14 @@ def test_who_loses_patience_is_not_drawn(occupied):
     assert drawn == ["later"]
 
 
-def test_what_has_begun_is_waited_for_without_patience():
+def test_a_job_that_has_begun_is_waited_for():
     renderer, asked = RenderThread(), threading.Event()
     # It ends only after the question whether to wait on.
     assert renderer.run_while(asked.set, asked.wait, 30)
     renderer.stop()
 
 
-def test_the_patient_get_their_turn(occupied):
+def test_a_job_that_may_wait_gets_its_turn(occupied):
     renderer, go_on = occupied
     assert renderer.run_while(lambda: go_on() or True, lambda: "drawn") == "drawn"
 
@@ -91,13 +91,13 @@ def test_another_thread_draws_on_when_one_hangs():
     asking = threading.Thread(target=ask)
     asking.start()
     assert began.wait(10)
-    assert not renderer.give_up(threading.get_ident(), ValueError("not mine"))
-    assert renderer.give_up(asking.ident, ValueError("it hangs"))
+    assert not renderer.abandon(threading.get_ident(), ValueError("not mine"))
+    assert renderer.abandon(asking.ident, ValueError("it hangs"))
     asking.join(10)
     assert outcomes == ["it hangs"]
     first = renderer.run(threading.get_ident)
     # The one that comes back draws no more.
     may_end.set()
     assert {renderer.run(threading.get_ident) for _ in range(20)} == {first}
-    assert not renderer.give_up(first, ValueError("it does not hang"))
+    assert not renderer.abandon(first, ValueError("it does not hang"))
     renderer.stop()

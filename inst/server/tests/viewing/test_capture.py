@@ -6,7 +6,7 @@ import time
 import pytest
 from test_viewer import in_background, play, state
 
-from gym_server.viewing import viewer as screens
+from gym_server.viewing import viewer
 
 
 @pytest.fixture
@@ -15,13 +15,14 @@ def occupied(app, client, faulty, watch):
     url = faulty("Drawing")
     instance, _ = watch(url)
     begun, over = threading.Event(), threading.Event()
-    draw = instance._draw
+    env = instance._backend.env
+    draw = env.draw
 
     def for_long():
         begun.set()
         over.wait(30)
 
-    instance._draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
+    env.draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
     client.post(f"{url}/reset/")
     thread, _ = in_background(state, app.test_client(), url)
     assert begun.wait(5)
@@ -67,7 +68,7 @@ def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occu
 
 
 def test_who_waits_for_others_drawing_for_long_is_told(client, create, occupied, monkeypatch):
-    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.2)
+    monkeypatch.setattr(viewer, "_LONGEST_WAIT", 0.2)
     url = create()
     client.post(f"{url}/reset/")
     assert state(client, url) == {"number": None, "state": "busy"}
@@ -87,7 +88,7 @@ def test_who_is_stepped_all_the_time_is_seen(
 
     urls = [faulty("Drawing", seconds=seconds, length=10**6) for _ in range(2)]
     for url in urls:
-        watch(url)[0].draws_when_stepped = draws_when_stepped
+        watch(url)[0]._backend.draws_when_stepped = draws_when_stepped
         client.post(f"{url}/reset/")
     players = [in_background(play_on, url)[0] for url in urls]
     number, end = 0, time.monotonic() + 60

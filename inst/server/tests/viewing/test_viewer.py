@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from pictures import decode
 
-from gym_server.viewing import capture
-from gym_server.viewing import viewer as screens
+from gym_server.viewing import capture, viewer
 
 
 def state(client, url, **query):
@@ -134,7 +133,8 @@ def test_the_observation_of_a_sub_env_is_its_own_when_only_others_stepped(app, c
     before = client.post(f"{url}/reset/", json={"seed": 1}).json["observation"]
     fields = {"action": [[0] * 4] * 2, "step_mask": [True, False, True]}
     after = client.post(f"{url}/step/", json=fields).json["observation"]
-    seen = [instance._observed(sub_env).tolist() for sub_env in range(3)]
+    backend = instance._backend
+    seen = [backend.env.observed(i, backend._observation).tolist() for i in range(3)]
     assert seen == [after[0], before[1], after[1]]
 
 
@@ -150,7 +150,7 @@ def test_nothing_is_drawn_unwatched(client, create, watch):
 
 
 def test_an_environment_that_nobody_steps_is_drawn_once(client, create, watch, monkeypatch):
-    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    monkeypatch.setattr(viewer, "_LONGEST_WAIT", 0.3)
     url = create()
     _, drawn = watch(url)
     client.post(f"{url}/reset/")
@@ -211,7 +211,7 @@ def test_the_latest_wins_and_is_seen_when_the_steps_end(client, create):
 
 
 def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
-    monkeypatch.setattr(screens, "_LEAST_SECONDS", 0.2)
+    monkeypatch.setattr(viewer, "_LEAST_SECONDS", 0.2)
     url = faulty("Drawing")
     _, drawn = watch(url)
     client.post(f"{url}/reset/")
@@ -226,13 +226,14 @@ def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
 def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch):
     url = faulty("Drawing")
     instance, drawn = watch(url)
-    draw = instance._draw
+    env = instance._backend.env
+    draw = env.draw
 
     def slowly(sub_env):
         time.sleep(0.05)
         return draw(sub_env)
 
-    instance._draw = slowly
+    env.draw = slowly
     client.post(f"{url}/reset/")
     number = state(client, url)["number"]
     began = time.monotonic()
@@ -244,18 +245,18 @@ def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch
 
 
 def test_sub_envs_that_nobody_looks_at_any_more_are_forgotten(client, create, watch, monkeypatch):
-    monkeypatch.setattr(screens, "_KEPT_SECONDS", 0.1)
+    monkeypatch.setattr(viewer, "_KEPT_SECONDS", 0.1)
     url = create(num_envs=8, vectorization_mode="sync")
     instance, _ = watch(url)
     client.post(f"{url}/reset/")
     for sub_env in range(8):
         state(client, url, sub_env=sub_env)
         time.sleep(0.06)
-    assert len(instance.screen._shots) < 5
+    assert len(instance.viewer._frames) < 5
 
 
 def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
-    monkeypatch.setattr(capture, "_PATIENCE", 0.2)
+    monkeypatch.setattr(capture, "_LOCK_TIMEOUT", 0.2)
     url = faulty("Counting", seconds=1.5)
     client.post(f"{url}/reset/")
     thread, _ = in_background(play, app.test_client(), url)
@@ -266,15 +267,15 @@ def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
 
 
 def test_one_never_drawn_whose_turn_is_far_off_is_told_in_time(client, faulty, watch, monkeypatch):
-    monkeypatch.setattr(screens, "_LONGEST_WAIT", 0.3)
+    monkeypatch.setattr(viewer, "_LONGEST_WAIT", 0.3)
     url = faulty("Drawing")
     instance, _ = watch(url)
     client.post(f"{url}/reset/")
-    instance.screen._due = time.monotonic() + 3600
+    instance.viewer._due = time.monotonic() + 3600
     waits = []
-    wait = instance.screen._changed.wait
+    wait = instance.viewer._changed.wait
     monkeypatch.setattr(
-        instance.screen._changed, "wait", lambda seconds: (waits.append(seconds), wait(seconds))
+        instance.viewer._changed, "wait", lambda seconds: (waits.append(seconds), wait(seconds))
     )
     thread, seen = in_background(state, client.application.test_client(), url)
     thread.join(5)
@@ -314,7 +315,7 @@ def test_at_the_end_all_watchers_are_sent_away(app, client, create):
 
 
 def is_paced(instance):
-    return instance.screen._next_tick > 0
+    return instance.viewer._next_tick > 0
 
 
 @pytest.mark.parametrize("how", ["human", "render", "num_envs"])
@@ -359,7 +360,7 @@ def test_one_that_is_held_up_holds_up_no_other_and_is_seen(app, client, create):
 
 @pytest.mark.parametrize(("fps", "expected"), [(50, 50), (None, 30), (0, 30), ("x", 30), (0.1, 30)])
 def test_a_speed_that_makes_no_sense_is_the_usual_one(fps, expected):
-    assert screens.Screen(None, fps).fps == expected
+    assert viewer.Viewer(None, fps).fps == expected
 
 
 def test_being_watched_is_known_and_is_no_use_of_the_environment(client, create):

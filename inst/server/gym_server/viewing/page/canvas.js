@@ -1,6 +1,6 @@
-// What all that is drawn on this page has in common.
+// What all drawings of this page share.
 
-// Make a canvas as fine as the screen and empty; lengths are those of the page.
+// Empty a canvas and give it the resolution of the display; lengths are in CSS pixels.
 export function prepare(canvas) {
   const scale = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas;

@@ -1,4 +1,4 @@
-// The returns of the last episodes: a point each, and the return that counts as solved.
+// Draws the returns of the last episodes, a point each, and the return that counts as solved.
 
 import { number, prepare } from "./canvas.js";
 
@@ -44,7 +44,7 @@ export function drawChart(canvas, returns, goal) {
     stroke(pen, [[left, y(goal)], [right, y(goal)]]);
     pen.setLineDash([]);
     const above = y(goal) - 20 > top;
-    // Where the first episodes are, which seldom come so far.
+    // On the left, where the returns of the first episodes seldom reach.
     pen.textAlign = "left";
     pen.fillText(`solved: mean of ${number(goal)}`, left + 4, y(goal) + (above ? -9 : 11));
   }
@@ -69,7 +69,7 @@ function stroke(pen, points) {
 function range(values, goal) {
   const all = Number.isFinite(goal) ? [...values, goal] : values;
   let [low, high] = [Math.min(...all), Math.max(...all)];
-  // Returns are read against nothing at all.
+  // The axis includes 0, so that returns can be compared with it.
   [low, high] = [Math.min(low, 0), Math.max(high, 0)];
   return low === high ? [0, 1] : [low, high];
 }

@@ -1,4 +1,4 @@
-// An observation that moves: a bar for each number as it is, a line for how it was.
+// Draws an observation: a bar for each number, and a line for its last values.
 
 import { number, prepare } from "./canvas.js";
 
@@ -52,8 +52,8 @@ export class Observation {
       };
       this.paintOne(pen, colour, place, names[index], value, this.histories[index]);
     });
-    const said = values.slice(0, 8).map((value, i) => `${names[i]} ${number(value)}`.trim());
-    this.canvas.setAttribute("aria-label", `The observation: ${said.join(", ")}`);
+    const texts = values.slice(0, 8).map((value, i) => `${names[i]} ${number(value)}`.trim());
+    this.canvas.setAttribute("aria-label", `The observation: ${texts.join(", ")}`);
   }
 
   paintOne(pen, colour, place, name, value, history) {

@@ -1,4 +1,4 @@
-// How this view is shown: live, or a short clip slowly and then on from the present.
+// Shows frames live, or collects a short clip, shows it slowly and goes on from the present.
 
 const CLIP_SECONDS = 2;
 
@@ -10,7 +10,7 @@ export class Playback {
     this.drop();
   }
 
-  // Whether more is wanted: not while a clip that is complete is still being shown.
+  // Whether more frames are wanted: not while a clip that is complete is still being shown.
   get wants() {
     return !this.paused && !this.complete;
   }
@@ -22,7 +22,7 @@ export class Playback {
 
   setPaused(paused) {
     this.paused = paused;
-    // The latest wins: what came meanwhile is past.
+    // After a pause it goes on with the latest frame.
     this.drop();
   }
 
@@ -33,20 +33,20 @@ export class Playback {
     this.complete = false;
   }
 
-  arrive(shot) {
+  arrive(frame) {
     if (this.paused) return;
     if (this.slowness === 1) {
-      this.show(shot);
+      this.show(frame);
       return;
     }
     const now = performance.now();
     if (!this.clip.length && this.timer === null) {
       this.filmed = this.played = now;
-      this.clip.push({ shot, at: now });
+      this.clip.push({ frame, at: now });
       this.playNext();
       return;
     }
-    this.clip.push({ shot, at: now });
+    this.clip.push({ frame, at: now });
     this.complete = now - this.filmed > CLIP_SECONDS * 1000;
     if (this.timer === null) this.playNext();
   }
@@ -54,7 +54,7 @@ export class Playback {
   playNext() {
     const next = this.clip[0];
     if (!next) {
-      // All that was filmed is shown.
+      // The clip was shown to its end.
       this.timer = null;
       if (this.complete || performance.now() - this.filmed > CLIP_SECONDS * 1000) this.drop();
       return;
@@ -62,7 +62,7 @@ export class Playback {
     const due = this.played + (next.at - this.filmed) * this.slowness;
     this.timer = setTimeout(() => {
       this.clip.shift();
-      this.show(next.shot);
+      this.show(next.frame);
       this.playNext();
     }, Math.max(0, due - performance.now()));
   }

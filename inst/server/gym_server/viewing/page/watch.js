@@ -1,4 +1,4 @@
-// Follows one environment: asks for what is new, and shows it.
+// Follows one environment: asks for new frames, and shows them.
 
 import { number } from "./canvas.js";
 import { drawChart } from "./chart.js";
@@ -6,14 +6,14 @@ import { Observation } from "./observation.js";
 import { Playback } from "./playback.js";
 
 const $ = (id) => document.getElementById(id);
-// What opens the page in place of a token, where the server asks for one.
+// Opens the page in place of a token, where the server needs one.
 const KEY = new URLSearchParams(location.search).get("key");
 // The page's own address, whether or not it was asked for with its last slash.
 const HERE = new URL(location.pathname.replace(/\/?$/, "/"), location.href);
 const GONE_PAUSE = 1000;
 const PRESENCE_PAUSE = 700;
 const STILL_AFTER = 1500;
-// With these there is nothing to wait for.
+// After these errors the environment does not come back.
 const CLOSED = new Set([
   "unknown_instance", "instance_idle_closed", "call_too_long", "environment_died",
 ]);
@@ -23,7 +23,7 @@ const playback = new Playback(show);
 let subEnv = 0;
 let after = null;
 let shown = null;
-let question = null;
+let request = null;
 let wake = () => {};
 let quiet = null;
 let pace = null;
@@ -34,9 +34,9 @@ async function follow() {
   for (;;) {
     try {
       if (playback.wants && !document.hidden) {
-        await askForNews();
+        await askForFrame();
       } else {
-        // Still there, but nothing needs to be drawn.
+        // Keep watching without a frame.
         await ask("presence/");
         if (document.body.dataset.state === "gone") returnFromGone();
         await sleep(PRESENCE_PAUSE);
@@ -44,11 +44,11 @@ async function follow() {
     } catch (problem) {
       if (problem.name === "AbortError") continue;
       if (CLOSED.has(problem.code)) {
-        await tellClosed(problem);
+        await showClosed(problem);
         return;
       }
       if (problem.status === 401) {
-        tellLocked(problem);
+        showLocked(problem);
         return;
       }
       if (problem.code === "invalid_parameter" && subEnv > 0) {
@@ -56,33 +56,33 @@ async function follow() {
         continue;
       }
       after = null;
-      if (problem.status === 500 || problem.status === 429) tell("faulty", "This cannot be shown", problem.message);
-      else tell("gone", "The server is gone", "This page goes on by itself when it is back.");
+      if (problem.status === 500 || problem.status === 429) showMessage("faulty", "This cannot be shown", problem.message);
+      else showMessage("gone", "The server is gone", "This page goes on by itself when it is back.");
       await sleep(GONE_PAUSE);
     }
   }
 }
 
-async function askForNews() {
+async function askForFrame() {
   const query = new URLSearchParams({ sub_env: subEnv });
   if (after !== null) query.set("after", after);
   const asked = subEnv;
-  const shot = await ask(`state/?${query}`);
+  const frame = await ask(`state/?${query}`);
   if (asked !== subEnv || playback.paused) return;
-  if (shot.state === "busy") {
+  if (frame.state === "busy") {
     setState("busy", "busy: a picture has to wait");
     return;
   }
-  const isNew = shot.number !== after;
-  after = shot.number;
-  if (isNew) playback.arrive(shot);
+  const isNew = frame.number !== after;
+  after = frame.number;
+  if (isNew) playback.arrive(frame);
 }
 
 async function ask(path) {
-  question = new AbortController();
+  request = new AbortController();
   const url = new URL(path, HERE);
   if (KEY !== null) url.searchParams.set("key", KEY);
-  const answer = await fetch(url, { cache: "no-store", signal: question.signal });
+  const answer = await fetch(url, { cache: "no-store", signal: request.signal });
   const content = await answer.json();
   if (!answer.ok) throw Object.assign(new Error(content.message), content, { status: answer.status });
   return content;
@@ -99,41 +99,41 @@ function sleep(milliseconds) {
 }
 
 function askAnew() {
-  if (question) question.abort();
+  if (request) request.abort();
   wake();
 }
 
 // Showing -----------------------------------------------------------------------------------
 
-async function show(shot) {
-  shown = shot;
+async function show(frame) {
+  shown = frame;
   hideMessage();
-  $("env").textContent = shot.env_id;
-  document.title = `${shot.env_id} · episode ${shot.episode}`;
-  showSubEnvs(shot);
-  $("episode").textContent = shot.episode ? number(shot.episode) : "–";
-  $("step").textContent = shot.episode ? number(shot.step) : "–";
-  $("return").textContent = shot.episode ? number(shot.return) : "–";
-  showReturns(shot);
-  showPace(shot);
-  $("observation").hidden = !shot.observation;
-  $("why").hidden = !shot.observation;
-  $("scene").classList.toggle("observing", Boolean(shot.observation));
-  $("picture").hidden = !shot.frame;
-  if (shot.state === "not_reset") {
-    tell("waiting", "Not reset yet", "There is something to see when its first episode begins.");
+  $("env").textContent = frame.env_id;
+  document.title = `${frame.env_id} · episode ${frame.episode}`;
+  showSubEnvs(frame);
+  $("episode").textContent = frame.episode ? number(frame.episode) : "–";
+  $("step").textContent = frame.episode ? number(frame.step) : "–";
+  $("return").textContent = frame.episode ? number(frame.return) : "–";
+  showReturns(frame);
+  showPace(frame);
+  $("observation").hidden = !frame.observation;
+  $("why").hidden = !frame.observation;
+  $("scene").classList.toggle("observing", Boolean(frame.observation));
+  $("picture").hidden = !frame.frame;
+  if (frame.state === "not_reset") {
+    showMessage("waiting", "Not reset yet", "There is something to see when its first episode begins.");
     return;
   }
-  setLive(shot);
-  if (shot.observation) showObservation(shot);
-  if (shot.frame) await showPicture(shot);
+  setLive(frame);
+  if (frame.observation) showObservation(frame);
+  if (frame.frame) await showPicture(frame);
 }
 
-async function showPicture(shot) {
-  const bytes = Uint8Array.from(atob(shot.frame), (letter) => letter.charCodeAt(0));
+async function showPicture(frame) {
+  const bytes = Uint8Array.from(atob(frame.frame), (letter) => letter.charCodeAt(0));
   const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-  // A later one may have been quicker.
-  if (shown !== shot) return;
+  // A later frame may have been decoded first.
+  if (shown !== frame) return;
   const canvas = $("picture");
   if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
     canvas.width = bitmap.width;
@@ -144,9 +144,9 @@ async function showPicture(shot) {
   pen.clearRect(0, 0, canvas.width, canvas.height);
   pen.drawImage(bitmap, 0, 0);
   bitmap.close();
-  const where = shot.num_envs === null ? "" : `, sub-environment ${shot.sub_env + 1}`;
+  const where = frame.num_envs === null ? "" : `, sub-environment ${frame.sub_env + 1}`;
   canvas.setAttribute(
-    "aria-label", `${shot.env_id}${where}, episode ${shot.episode}, step ${shot.step}`
+    "aria-label", `${frame.env_id}${where}, episode ${frame.episode}, step ${frame.step}`
   );
 }
 
@@ -193,7 +193,7 @@ function showPace({ steps, fps, num_envs: numEnvs }) {
   $("pace").textContent = [rate, real].filter(Boolean).join(" · ");
 }
 
-// Saying ------------------------------------------------------------------------------------
+// Messages ----------------------------------------------------------------------------------
 
 function setState(state, words) {
   document.body.dataset.state = state;
@@ -221,7 +221,7 @@ const BADGES = {
   gone: "server gone",
 };
 
-function tell(state, words, advice) {
+function showMessage(state, words, advice) {
   clearTimeout(quiet);
   setState(state, BADGES[state]);
   $("words").textContent = words;
@@ -239,17 +239,17 @@ function hideMessage() {
   $("message").hidden = true;
 }
 
-function tellLocked({ message }) {
+function showLocked({ message }) {
   const advice =
     "In R, env_watch() or env$watch() makes a new link. It lasts until nobody has used it for 10 minutes.";
-  tell("locked", `${message}.`, advice);
+  showMessage("locked", `${message}.`, advice);
   $("pause").disabled = true;
   if (!shown) $("env").textContent = "Locked";
 }
 
-async function tellClosed(problem) {
+async function showClosed(problem) {
   const byItsOwner = problem.code === "unknown_instance";
-  tell("closed", byItsOwner ? "This environment is closed" : problem.message, "");
+  showMessage("closed", byItsOwner ? "This environment is closed" : problem.message, "");
   $("pause").disabled = true;
   $("pace").textContent = "";
   if (!shown) $("env").textContent = "Closed";
@@ -280,7 +280,7 @@ async function tellClosed(problem) {
   }
 }
 
-// Being told --------------------------------------------------------------------------------
+// Controls ----------------------------------------------------------------------------------
 
 function setPaused(paused) {
   playback.setPaused(paused);

@@ -1,0 +1,125 @@
+"""A single environment: one action, one observation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+from gymnasium.spaces import Space
+
+from gym_server import spaces
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.instances.environment import env_id_of
+from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
+from gym_server.json_values import plain
+from gym_server.rendering.render_thread import RenderThread
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+class SingleEnvironment:
+    """A single environment; see ``Environment`` for the methods."""
+
+    num_envs: int | None = None
+    vectorization_mode: str | None = None
+    autoreset_mode: str | None = None
+    fails_as_a_whole = False
+
+    def __init__(self, env: gymnasium.Env, choices: EnvConfig, renderer: RenderThread) -> None:
+        """Take over an environment."""
+        self.gym_env: Any = env
+        self.env_id = env_id_of(choices, env)
+        self.action_space = self.single_action_space = env.action_space
+        self.observation_space = self.single_observation_space = env.observation_space
+        self.draws_when_stepped = draws_when_stepped(env)
+        self.draws_on_render_thread = env.render_mode == "rgb_array"
+        self.statistics: Statistics = EpisodeStatistics()
+        self.has_ended = False
+        self._renderer = renderer
+
+    def check_reset(
+        self, seed: object, options: dict | None, mask: np.ndarray | None, was_reset: bool
+    ) -> None:
+        """Refuse options that make a loop."""
+        argument_limits.check_reset_options(self.gym_env, options)
+
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+        """Reset the environment."""
+        start: tuple = self.gym_env.reset(seed=seed, options=options)
+        return start
+
+    def begin_episodes(self, mask: np.ndarray | None) -> None:
+        """Remember that an episode has begun."""
+        self.has_ended = False
+
+    def select(self, mask: np.ndarray | None) -> tuple[None, None]:
+        """Return that the environment takes one action; a mask was refused before."""
+        return None, None
+
+    def check_running(self, which: np.ndarray | None) -> None:
+        """Leave it to the environment what comes after an episode's end."""
+
+    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
+        """Refuse: there are no sub-environments to select."""
+        raise NotImplementedError
+
+    def read_outcome(
+        self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
+    ) -> tuple[float, bool, bool, bool]:
+        """Return reward, terminated, truncated and done; remember the last."""
+        terminated, truncated = bool(terminated), bool(truncated)
+        self.has_ended = done = terminated or truncated
+        return float(reward), terminated, truncated, done
+
+    def answer(
+        self,
+        observation: object,
+        reward: float,
+        terminated: bool,
+        truncated: bool,
+        done: bool,
+        info: dict,
+        tensors: bool,
+    ) -> dict:
+        """Return the answer to a step."""
+        return {
+            "observation": self.encode(observation, tensors),
+            "reward": reward,
+            "done": done,
+            "terminated": terminated,
+            "truncated": truncated,
+            # Converted while the environment cannot change it.
+            "info": plain(info) if info else {},
+        }
+
+    def encode(self, observation: Any, tensors: bool) -> object:
+        """Return an observation as a JSON value or as ``Parts``."""
+        if tensors:
+            return spaces.encode_tensors(self.observation_space, "observation", observation)
+        return spaces.encode(self.observation_space, observation)
+
+    def encode_action(self, action: Any) -> object:
+        """Return an action as a JSON value."""
+        return spaces.encode(self.action_space, action)
+
+    def decode(self, space: Space, value: object) -> object:
+        """Return the member of a space that a JSON value stands for."""
+        return spaces.decode(space, value)
+
+    def observed(self, sub_env: int, observation: Any) -> object:
+        """Return the last observation."""
+        return observation
+
+    def draw(self, sub_env: int) -> object:
+        """Draw the environment on the render thread."""
+        return self._renderer.run(self.gym_env.render)
+
+    def close(self) -> None:
+        """Close the environment on the render thread."""
+        self._renderer.run(self.gym_env.close)
+
+    def kill(self) -> None:
+        """Do nothing: it runs in this process."""

@@ -1,0 +1,273 @@
+"""A vector environment: one row a sub-environment in what comes and goes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Dict, Space, Tuple
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+from gym_server import spaces
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
+from gym_server.errors import GymServerError, wrong_length
+from gym_server.instances.environment import env_id_of
+from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
+from gym_server.instances.vector_modes import MODES, Mode
+from gym_server.json_values import plain
+from gym_server.rendering.render_thread import RenderThread
+
+
+class VectorEnvironment:
+    """A vector environment; see ``Environment`` for the methods."""
+
+    # Some sub-environments may have moved then, and others not.
+    fails_as_a_whole = True
+
+    def __init__(
+        self, env: VectorEnv, mode: str, choices: EnvConfig, renderer: RenderThread
+    ) -> None:
+        """Take over a vector environment.
+
+        Args:
+            env: it.
+            mode: its vectorization_mode.
+            choices: what the client wanted.
+            renderer: the process's render thread.
+
+        Raises:
+            GymServerError: ``unsupported_space``.
+        """
+        self.gym_env: Any = env
+        self.env_id = env_id_of(choices, env)
+        self.num_envs: int | None = env.num_envs
+        self._num_envs = env.num_envs
+        self.action_space = env.action_space
+        self.observation_space = env.observation_space
+        self.single_action_space = env.single_action_space
+        self.single_observation_space = env.single_observation_space
+        if _has_empty_part(self.single_action_space):
+            raise GymServerError(
+                "unsupported_space",
+                "Gymnasium cannot give each sub-environment its action where it is of "
+                f"{spaces.brief_space(self.single_action_space)}",
+                "an empty Tuple or Dict is the reason; create the environment without num_envs",
+            )
+        self.vectorization_mode: str | None = mode
+        self._mode: Mode = MODES[mode](env, self.env_id, renderer)
+        self._autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
+        self.autoreset_mode: str | None = self._autoreset_mode.value
+        self.draws_when_stepped = self._mode.draws_when_stepped
+        self.draws_on_render_thread = env.render_mode == "rgb_array" and self._mode.draws_in_process
+        self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, self._autoreset_mode)
+        # The sub-environments that ended, where they do not reset themselves.
+        self._ended = np.zeros(env.num_envs, dtype=bool)
+
+    # Reset ----------------------------------------------------------------------------------
+
+    def check_reset(
+        self, seed: Any, options: dict | None, mask: np.ndarray | None, was_reset: bool
+    ) -> None:
+        """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
+        self._check_seed(seed)
+        argument_limits.check_reset_options(self.gym_env, options)
+        if options and "reset_mask" in options:
+            raise GymServerError(
+                "invalid_parameter",
+                "The parameter 'options' must not carry 'reset_mask'",
+                "reset_mask is a parameter of its own",
+            )
+        if mask is not None:
+            self._check_reset_mask(mask, was_reset)
+
+    def _check_seed(self, seed: int | tuple | None) -> None:
+        if not isinstance(seed, tuple):
+            return
+        if len(seed) != self._num_envs:
+            raise wrong_length("seed", len(seed), self._num_envs, "integer or null")
+        if not self._mode.resets_each:
+            raise self._not_supported("one seed a sub-environment")
+
+    def _check_reset_mask(self, mask: np.ndarray, was_reset: bool) -> None:
+        self._check_mask("reset_mask", mask)
+        if not self._mode.resets_each:
+            raise self._not_supported("reset_mask")
+        if not was_reset:
+            raise GymServerError(
+                "reset_needed",
+                "reset() with a mask needs sub-environments that have been reset",
+                "reset all of them first",
+            )
+
+    def _check_mask(self, name: str, mask: np.ndarray) -> None:
+        if len(mask) != self._num_envs:
+            raise wrong_length(name, len(mask), self._num_envs, "boolean")
+        if not mask.any():
+            raise GymServerError(
+                "invalid_parameter",
+                f"The parameter '{name}' must hold true for at least one sub-environment",
+            )
+
+    def _not_supported(self, what: str) -> GymServerError:
+        return GymServerError(
+            "not_supported",
+            f"With vectorization_mode '{self.vectorization_mode}' there is no {what}",
+            "create the environment with vectorization_mode 'sync'",
+        )
+
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+        """Reset all sub-environments, or those of a mask."""
+        if isinstance(seed, tuple):
+            seed = list(seed)
+        if mask is not None:
+            options = {**(options or {}), "reset_mask": mask}
+        start: tuple = self.gym_env.reset(seed=seed, options=options)
+        return start
+
+    def begin_episodes(self, mask: np.ndarray | None) -> None:
+        """Remember that episodes have begun, in the sub-environments of a mask."""
+        self._ended[slice(None) if mask is None else mask] = False
+
+    # Step -----------------------------------------------------------------------------------
+
+    def select(self, mask: np.ndarray | None) -> tuple[np.ndarray | None, int]:
+        """Return which sub-environments a mask selects, None for all, and how many they are."""
+        if mask is None:
+            return None, self._num_envs
+        self._check_mask("step_mask", mask)
+        if not self._mode.steps_some:
+            raise self._not_supported("step_mask")
+        which = np.flatnonzero(mask)
+        return which, len(which)
+
+    def check_running(self, which: np.ndarray | None) -> None:
+        """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
+        if self._autoreset_mode is not AutoresetMode.DISABLED:
+            return
+        stepping = np.arange(self._num_envs) if which is None else which
+        ended = stepping[self._ended[stepping]]
+        if len(ended):
+            raise GymServerError(
+                "reset_needed",
+                f"step() needs a running episode in every sub-environment, and "
+                f"{_named(ended)} ended",
+                "reset with a reset_mask, or step the others with a step_mask",
+            )
+
+    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
+        """Step some sub-environments."""
+        return self._mode.step_some(which, actions)
+
+    def read_outcome(
+        self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return rewards, terminated, truncated and done as arrays; remember the last."""
+        terminated = np.asarray(terminated, dtype=bool)
+        truncated = np.asarray(truncated, dtype=bool)
+        done = terminated | truncated
+        if self._autoreset_mode is AutoresetMode.DISABLED:
+            self._ended[slice(None) if which is None else which] = done
+        return _reward(reward), terminated, truncated, done
+
+    def answer(
+        self,
+        observation: object,
+        reward: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        done: np.ndarray,
+        info: dict,
+        tensors: bool,
+    ) -> dict:
+        """Return the answer to a step: arrays where ``Parts`` are wanted, else lists."""
+        final = self._take_final(info, tensors) if info else {}
+        answer = {
+            "observation": self.encode(observation, tensors),
+            "reward": reward,
+            "terminated": terminated,
+            "truncated": truncated,
+            "info": plain(info) if info else {},
+            **final,
+        }
+        if tensors:
+            return answer
+        answer["done"] = done
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in answer.items()
+        }
+
+    def _take_final(self, info: dict, tensors: bool) -> dict:
+        """Take the last observations of the sub-environments that were reset out of an info."""
+        if self._autoreset_mode is not AutoresetMode.SAME_STEP or "final_obs" not in info:
+            return {}
+        final, which = info.pop("final_obs"), info.pop("_final_obs")
+        rows = np.flatnonzero(which)
+        batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
+        return {
+            "final_obs": self.encode(batch, tensors, "final_obs"),
+            "final_sub_envs": rows.tolist(),
+        }
+
+    # Values ---------------------------------------------------------------------------------
+
+    def encode(self, observation: Any, tensors: bool, name: str = "observation") -> object:
+        """Return a batch of observations as JSON values or as ``Parts``."""
+        if tensors:
+            return spaces.encode_batch_tensors(self.single_observation_space, name, observation)
+        return spaces.encode_batch(self.single_observation_space, observation)
+
+    def encode_action(self, action: Any) -> object:
+        """Return one action a sub-environment as JSON values."""
+        return spaces.encode_sub_envs(self.single_action_space, action)
+
+    def decode(self, space: Space, value: object) -> object:
+        """Return the members of a space that a list has, one a sub-environment."""
+        return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether an episode ended that only a reset of the client's follows."""
+        return bool(self._ended.any())
+
+    def observed(self, sub_env: int, observation: Any) -> object:
+        """Return the last observation of a sub-environment."""
+        return self._mode.observed(self.single_observation_space, sub_env, observation)
+
+    def draw(self, sub_env: int) -> object:
+        """Draw a sub-environment."""
+        return self._mode.draw(sub_env)
+
+    # The end --------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close all sub-environments."""
+        self._mode.close()
+
+    def kill(self) -> None:
+        """Kill the processes that they run in, if they have any."""
+        self._mode.kill()
+
+
+def _has_empty_part(space: Space) -> bool:
+    """Tell whether a space is an empty Tuple or Dict, or has such a part."""
+    match space:
+        case Dict() | Tuple():
+            parts = space.spaces.values() if isinstance(space, Dict) else space.spaces
+            return not parts or any(map(_has_empty_part, parts))
+        case _:
+            return False
+
+
+def _named(sub_envs: np.ndarray, most: int = 10) -> str:
+    """Return the numbers of some sub-environments as words."""
+    if len(sub_envs) == 1:
+        return f"sub-environment {sub_envs[0]}"
+    more = f" and {len(sub_envs) - most} more" if len(sub_envs) > most else ""
+    return f"sub-environments {', '.join(map(str, sub_envs[:most]))}{more}"
+
+
+def _reward(reward: object) -> np.ndarray:
+    array = np.asarray(reward)
+    return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
