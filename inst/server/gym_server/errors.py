@@ -176,6 +176,11 @@ def environment_died(how: str, doing: str, hint: str | None = None) -> GymServer
     )
 
 
+def malformed_request(reason: str) -> GymServerError:
+    """What was sent cannot be read as a request."""
+    return GymServerError("malformed_json", f"The request cannot be read: {reason}")
+
+
 def body_too_large() -> GymServerError:
     """More was sent than the operator allows."""
     return GymServerError(
@@ -241,4 +246,4 @@ def _from_http(error: HTTPException) -> GymServerError:
         case 413:
             return body_too_large()
         case _:
-            return GymServerError("malformed_json", f"The request cannot be read: {error}")
+            return malformed_request(str(error))

@@ -182,9 +182,9 @@ def test_who_has_no_token_and_asks_first_is_refused_first(ask, attacked):
 
 @pytest.fixture
 def conversation(monkeypatch):
-    """Talk to one connection's code whose patience is short."""
+    """Talk to one connection's code whose timeouts are short."""
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
     ours, theirs = socket.socketpair()
     listener = socket.create_server(("127.0.0.1", 0))
     ours.close()
@@ -213,10 +213,10 @@ def conversation(monkeypatch):
     ],
     ids=["head", "body", "chunks"],
 )
-def test_a_request_drop_by_drop_is_given_up(conversation, begun):
+def test_a_request_drop_by_drop_ends_the_connection(conversation, begun):
     began = time.monotonic()
     conversation.settimeout(0.05)
-    # Never silent for as long as its patience is.
+    # Never silent for as long as its timeout.
     with suppress(ConnectionError):
         conversation.sendall(begun)
         while time.monotonic() - began < 20:

@@ -8,6 +8,7 @@ import time
 import pytest
 
 from gym_server.api.app import create_app
+from gym_server.budget import Budget
 from gym_server.http_server import connection as connection_module
 from gym_server.http_server import connections as connections_module
 from gym_server.http_server.server import Server, bind
@@ -22,10 +23,10 @@ def crowded(monkeypatch):
     """Run a server that takes few connections; return a function that makes one."""
     monkeypatch.setattr(connections_module, "MOST_CONNECTIONS", MOST)
     monkeypatch.setattr(connections_module, "MOST_OF_ONE_ADDRESS", MOST)
-    monkeypatch.setattr(connections_module, "MAKES_ROOM", 2)
-    monkeypatch.setattr(connection_module, "_STUCK_SECONDS", 0.3)
+    monkeypatch.setattr(connections_module, "EVICTED_AT_ONCE", 2)
+    monkeypatch.setattr(connection_module, "_UNREAD_SECONDS", 0.3)
     app = create_app()
-    server = Server(app, bind("127.0.0.1", 0), 2**20, on_stop=app.end_watching)
+    server = Server(app, bind("127.0.0.1", 0), 2**20, Budget(2**24), on_stop=app.end_watching)
     running = threading.Thread(target=server.run, args=(5,))
     running.start()
     connections = []
@@ -39,12 +40,12 @@ def crowded(monkeypatch):
         connections.append(connection)
         return connection
 
-    def turns(kind):
-        """Count those whose turn to leave is of this kind."""
-        now = [one.turn_to_leave(time.monotonic()) for one in list(server._connections._all)]
-        return sum(turn is not None and turn[0] == kind for turn in now)
+    def of_rank(kind):
+        """Count those whose rank is of this kind."""
+        now = [one.eviction_rank(time.monotonic()) for one in list(server._connections._all)]
+        return sum(rank is not None and rank[0] == kind for rank in now)
 
-    connect.turns = turns
+    connect.of_rank = of_rank
     yield connect
     for connection in connections:
         connection.close()
@@ -79,22 +80,22 @@ def test_half_sent_requests_leave_as_well(crowded):
     assert is_well(crowded())
 
 
-def test_those_who_do_not_read_their_answers_leave_before_those_who_are_silent(crowded, eventually):
+def test_connections_whose_answer_is_not_read_are_evicted_before_silent_ones(crowded, eventually):
     silent = crowded()
     assert is_well(silent)
     for _ in range(MOST - 1):
         crowded().sendall(LARGE * 200)
-    eventually(lambda: crowded.turns(1) == MOST - 1)
+    eventually(lambda: crowded.of_rank(1) == MOST - 1)
     assert all(is_well(crowded()) for _ in range(MOST // 2))
     assert is_well(silent)
 
 
-def test_those_who_have_not_shown_that_they_belong_here_leave_first(crowded, eventually):
+def test_connections_whose_client_is_not_recognized_are_evicted_first(crowded, eventually):
     silent = crowded()
     assert is_well(silent)
     for _ in range(MOST - 1):
         crowded().sendall(GET[:20])
-    eventually(lambda: crowded.turns(0) == MOST - 1)
+    eventually(lambda: crowded.of_rank(0) == MOST - 1)
     assert all(is_well(crowded()) for _ in range(MOST // 2))
     assert is_well(silent)
 

@@ -1,1 +1,1 @@
-"""The routes of the protocol, who may call them, and that each call is done once."""
+"""The protocol's routes: who may call them, what they take and answer, each call done once."""

@@ -1,4 +1,4 @@
-"""Who may talk to this server: asked of every request before anything else is."""
+"""Who may use this server: every request is checked before anything else is done with it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from urllib.parse import parse_qs
 
 from gym_server.api.routing import Callers, Match
 from gym_server.api.watch_keys import WatchKeys
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, malformed_request
 from gym_server.json_values import brief
 
 log = logging.getLogger(__name__)
@@ -24,16 +24,17 @@ _AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+?)\.?(?::([0-9]*))?
 _ORIGIN = re.compile("(https?)://(.*)")
 _DEFAULT_PORTS = {"http": "80", "https": "443"}
 
-# Names that were looked into; a client that thinks up others is looked into each time.
+# How many values of Host are remembered as allowed, so that clients that send ever new ones take no
+# memory; others are checked each time.
 _MOST_KNOWN = 100
 
 
 @dataclass(frozen=True)
 class Access:
-    """Whom a server lets in.
+    """The requests that a server lets pass.
 
     Attributes:
-        token: what every request must carry; None for no such thing.
+        token: what every request must carry; None if none is asked for.
         host: the address or name that the server listens on.
         allowed_hosts: further names that clients may know it by, NAME or NAME:PORT.
     """
@@ -44,13 +45,13 @@ class Access:
 
 
 class Guard:
-    """Lets requests pass, or says why not."""
+    """Lets requests pass, or refuses them."""
 
     def __init__(self, access: Access, watch_keys: WatchKeys) -> None:
         """Take the rules.
 
         Args:
-            access: whom to let in.
+            access: which requests to let pass.
             watch_keys: the keys that open a watch page without a token.
         """
         self._expected = None if access.token is None else _header(access.token)
@@ -83,16 +84,17 @@ class Guard:
         if self._expected is not None and not self._has_token(environ):
             self._check_callers(environ, match)
 
-    # A page from elsewhere can have its name resolve to this machine (DNS rebinding); then its
-    # browser names that page as the host. An address resolves to nothing else.
+    # The owner of a page from elsewhere can make the page's name resolve to this machine (DNS
+    # rebinding). The browser then sends that name as the host. An address cannot be made to mean
+    # another machine, so addresses pass.
     def _check_host(self, environ: dict) -> None:
         host = environ.get("HTTP_HOST")
         if host is None:
             if environ.get("SERVER_PROTOCOL") == "HTTP/1.1":
-                raise GymServerError("malformed_json", "The request cannot be read: it has no Host")
+                raise malformed_request("it has no Host")
             return
         if "," in host:
-            raise GymServerError("malformed_json", "The request cannot be read: it has two Hosts")
+            raise malformed_request("it has two Hosts")
         match = _AUTHORITY.fullmatch(host)
         name = match[1].lower() if match else None
         if name is None or not (_is_address(name) or self._is_ours(name)):
@@ -108,7 +110,7 @@ class Guard:
         if name in self._names:
             return True
         if self._machine_names is None:
-            # Only now, as it may have to ask the network.
+            # Only here, because it may have to ask the network.
             self._machine_names = _machine_names(self._listens_on_loopback)
         return name in self._machine_names
 
@@ -116,7 +118,7 @@ class Guard:
         origin = environ.get("HTTP_ORIGIN")
         if origin is not None and not self._is_own_origin(origin, environ.get("HTTP_HOST", "")):
             raise _foreign_origin(f"A page of {brief(origin)} may not ask this server")
-        # Browsers say so also where they name no Origin. One may follow a link from anywhere.
+        # Browsers send this also where they send no Origin. A link may be followed from anywhere.
         site = environ.get("HTTP_SEC_FETCH_SITE", "none")
         navigates = (
             environ.get("HTTP_SEC_FETCH_MODE") == "navigate" and environ["REQUEST_METHOD"] == "GET"
@@ -131,7 +133,7 @@ class Guard:
         default = _DEFAULT_PORTS[parts[1]]
         try:
             name, port = split_host(parts[2], default)
-            # Another port of the same machine is another's page.
+            # A page of another port of the same machine is foreign.
             if (name, port) == split_host(host, default):
                 return True
         except ValueError:
@@ -142,14 +144,14 @@ class Guard:
         given = environ.get("HTTP_AUTHORIZATION", "").encode("latin-1", "replace")
         if hmac.compare_digest(given, self._expected):
             return True
-        # The scheme's name may be written in any way.
+        # The scheme's name may be in upper or lower case.
         scheme, _, token = given.partition(b" ")
         return scheme.lower() == b"bearer" and hmac.compare_digest(
             b"Bearer " + token.strip(), self._expected
         )
 
-    def knows(self, environ: dict, match: Match | None) -> bool:
-        """Tell whether a request shows the token, or a key; where there is none, everybody does.
+    def recognizes(self, environ: dict, match: Match | None) -> bool:
+        """Tell whether a request has the token, if there is one, or a watch key.
 
         Args:
             environ: as for ``check()``.

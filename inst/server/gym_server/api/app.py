@@ -1,6 +1,6 @@
-"""The Flask application: it has the services, lets requests in, and finds their routes.
+"""The Flask application: it has the services, checks requests, and finds their routes.
 
-Flask itself has the settings, the client that tests use, and the answers to what has no route.
+Of Flask it uses the test client, and the answers to requests that have no route.
 """
 
 from __future__ import annotations
@@ -20,7 +20,13 @@ from gym_server.api.routes import ROUTES
 from gym_server.api.routing import Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.errors import GymServerError, shutdown_disabled
+from gym_server.errors import (
+    GymServerError,
+    body_too_large,
+    busy_receiving,
+    malformed_request,
+    shutdown_disabled,
+)
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits, Watchers
@@ -30,8 +36,10 @@ from gym_server.protocol import answers
 from gym_server.protocol.answers import Answer
 from gym_server.rendering.render_thread import RenderThread
 
-# As Flask writes them.
-_STATUS_LINES = {status.value: f"{status.value} {status.phrase.upper()}" for status in HTTPStatus}
+# A status line, headers and a body.
+WsgiAnswer = tuple[str, list[tuple[str, str]], bytes]
+
+_STATUS_LINES = {status.value: f"{status.value} {status.phrase}" for status in HTTPStatus}
 _NO_CONTENT = HTTPStatus.NO_CONTENT.value
 
 
@@ -44,12 +52,12 @@ class Config:
         temporary_monitors: whether they may also write below the system's temporary directory.
         allowed_modules: names of the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
-        limits: how much of everything there is for all clients together.
+        limits: of all clients together.
         isolate: which environments get a process of their own: "none", "foreign" (those of
             other modules than Gymnasium's and ale_py's) or "all".
         max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
-        access: whom the server lets in.
+        access: which requests the server lets pass.
         client_stop: whether clients may stop it.
         allowed_paths: directories that kwargs may name paths in; None for any path.
     """
@@ -68,11 +76,11 @@ class Config:
 
 
 class GymApp(Flask):
-    """The application, with what it has to put in order at the end.
+    """The application, which must be closed at the end.
 
     Attributes:
-        answer_for: sends a status, headers and a body on behalf of a thread that is stuck in an
-            environment, to the client that it serves; set by what has the connections.
+        answer_for: sends a status, headers and a body to the client of a thread that is stuck in
+            an environment; set by the owner of the connections.
     """
 
     answer_for: Callable[[int, str, list[tuple[str, str]], bytes], None]
@@ -105,7 +113,7 @@ class GymApp(Flask):
         self._endpoints = {}
         for route in ROUTES:
             self._endpoints[route] = Endpoint(route, services, exactly_once, config.max_body_bytes)
-            # By these Flask tells what is wrong with a request that has no route.
+            # With these rules Flask makes the answers to requests that have no route.
             self.add_url_rule(
                 route.path,
                 endpoint=route.handler.__name__,
@@ -116,7 +124,7 @@ class GymApp(Flask):
         self.register_error_handler(Exception, lambda error: _response(failure(error, None)))
         self.answer_for = lambda *_: None
         self._watchdog = Watchdog(
-            self._instances, config.limits, self._give_up, exactly_once.forget_in_time
+            self._instances, config.limits, self._abandon, exactly_once.forget_in_time
         )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
@@ -125,31 +133,47 @@ class GymApp(Flask):
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
-            answer = _turn_away(refusal, environ, match)
-        else:
-            if match is None:
-                # Flask answers by 404, 405, or a redirection where there are slashes too many.
-                return super().wsgi_app(environ, start_response)
-            answer = self._endpoints[match.route].answer(environ, match)
-        start_response(*_head(answer))
-        return (answer.body,)
+            status, headers, body = _wsgi(_refused(refusal, environ, match))
+            start_response(status, headers)
+            return (body,)
+        if match is None:
+            # Flask answers by 404, 405, or a redirection where there are slashes too many.
+            return super().wsgi_app(environ, start_response)
+        status, headers, body = _wsgi(self._endpoints[match.route].answer(environ, match))
+        # In capitals, as Flask writes it and classic clients show it.
+        start_response(status.upper(), headers)
+        return (body,)
 
-    def admit(self, environ: dict) -> None:
-        """Raise the refusal of a request that would not be answered, before its body has come."""
-        self._guard.check(environ, self._router.match(environ))
+    def admit(self, environ: dict) -> WsgiAnswer | None:
+        """Return the answer that refuses a request before its body has come; None to admit it."""
+        try:
+            self._guard.check(environ, self._router.match(environ))
+        except GymServerError as refusal:
+            return _wsgi(failure(refusal, None))
+        return None
 
-    def knows(self, environ: dict) -> bool:
-        """Tell whether a request comes from one who may talk to this server at all."""
-        return self._guard.knows(environ, self._router.match(environ))
+    def recognizes(self, environ: dict) -> bool:
+        """Tell whether a request comes from a client that may use this server at all."""
+        return self._guard.recognizes(environ, self._router.match(environ))
 
-    def _give_up(self, thread: int, why: GymServerError) -> None:
-        """Answer what a thread does that is stuck in an environment."""
-        answer = self._exactly_once.give_up(thread, lambda number: failure(why, number))
-        answer = answer or failure(why, None)
-        self.answer_for(thread, *_head(answer), answer.body)
+    def refuse(self, status: int, reason: str) -> WsgiAnswer:
+        """Return the answer to a request that does not get as far as the application.
+
+        Args:
+            status: 400, 413 or 503.
+            reason: what is wrong with the request, for 400.
+        """
+        refusals = {413: body_too_large, 503: busy_receiving}
+        refusal = refusals[status]() if status in refusals else malformed_request(reason)
+        return _wsgi(failure(refusal, None))
+
+    def _abandon(self, thread: int, why: GymServerError) -> None:
+        """Abandon the call of a thread that is stuck in an environment, and answer it."""
+        answer = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
+        self.answer_for(thread, *_wsgi(answer or failure(why, None)))
 
     def end_watching(self) -> None:
-        """Send all watchers away, who would wait for more than the server's last moment."""
+        """Answer all watchers, who would otherwise wait for longer than the stop may take."""
         self._instances.end_watching()
 
     def close(self) -> None:
@@ -165,12 +189,11 @@ def create_app(config: Config | None = None) -> GymApp:
     return GymApp(config or Config())
 
 
-def _turn_away(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
-    """Answer a request that may not pass; people get the reason on the page that they wanted."""
+def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
+    """Answer a request that may not pass; people get the reason on the page that they asked for."""
     wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
-    page_of = match.route.refusal_page if match is not None else None
-    if refusal.code == "unauthorized" and wants_page and page_of is not None:
-        page = answers.answer(page_of(match.path, refusal.status), None)
+    if match and match.route.refusal_page and refusal.code == "unauthorized" and wants_page:
+        page = answers.answer(match.route.refusal_page(match.path, refusal.status), None)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return failure(refusal, None)
 
@@ -179,13 +202,13 @@ def _refuse_to_stop() -> None:
     raise shutdown_disabled()
 
 
-def _head(answer: Answer) -> tuple[str, list[tuple[str, str]]]:
-    """Return an answer's status and headers in WSGI's words."""
+def _wsgi(answer: Answer) -> WsgiAnswer:
+    """Return an answer in WSGI's words."""
     headers = [("Content-Type", answer.content_type)]
     if answer.status != _NO_CONTENT:
         headers.append(("Content-Length", str(len(answer.body))))
     headers += answer.headers
-    return _STATUS_LINES[answer.status], headers
+    return _STATUS_LINES[answer.status], headers, answer.body
 
 
 def _response(answer: Answer) -> Response:

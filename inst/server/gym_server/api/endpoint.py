@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hashlib import blake2b
+from typing import Any
 
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.exceptions import MethodNotAllowed
@@ -18,7 +19,7 @@ from gym_server.protocol.answers import Answer
 from gym_server.protocol.fields import REQUEST, RequestId, read
 from gym_server.protocol.safetensors import TENSORS
 
-# As much as the answers that are kept beside it; a digest of it takes 40 us.
+# A longer body is kept as a digest, which takes 40 us for one of this size.
 _KEPT_BYTES = 2**16
 
 
@@ -86,18 +87,20 @@ class Endpoint:
                 answer = answers.answer(result, request_id)
                 return Outcome(answer, True, instance_id or _created(result))
             except BaseException as error:
-                # What an environment raises must not pass by the answer that is stored.
+                # Also SystemExit and the like, which environments may raise, become the answer that
+                # is stored.
                 did_nothing = isinstance(error, GymServerError) and error.did_nothing
                 return Outcome(failure(error, request_id), not did_nothing, instance_id)
 
         if request_id is None:
-            return perform().answer
+            answer: Answer = perform().answer
+            return answer
         # A request that ends an instance is kept with those that create one, so that it is never
         # refused because the instance has seen too many keys.
-        moved_id = None if route.ends_instance else instance_id
+        used_id = None if route.ends_instance else instance_id
         content = (match.path, _fingerprint(raw), sends_tensors, wants_tensors)
         try:
-            return self._exactly_once.answer(request_id, moved_id, content, perform)
+            return self._exactly_once.answer(request_id, used_id, content, perform)
         except Exception as error:
             return failure(error, request_id)
 
@@ -105,7 +108,8 @@ class Endpoint:
         length = int(environ.get("CONTENT_LENGTH") or 0)
         if length > self._max_body_bytes:
             raise body_too_large()
-        return environ["wsgi.input"].read(length)
+        body: bytes = environ["wsgi.input"].read(length)
+        return body
 
 
 def failure(error: BaseException, request_id: RequestId | None) -> Answer:
@@ -115,11 +119,12 @@ def failure(error: BaseException, request_id: RequestId | None) -> Answer:
     if isinstance(error, GymServerError):
         answer = answer._replace(headers=error.headers)
     elif isinstance(error, MethodNotAllowed):
-        answer = answer._replace(headers=(("Allow", ", ".join(sorted(error.valid_methods))),))
+        allowed = ", ".join(sorted(error.valid_methods or ()))
+        answer = answer._replace(headers=(("Allow", allowed),))
     return answer
 
 
-def kept_bytes(content: tuple | None, answer: Answer | None) -> int:
+def kept_bytes(content: Any, answer: Answer | None) -> int:
     """Tell how much is kept of a request, as its endpoint describes it, and of its answer."""
     return 0 if content is None or answer is None else len(content[1]) + len(answer.body)
 
@@ -131,7 +136,7 @@ def _query(environ: dict) -> dict[str, str | list[str]]:
 
 
 def _fingerprint(body: bytes) -> bytes:
-    """Return what a repetition is known by: a digest where the body is too long to keep."""
+    """Return what a repetition is compared by: a digest if the body is too long to be kept."""
     return body if len(body) <= _KEPT_BYTES else blake2b(body).digest()
 
 
@@ -141,7 +146,7 @@ def _created(result: object) -> str | None:
 
 
 def _prefers_tensors(accept: str, content_type: str) -> bool:
-    # Reading the header properly takes time in each step, and few clients write more than a name.
+    # Parsing the header takes time in each step, and most clients send just a name.
     if TENSORS not in accept:
         return False
     if accept == TENSORS:

@@ -1,23 +1,24 @@
-"""Requests that a client numbers are done once, however often they arrive.
+"""Requests with an idempotency key are done once, however often they arrive.
 
 libcurl silently sends a POST again when a kept-alive connection broke before an answer came.
-A step must not be taken twice for that, so a client may put a key and a growing number into
-its requests; a repetition gets the stored answer.
+A step must not be taken twice for that, so a client may put an idempotency key into its requests:
+a key of its own, and a number that grows. A repetition gets the stored answer.
 
-What is kept can be exhausted by nobody but the one who uses an instance, and nobody can make it
-be forgotten for another:
+A client can exhaust what is kept of its own instances only, and can make nothing of other
+clients' be forgotten:
 
-- A key belongs to the instance that it moves, and numbers grow for each instance by itself. Who
-  sends a huge number under a key that he guessed has to send it to the instance of that key, and
-  he could as well close it. Creations have no order at all: each key and number is one of them.
-- A call that was refused before anything moved leaves nothing behind.
+- A key belongs to the instance that it is used on, and numbers grow for each instance by itself.
+  To use up somebody else's key by a huge number, one would have to send it to that client's
+  instance, and could as well close that. Creations have no order at all: each key with its number
+  stands for one of them.
+- A call that was refused before anything was done leaves nothing behind.
 - As long as an instance lives, so does what is known of the last call on it and of its creation.
   Other keys of the same instance are known for a quarter of an hour, and a new one is refused
   where there are very many of them.
 - What is known of an instance that is gone may be dropped at any time: a repetition could do
   nothing any more.
-- Where the answers of all hold too much memory the largest ones go, those of last calls last.
-  What remains is that the call was done: its repetition is refused and does nothing.
+- Where all answers together take too much memory the largest ones are dropped, those of last calls
+  last. It stays known that the call was done: its repetition is refused and does nothing.
 """
 
 from __future__ import annotations
@@ -29,13 +30,21 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import RequestId
+from gym_server.threads.in_progress import InProgress
 
 AnswerT = TypeVar("AnswerT")
 
-# When what is kept is looked through: after so many seconds, or when this share of the memory that
-# it may hold was stored anew.
-_LOOK_SECONDS = 30.0
-_LOOK_SHARE = 1 / 8
+# What is kept is searched for what may be dropped after so many seconds, or when this share of the
+# memory that it may take was stored anew.
+_SEARCH_SECONDS = 30.0
+_SEARCH_SHARE = 1 / 8
+
+
+class _Doing(NamedTuple):
+    """A request that a thread is doing."""
+
+    thread: int
+    request_id: RequestId
 
 
 class Outcome(NamedTuple):
@@ -44,7 +53,7 @@ class Outcome(NamedTuple):
     Attributes:
         answer: what the client gets.
         did_something: whether to do it again could make a difference.
-        instance_id: the instance that it moved or made; None where there is none.
+        instance_id: the instance that it used or created; None where there is none.
     """
 
     answer: Any
@@ -57,12 +66,9 @@ class _Latest(Generic[AnswerT]):
 
     def __init__(self, instance_id: str | None, name: Hashable) -> None:
         self.lock = threading.Lock()
-        # Where it is kept; what makes or ends an instance has none there.
+        # Where it is kept; what creates or ends an instance is kept under None.
         self.place = instance_id, name
         self.is_dropped = False
-        # What the thread that has the lock is doing. Whoever takes the entry out, which only
-        # one thread can, stores the answer and releases the lock.
-        self.doing: dict[int, tuple[RequestId, Hashable]] = {}
         self.instance_id = instance_id
         self.number = -1
         self.content: Hashable = None
@@ -77,7 +83,7 @@ class ExactlyOnce(Generic[AnswerT]):
     def __init__(
         self,
         lives: Callable[[str], bool],
-        size: Callable[[Hashable, AnswerT], int] = lambda content, answer: 0,
+        size: Callable[[Hashable, AnswerT | None], int] = lambda content, answer: 0,
         forget_after: float = 15 * 60,
         most_keys: int = 256,
         most_gone: int = 10_000,
@@ -100,10 +106,12 @@ class ExactlyOnce(Generic[AnswerT]):
         self._most_gone = most_gone
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
-        self._looked = time.monotonic()
-        self._bytes_since_look = 0
-        # By the instance that is moved; there by the key. What makes or ends an instance, under
-        # None, by key and number.
+        self._searched = time.monotonic()
+        self._bytes_since_search = 0
+        # The requests that are being done, each by the thread that does it and its idempotency key.
+        self._doing: InProgress[_Doing, tuple[_Latest[AnswerT], Hashable]] = InProgress()
+        # By the instance that is used, and there by the key. Requests that create or end an
+        # instance stand under None, by key and number.
         self._calls: dict[str | None, dict[Hashable, _Latest[AnswerT]]] = {}
 
     def answer(
@@ -116,56 +124,59 @@ class ExactlyOnce(Generic[AnswerT]):
         """Do what a request asks, or return the answer that it got before.
 
         Args:
-            request_id: the key and number that the client gave it.
-            instance_id: the instance that it moves; None for what makes or ends one.
+            request_id: its idempotency key.
+            instance_id: the instance that it uses; None for what creates or ends one.
             content: what the request asks; a repetition has the same.
-            act: does it; called at most once per number unless nothing came of it, must not
-                raise.
+            act: does it, and must not raise; called at most once per number, unless it did
+                nothing.
 
         Raises:
             GymServerError: ``request_conflict`` when the number was used for something else,
                 lies before the newest, or its answer is not kept any more; ``too_many_keys``.
         """
-        # Held while the environment moves: a repetition that arrives meanwhile waits for the
-        # answer of the first.
+        # Its lock is held while the request is done: a repetition that arrives meanwhile waits for
+        # the answer of the first.
         latest = self._acquire(request_id, instance_id)
-        thread = threading.get_ident()
-        latest.doing[thread] = request_id, content
+        doing = _Doing(threading.get_ident(), request_id)
+        self._doing.begin(doing, (latest, content))
         try:
             if request_id.number <= latest.number:
                 return _repeat(latest, request_id, content)
-            done = act()
-            if done.did_something and latest.doing.pop(thread, None) is not None:
-                latest.instance_id = done.instance_id
-                self._store(latest, request_id, content, done.answer)
-            return done.answer
+            outcome = act()
+            answer: AnswerT = outcome.answer
+            if outcome.did_something and self._doing.finish(doing):
+                latest.instance_id = outcome.instance_id
+                self._store(latest, request_id, content, answer)
+            return answer
         finally:
-            if latest.doing.pop(thread, None) is not None:
+            if self._doing.finish(doing):
                 if latest.number < 0:
                     self._drop(latest)
                 latest.lock.release()
 
-    def give_up(self, thread: int, refuse: Callable[[RequestId], AnswerT]) -> AnswerT | None:
-        """Answer what a thread is doing, which may never come back with an answer.
+    def abandon(self, thread: int, refuse: Callable[[RequestId], AnswerT]) -> AnswerT | None:
+        """Answer what a thread is doing that is stuck; its own answer, if it comes, is dropped.
+
+        The thread may come back at this very moment; ``InProgress`` says who stores the answer and
+        releases the lock then.
 
         Args:
             thread: the thread.
             refuse: makes the answer, for repetitions as well.
 
         Returns:
-            The answer; None when the thread does nothing that is numbered.
+            The answer; None when the thread does nothing that has an idempotency key.
         """
-        for latest in self._all():
-            doing = latest.doing.pop(thread, None)
-            if doing is not None:
-                request_id, content = doing
-                answer = refuse(request_id)
-                self._store(latest, request_id, content, answer)
+        for doing, (latest, content) in self._doing.items():
+            if doing.thread == thread and self._doing.abandon(doing):
+                answer = refuse(doing.request_id)
+                self._store(latest, doing.request_id, content, answer)
+                self._doing.answered(doing)
                 return answer
         return None
 
     def _acquire(self, request_id: RequestId, instance_id: str | None) -> _Latest[AnswerT]:
-        """Return what is known of a key, with its lock."""
+        """Return what is known of a key, and take its lock."""
         name = request_id if instance_id is None else request_id.key
         while True:
             with self._lock:
@@ -180,7 +191,7 @@ class ExactlyOnce(Generic[AnswerT]):
             latest.lock.acquire()
             if not latest.is_dropped:
                 return latest
-            # Meanwhile another thread found that nothing had come of it.
+            # Meanwhile another thread found that the request had done nothing.
             latest.lock.release()
 
     def _store(
@@ -192,10 +203,10 @@ class ExactlyOnce(Generic[AnswerT]):
         latest.stored = time.monotonic()
         latest.lock.release()
         # Not exact where several threads are here at once, and need not be.
-        self._bytes_since_look += self._size(content, answer)
+        self._bytes_since_search += self._size(content, answer)
 
     def _drop(self, latest: _Latest[AnswerT]) -> None:
-        """Know nothing any more; whoever calls it has the lock."""
+        """Forget an entry whose lock the caller has."""
         if latest.is_dropped:
             return
         latest.is_dropped = True
@@ -211,18 +222,18 @@ class ExactlyOnce(Generic[AnswerT]):
             return [latest for calls in self._calls.values() for latest in calls.values()]
 
     def forget_in_time(self) -> None:
-        """``forget()``, when some time has gone by or much was stored since the last time.
+        """Call ``forget()`` if some time has gone by, or much was stored, since the last time.
 
-        With very many keys a look at all of them takes some tenths of a second.
+        With very many keys a search of all of them takes some tenths of a second.
         """
-        is_due = time.monotonic() > self._looked + _LOOK_SECONDS
-        if is_due or self._bytes_since_look > self._most_bytes * _LOOK_SHARE:
-            self._looked = time.monotonic()
-            self._bytes_since_look = 0
+        is_due = time.monotonic() > self._searched + _SEARCH_SECONDS
+        if is_due or self._bytes_since_search > self._most_bytes * _SEARCH_SHARE:
+            self._searched = time.monotonic()
+            self._bytes_since_search = 0
             self.forget()
 
     def forget(self) -> None:
-        """Drop what need not be known any more, and answers where they hold too much."""
+        """Drop what need not be known any more, and answers where they take too much memory."""
         known = [
             _Known(latest, latest.stored, self._size(latest.content, latest.answer))
             for latest in self._all()
@@ -271,15 +282,15 @@ class _Known(NamedTuple):
 
 
 def _lighten(kept: list[_Known], excess: int) -> None:
-    """Give up so many bytes of answers, the first ones."""
+    """Drop so many bytes of answers, the first ones."""
     for one in kept:
         if excess <= 0:
             return
-        one.change_unless_used(_lose_answer)
+        one.change_unless_used(_drop_answer)
         excess -= one.size
 
 
-def _lose_answer(latest: _Latest) -> None:
+def _drop_answer(latest: _Latest) -> None:
     latest.answer = latest.content = None
 
 

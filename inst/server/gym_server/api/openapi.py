@@ -1,8 +1,9 @@
-"""The protocol, for machines: an OpenAPI document made from the routes' own declarations."""
+"""The protocol described for machines: an OpenAPI document made of the routes' declarations."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from gym_server import __version__
 from gym_server.api.routing import Route
@@ -23,8 +24,8 @@ _ERROR = {
 }
 
 
-# What classic clients send for a parameter that they do not set.
-_ABSENT = {"enum": [None, "", []], "description": "As if it were not there."}
+# Classic clients send one of these for a parameter that they do not set.
+_ABSENT: dict[str, Any] = {"enum": [None, "", []], "description": "As if it were not there."}
 _ABSENT_REFERENCE = {"$ref": "#/components/schemas/Absent"}
 
 
@@ -66,7 +67,7 @@ def _link_created(paths: dict[str, dict]) -> None:
 
 def _operation(route: Route) -> dict:
     doc = route.handler.__doc__ or ""
-    operation = {
+    operation: dict[str, Any] = {
         "operationId": route.handler.__name__,
         "summary": doc.split("\n")[0],
         "responses": {
@@ -96,7 +97,7 @@ def _answer(route: Route) -> dict:
         if route.once:
             answer["headers"] = {
                 "Gym-Request": {
-                    "description": "Key and number of the request, when it had them.",
+                    "description": "The request's idempotency key: its key, a space, its number.",
                     "schema": {"type": "string"},
                 }
             }
@@ -128,7 +129,7 @@ def _query(field: Field) -> dict:
 def _request_body(route: Route, fields: Iterable[Field]) -> dict:
     required = any(field.required for field in fields)
     schema = _body(fields)
-    body = {
+    body: dict[str, Any] = {
         "required": required,
         "content": {
             JSON: {"schema": schema if required else {"anyOf": [schema, _ABSENT_REFERENCE]}}
@@ -156,7 +157,7 @@ def _body(fields: Iterable[Field]) -> dict:
 
 
 def _property(field: Field) -> dict:
-    """Return the schema of what is taken for a field, also of what is not meant to be there."""
+    """Return the schema of all that is taken for a field, also of what stands for an absent one."""
     schema = field.kind.schema
     if field.required:
         if field.kind.empty_is_absent and schema.get("type") == "string":

@@ -8,21 +8,21 @@ import threading
 import time
 from collections.abc import Callable
 
-# How long a key is good after it was made or last used.
+# How long a key is valid after it was made or last used.
 KEY_SECONDS = 600
 
 _MOST_KEYS = 10_000
 
 
 class WatchKeys:
-    """The keys that are good at present, each for one environment's page."""
+    """The keys that are valid at present, each for one environment's page."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Start with none."""
         self._clock = clock
         self._lock = threading.Lock()
-        # By their digests, so that no key can be read or timed out of here; the one that ends
-        # next is first.
+        # By their digests, so that no key can be read here, or guessed from the time that a
+        # comparison takes. The key that expires next is first.
         self._keys: dict[bytes, tuple[str, float]] = {}
 
     def make(self, instance_id: str) -> str:
@@ -36,7 +36,7 @@ class WatchKeys:
         return key
 
     def opens(self, key: str, instance_id: str) -> bool:
-        """Tell whether a key is good for an instance's page; that is a use of it."""
+        """Tell whether a key is valid for an instance's page, which renews it."""
         digest = _digest(key)
         with self._lock:
             self._drop_old()

@@ -20,11 +20,11 @@ _HTML = "text/html; charset=utf-8"
 _CSS = "text/css; charset=utf-8"
 _JAVASCRIPT = "text/javascript; charset=utf-8"
 
-# What the page shows is of this moment, and it is made anew with the server.
-_NOT_KEPT = ("Cache-Control", "no-store")
+# The page shows this moment, and its files may be others with the next server.
+_NO_STORE = ("Cache-Control", "no-store")
 _PAGE_HEADERS = (
-    _NOT_KEPT,
-    # Nothing from elsewhere, and nothing that does not stand in the package's files.
+    _NO_STORE,
+    # Nothing from other servers, and no scripts or styles but those in the package's files.
     (
         "Content-Security-Policy",
         "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
@@ -39,13 +39,14 @@ ROUTES = Table()
 
 
 def page(url: str, status: int) -> Content:
-    """Return the watch page; what it has to tell it learns from what it asks for.
+    """Return the watch page; its script then asks for the state, and shows errors in words.
 
     Args:
         url: the path that it was asked for by.
         status: the HTTP status.
     """
-    # Also without the last slash the page finds what belongs to it, below any proxy's folder.
+    # The page names its files relative to its own address, so that it works below any proxy's
+    # folder, and that address may lack the last slash.
     here = "" if url.endswith("/") else "watch/"
     return Content(
         _read("watch.html").replace(b"{here}", here.encode()), _HTML, status, _PAGE_HEADERS
@@ -66,7 +67,7 @@ def env_watch(call: Call) -> Content:
         _ = call.instance
         status = 200
     except GymServerError as refusal:
-        # A browser gets the page all the same: it says so in words, and what else there is.
+        # A browser gets the page all the same, which shows the error and the other environments.
         if "text/html" not in call.accept:
             raise
         status = refusal.status
@@ -99,7 +100,7 @@ def env_watch_key(call: Call) -> dict:
     content_type=_CSS,
 )
 def env_watch_style(call: Call) -> Content:
-    """Tell the watch page's browser how it looks."""
+    """Return the watch page's style sheet."""
     return Content(_read("watch.css"), _CSS, headers=_PAGE_HEADERS)
 
 
@@ -111,7 +112,7 @@ def env_watch_style(call: Call) -> Content:
     content_type=_JAVASCRIPT,
 )
 def env_watch_script(call: Call) -> Content:
-    """Tell the watch page's browser what it does."""
+    """Return one of the watch page's scripts."""
     name = call.path["script"]
     if name not in _SCRIPTS:
         raise GymServerError("not_found", f"The watch page has no script {name}.js")
@@ -131,12 +132,12 @@ def env_watch_script(call: Call) -> Content:
     schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
 def env_watch_state(call: Call) -> Content:
-    """Wait for something new to see; drawing takes place only for those who wait here."""
+    """Wait for a new frame; frames are drawn only for those who wait here."""
     sub_env = call.fields["sub_env"] or 0
     call.instance.check_sub_env(sub_env)
     with call.services.watchers.one_more():
         body = call.instance.viewer.next_frame(sub_env, call.fields["after"])
-    return Content(body, JSON, headers=(_NOT_KEPT,))
+    return Content(body, JSON, headers=(_NO_STORE,))
 
 
 @ROUTES.declare(
@@ -147,7 +148,7 @@ def env_watch_state(call: Call) -> Content:
     schema=schemas.json_object({"watched": schemas.FLAG}),
 )
 def env_watch_presence(call: Call) -> dict:
-    """Say that somebody goes on watching, without a picture for now."""
+    """Note that somebody goes on watching, without a frame for now."""
     call.instance.viewer.note_presence()
     return {"watched": True}
 

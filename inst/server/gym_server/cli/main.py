@@ -15,6 +15,7 @@ from pathlib import Path
 
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
+from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.port_holder import port_holder
@@ -25,13 +26,17 @@ from gym_server.processes import memory, start
 
 log = logging.getLogger("gym_server")
 
-# Windows knows a port that is bound exclusively by the second.
+# The second is what Windows reports for a port that another process has bound exclusively.
 _TAKEN = (errno.EADDRINUSE, 10013)
 
-# A step that never returns must not keep the server alive for ever.
+# How many of the largest bodies may be on their way at a time; of parts of bodies, and of small
+# ones, which do not count, there may be many more.
+_LARGEST_BODIES = 16
+
+# A step that never returns must not keep the server alive.
 _GRACE_SECONDS = 10.0
 
-# After that, for the environments that can be closed.
+# How long closing the environments may take if requests have not ended by then.
 _LAST_SECONDS = 2.0
 
 
@@ -91,7 +96,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(app, listener, max_body_bytes, app.end_watching, app.admit, app.knows)
+    server = Server(
+        app,
+        listener,
+        max_body_bytes,
+        Budget(_LARGEST_BODIES * max_body_bytes),
+        app.end_watching,
+        app.admit,
+        app.recognizes,
+        app.refuse,
+    )
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)
@@ -99,7 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
-    # What environments print must not fill a pipe that nobody reads.
+    # From here on standard output goes where standard error goes: what environments print must not
+    # fill a pipe that is not read.
     os.dup2(2, 1)
     _serve(app, server)
     return 0
@@ -112,7 +127,7 @@ def _set_up_logging(level: str) -> None:
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
     )
     logging.captureWarnings(True)
-    # RecordVideo says so of any folder that exists; what is in ours is the monitor's affair.
+    # RecordVideo warns of every folder that exists. The monitor itself looks after its folder.
     warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
 
 
@@ -150,7 +165,7 @@ def _fail(reason: str) -> int:
 
 
 class _Stop:
-    """Stops the server, which is made after the application that may want to stop it."""
+    """Stops the server, which is created later than the application that may ask for it."""
 
     server: Server | None = None
 
@@ -166,7 +181,7 @@ def _stop_on_signals(stop: Callable[[], None]) -> None:
 
 
 def _wait_for_eof(stop: Callable[[], None]) -> None:
-    # Not sys.stdin, whose lock this thread would still hold when the interpreter ends.
+    # Not by sys.stdin: this thread would hold its lock when the interpreter ends.
     try:
         while os.read(0, 4096):
             pass
@@ -184,5 +199,5 @@ def _serve(app: GymApp, server: Server) -> None:
         log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
         logging.shutdown()
         start.remove_temporary_folder()
-        # An ordinary exit would wait for its thread.
+        # An ordinary exit would wait for the thread that is in the environment.
         os._exit(0)

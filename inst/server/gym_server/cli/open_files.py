@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import contextlib
 
-# More than the connections that the server takes, with their environments' pipes and files; what
-# programs of ours that close every file before they begin still get through in no time.
+# More than the connections that the server takes, with their environments' pipes and files. It is
+# not more still, because some programs close every possible file when they start.
 _ENOUGH = 65536
 
-# What macOS lets a process have, whatever it says.
+# What macOS lets a process have, whatever limit it reports.
 _LEAST = 10240
 
 
 def allow_many_open_files() -> None:
     """Raise the limit of open files, which is 1,024 on many systems, as far as is allowed.
 
-    Windows has none that matters here.
+    Windows has no such limit.
     """
     try:
         import resource

@@ -1,4 +1,4 @@
-"""What can be said on the command line."""
+"""The options of the command line."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         type=_duration,
         default=Limits.max_call_seconds,
         metavar="SECONDS",
-        help="that a call may take before its environment is given up; 0 for ever (%(default)g)",
+        help="that a call may take before its environment is evicted; 0 for ever (%(default)g)",
     )
     limits.add_argument(
         "--idle-minutes",

@@ -1,4 +1,4 @@
-"""The token that lets people in, from a file or a variable; never from the command line."""
+"""The token that requests must carry, from a file or a variable, never from the command line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TOKEN = re.compile("[!-~]{16,1024}")
 
 
 class BadTokenError(Exception):
-    """A token that cannot be one, in words that do not show it."""
+    """What was given cannot be a token; the message does not show it."""
 
 
 def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | None:
@@ -30,7 +30,7 @@ def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | No
             environment starts inherits it.
 
     Raises:
-        BadTokenError: what is there is no token.
+        BadTokenError: what was given cannot be a token.
         OSError: the file cannot be read.
     """
     of_variable = environ.pop(VARIABLE, "")
@@ -57,6 +57,6 @@ def _fault(token: str) -> str:
 
 
 def _warn_of_readers(file: Path) -> None:
-    # Windows has other ways to say who may read a file.
+    # On Windows these bits do not say who may read a file.
     if os.name == "posix" and file.stat().st_mode & stat.S_IROTH:
-        log.warning("Everybody on this machine can read the token in %s (chmod 600 mends it)", file)
+        log.warning("Everybody on this machine can read the token in %s (chmod 600 fixes it)", file)

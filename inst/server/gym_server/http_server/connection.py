@@ -1,7 +1,4 @@
-"""One client's connection: its requests come in, their answers go out, in a thread of its own.
-
-WSGI calls the application.
-"""
+"""One client's connection: its requests come in, their answers go out, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -16,14 +13,11 @@ import threading
 import time
 from collections.abc import Callable
 from functools import lru_cache
-from http import HTTPStatus
 
 from httptools import HttpParserError
 
-from gym_server.budget import Share
-from gym_server.errors import GymServerError, answer_to
-from gym_server.http_server.request_parser import Reader, Request, malformed
-from gym_server.protocol import answers
+from gym_server.http_server.interface import Answer, Refuse, Share, refuse_in_plain_text
+from gym_server.http_server.request_parser import Request, RequestParser
 
 # Seconds that a connection may be idle.
 _IDLE_SECONDS = 3600.0
@@ -33,36 +27,36 @@ _IDLE_SECONDS = 3600.0
 _REST_SECONDS = 60.0
 _SLOWEST_BYTES = 1000
 
-# Seconds for both, and for being idle, for those who have not shown that they belong here. Longer
-# than the proxy of inst/examples/nginx.conf keeps a connection that is idle.
-_STRANGER_SECONDS = 20.0
+# Seconds for both, and for being idle, while the client is not recognized. Longer than the proxy
+# of inst/examples/nginx.conf keeps a connection that is idle.
+_UNRECOGNIZED_SECONDS = 20.0
 
-# An answer that was not read for so long waits for its client, and not for the network.
-_STUCK_SECONDS = 1.0
+# When an answer was not read for so long, the client is slow, and not the network.
+_UNREAD_SECONDS = 1.0
 
-# For the answer of a thread that is stuck.
-_LAST_WORD_SECONDS = 1.0
+# Seconds that it may take to send the answer of a thread that is stuck.
+_STUCK_ANSWER_SECONDS = 1.0
 
 # The header of answers that are worth nothing later.
-_NOT_KEPT = ("Cache-Control", "no-store")
+_NO_STORE = ("Cache-Control", "no-store")
 
 _RECEIVE_BYTES = 2**16
 
 # An answer's body that is copied behind its head, so that both go in one piece.
 _COPIED_BYTES = 2**16
 
-# What the system takes of an answer beyond what is on its way. It takes more when half of that is
-# gone: so it is seen within half a minute that a client reads as slowly as it may.
+# How much of an answer the system takes beyond what is on its way. It takes more when half of that
+# is gone, so a client that reads as slowly as it may is seen to read within half a minute.
 _UNSENT_BYTES = 2**16
 
-# Closing then forgets what was not read; the system would keep it for minutes.
-_FORGET_UNREAD = struct.pack("hh" if os.name == "nt" else "ii", 1, 0)
+# With this option closing discards what was not read; the system would keep it for minutes.
+_DISCARD_UNREAD = struct.pack("hh" if os.name == "nt" else "ii", 1, 0)
 
 
 class _Pace:
-    """How long one may wait for the rest of what comes or goes in parts.
+    """How long to wait for the rest of what comes or goes in parts.
 
-    Whoever sends or reads drop by drop is no better than who does nothing.
+    A client that sends or reads drop by drop is treated as one that does nothing.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -100,8 +94,9 @@ class Connection:
         base_environ: dict,
         max_body_bytes: int,
         bodies: Share,
-        admit: Callable[[dict], None] = lambda environ: None,
-        knows: Callable[[dict], bool] = lambda environ: True,
+        admit: Callable[[dict], Answer | None] = lambda environ: None,
+        recognizes: Callable[[dict], bool] = lambda environ: True,
+        refuse: Refuse = refuse_in_plain_text,
     ) -> None:
         """Take over a connected socket.
 
@@ -110,33 +105,35 @@ class Connection:
             app: a WSGI application.
             base_environ: what is the same in the environment of each request.
             max_body_bytes: the size of the largest body.
-            bodies: what large bodies may hold until they are answered.
-            admit: is shown what WSGI would be, before a large body is read, and raises what the
-                request is refused with.
-            knows: is shown the same, and tells whether its client may stay connected; asked
-                until it does. Others get one answer and have less time.
+            bodies: the memory that large bodies hold until they are answered.
+            admit: is given the environment that WSGI would be given, before a large body is read;
+                returns the answer that refuses the request, or None to let it pass.
+            recognizes: is given the same; tells whether its client may stay connected. It is asked
+                until it says so. Other clients get one answer and have less time.
+            refuse: makes the answer to a request that does not reach the application.
         """
         self._socket = client
         self._app = app
         self._base_environ = base_environ
-        self._reader = Reader(max_body_bytes, self._send, self._why_not, bodies)
+        self._parser = RequestParser(max_body_bytes, self._send, self._refusal, bodies, refuse)
         self._admit = admit
-        self._knows = knows
-        self._known = False
+        self._recognizes = recognizes
+        self._refuse = refuse
+        self._is_recognized = False
         self._last: Request | None = None
         self._last_environ: dict = {}
         self._stopping = False
-        # Whether it works, and does not wait for its client.
+        # Whether it works on a request, and does not wait for its client.
         self._busy = False
-        # The size of the answer that is being sent meanwhile. Whoever takes it out, which only one
-        # thread can, decides whether the connection goes on after it.
+        # The size of the answer that is being sent, as a list's only item. list.pop() succeeds in
+        # one thread only: in the serving thread when all is sent, and the connection goes on; or in
+        # the thread that evicts this connection because the answer is not read.
         self._sending: list[int] = []
-        # Whether what is sent is of this moment only.
-        self._passing = False
-        # The request that wants an answer. Whoever takes it out, which only one thread can, is
-        # the one to send it.
-        self._owed: list[Request] = []
-        # Who serves it.
+        # Whether what is sent is worth nothing later.
+        self._sends_no_store = False
+        # The request that waits for its answer, as a list's only item; see answer_for().
+        self._unanswered: list[Request] = []
+        # The identity of the thread that serves it.
         self.thread = 0
         # Since when it has waited for its client, in the clock's seconds.
         self.waiting_since = time.monotonic()
@@ -148,13 +145,13 @@ class Connection:
 
     @property
     def _seconds(self) -> float:
-        return _REST_SECONDS if self._known else _STRANGER_SECONDS
+        return _REST_SECONDS if self._is_recognized else _UNRECOGNIZED_SECONDS
 
     def serve(self) -> None:
         """Answer until the client leaves, is silent for too long, or the server stops."""
-        # Whoever is not there any more needs no answer.
         self.thread = threading.get_ident()
-        with contextlib.suppress(OSError), contextlib.closing(self._reader), self._socket:
+        # A client that has left needs no answer, so an error of its socket is none of ours.
+        with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if hasattr(socket, "TCP_NOTSENT_LOWAT"):
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
@@ -162,13 +159,13 @@ class Connection:
             rest: _Pace | None = None
             while data := self._receive():
                 self._busy = True
-                requests = self._reader.feed(data)
+                requests = self._parser.feed(data)
                 if not self._answer_all(requests):
                     break
                 if not requests:
                     self.waiting_since = time.monotonic()
                 self._busy = False
-                if not self._reader.began:
+                if not self._parser.began:
                     if rest is not None:
                         self._socket.settimeout(self._seconds)
                     rest = None
@@ -183,24 +180,23 @@ class Connection:
                 return self._socket.recv(_RECEIVE_BYTES)
             except TimeoutError:
                 silent = time.monotonic() - self.waiting_since
-                if self._reader.began or not self._known or silent > _IDLE_SECONDS:
+                if self._parser.began or not self._is_recognized or silent > _IDLE_SECONDS:
                     raise
 
-    def _why_not(self, request: Request) -> GymServerError | None:
+    def _refusal(self, request: Request) -> Answer | None:
+        """Return the answer that refuses a request, before its large body has come."""
         try:
             environ = {**self._base_environ, **request.environ()}
-            self._admit(environ)
-            if not self._known:
-                self._meet(environ)
-        except GymServerError as refusal:
-            return refusal
         except HttpParserError as error:
-            return malformed(str(error))
-        return None
+            return self._refuse(400, str(error))
+        refusal = self._admit(environ)
+        if refusal is None and not self._is_recognized:
+            self._recognize(environ)
+        return refusal
 
-    def _meet(self, environ: dict) -> None:
-        if self._knows(environ):
-            self._known = True
+    def _recognize(self, environ: dict) -> None:
+        if self._recognizes(environ):
+            self._is_recognized = True
             self._socket.settimeout(self._seconds)
 
     def _answer_all(self, requests: list[Request]) -> bool:
@@ -208,23 +204,23 @@ class Connection:
 
     def _answer(self, request: Request) -> bool:
         """Answer one request; return whether another may follow."""
-        self._owed.append(request)
+        self._unanswered.append(request)
         status, headers, body = self._respond(request)
         if request.held_bytes:
-            self._reader.release(request)
+            self._parser.release(request)
         try:
-            self._owed.pop()
+            self._unanswered.pop()
         except IndexError:
-            # It took so long that somebody else has answered.
+            # It took so long that answer_for() has answered.
             return False
-        keep = request.keep_alive and self._known and not self._stopping
-        self._passing = _NOT_KEPT in headers
+        keep = request.keep_alive and self._is_recognized and not self._stopping
+        self._sends_no_store = _NO_STORE in headers
         # In one piece, where that is not much to copy: what follows the head would come later.
         if len(body) <= _COPIED_BYTES:
             self._send(_head(status, headers, keep) + body)
         else:
             self._send(_head(status, headers, keep), body)
-        self._passing = False
+        self._sends_no_store = False
         return keep
 
     def _send(self, data: bytes, more: bytes = b"") -> None:
@@ -237,7 +233,7 @@ class Connection:
                 self._send_rest(sent, memoryview(data)[sent:], memoryview(more))
             self._sending.pop()
         except (OSError, IndexError) as error:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _FORGET_UNREAD)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _DISCARD_UNREAD)
             raise ConnectionAbortedError("an answer was not read") from error
 
     def _send_rest(self, sent: int, *parts: memoryview) -> None:
@@ -251,7 +247,17 @@ class Connection:
         self._socket.settimeout(self._seconds)
 
     def answer_for(self, status: str, headers: list[tuple[str, str]], body: bytes) -> None:
-        """Answer on behalf of the thread that serves it and is stuck; then leave.
+        """Answer on behalf of the serving thread, which is stuck in the application; then close.
+
+        Both threads may come to answer the same request:
+
+        1. The serving thread puts the request into ``_unanswered`` and calls the application.
+        2. Another thread decides that this takes too long, and calls ``answer_for()``.
+        3. The application may come back at this very moment, so both threads try to take the
+           request out of the list. Only one of them can.
+        4. The thread that took it out sends its answer. If that is the serving thread,
+           ``answer_for()`` does nothing. If it is the other, that closes the socket, and the
+           serving thread, if the application ever comes back, finds the list empty and ends.
 
         Args:
             status: as for WSGI.
@@ -259,25 +265,24 @@ class Connection:
             body: what follows them.
         """
         try:
-            request = self._owed.pop()
+            request = self._unanswered.pop()
         except IndexError:
-            # It has just come back.
             return
-        with contextlib.suppress(OSError), contextlib.closing(self._reader), self._socket:
-            self._socket.settimeout(_LAST_WORD_SECONDS)
+        with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
+            self._socket.settimeout(_STUCK_ANSWER_SECONDS)
             data = b"" if request.method == "HEAD" else body
             self._socket.sendall(_head(status, headers, keep=False) + data)
             self._socket.shutdown(socket.SHUT_WR)
 
-    def _respond(self, request: Request) -> tuple[str, list[tuple[str, str]], bytes]:
+    def _respond(self, request: Request) -> Answer:
         if request.refusal is not None:
-            return _refuse(request.refusal)
+            return request.refusal
         try:
             environ = self._environ(request)
         except HttpParserError as error:
-            return _refuse(malformed(str(error)))
-        if not self._known:
-            self._meet(environ)
+            return self._refuse(400, str(error))
+        if not self._is_recognized:
+            self._recognize(environ)
         started: list = []
         result = self._app(
             environ,
@@ -291,7 +296,7 @@ class Connection:
         return started[0], started[1], b"" if request.method == "HEAD" else body
 
     def _environ(self, request: Request) -> dict:
-        # A client that plays says the same words in each step.
+        # A client that plays sends the same head with each step.
         if not (self._last is not None and request.same_head(self._last)):
             self._last, self._last_environ = request, {**self._base_environ, **request.environ()}
         body = bytes(request.body)
@@ -303,24 +308,24 @@ class Connection:
             "wsgi.errors": sys.stderr,
         }
 
-    def turn_to_leave(self, now: float) -> tuple[int, float] | None:
-        """Return what is the smaller, the sooner it is to leave for others; None: not now.
+    def eviction_rank(self, now: float) -> tuple[int, float] | None:
+        """Return what is the smaller, the sooner it is to be evicted; None if it is not to be now.
 
-        First those who have not shown that they belong here, then those who do not read their
-        answers, then those who are silent; of each kind those first who were waited for longest.
+        First come connections whose client is not recognized, then those whose client does not
+        read its answer, then idle ones; of each kind the one that has waited longest is first.
 
         Args:
             now: the clock's seconds.
         """
-        stuck = now > self.waiting_since + _STUCK_SECONDS
-        if self._busy and not (self._sending and stuck):
+        is_slow = now > self.waiting_since + _UNREAD_SECONDS
+        if self._busy and not (self._sending and is_slow):
             return None
-        # A new one may have been heard in a moment.
-        stranger = stuck and not self._known
-        return (0 if stranger else 1 if self._busy else 2), self.waiting_since
+        # The client of a new connection may be recognized in a moment.
+        is_foreign = is_slow and not self._is_recognized
+        return (0 if is_foreign else 1 if self._busy else 2), self.waiting_since
 
-    def give_way(self) -> bool:
-        """Leave, if nothing but the client is waited for; return whether that is so."""
+    def evict(self) -> bool:
+        """End it if it only waits for its client; return whether that is so."""
         how = socket.SHUT_RD
         if self._busy:
             try:
@@ -329,7 +334,7 @@ class Connection:
                 return False
             how = socket.SHUT_RDWR
         with contextlib.suppress(OSError):
-            # Of a silent one what has arrived in this moment is answered still.
+            # What an idle client has just sent is still answered.
             self._socket.shutdown(how)
         return True
 
@@ -337,28 +342,16 @@ class Connection:
         """Make ``serve()`` end when the requests that have arrived are answered.
 
         Args:
-            half_sent: whether to give up a request of which only a part has arrived, and an
-                answer that nobody would keep and its client does not read.
+            half_sent: whether to drop a request of which only a part has arrived, and an answer
+                that is worth nothing later and is not read.
         """
         self._stopping = True
-        if self._busy and self._passing and half_sent:
-            # A watcher that does not read what it asked for.
+        if self._busy and self._sends_no_store and half_sent:
             with contextlib.suppress(OSError):
                 self._socket.shutdown(socket.SHUT_RDWR)
-        if not self._busy and (half_sent or not self._reader.began):
+        if not self._busy and (half_sent or not self._parser.began):
             with contextlib.suppress(OSError):
                 self._socket.shutdown(socket.SHUT_RD)
-
-
-def _refuse(refusal: GymServerError) -> tuple[str, list[tuple[str, str]], bytes]:
-    status, body = answer_to(refusal)
-    data = answers.dumps(body)
-    headers = [
-        ("Content-Type", answers.JSON),
-        ("Content-Length", str(len(data))),
-        *refusal.headers,
-    ]
-    return f"{status} {HTTPStatus(status).phrase}", headers, data
 
 
 def _head(status: str, headers: list[tuple[str, str]], keep: bool) -> bytes:

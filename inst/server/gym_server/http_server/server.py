@@ -1,12 +1,4 @@
-"""Serve the application: a port, a thread for each connection, a stop that loses no answer.
-
-Why no ready-made server: those that run on Windows, macOS and Linux hand each request over from
-the thread that waits for it to one that answers it. Here the thread that answers waits itself.
-Microseconds a request on one kept-alive connection, a bare WSGI application / Flask (medians of 5
-interleaved rounds of 3,000 on two noisy cores): this one 37/206, waitress 3.0.2 156/296; measured
-earlier and elsewhere, beside waitress with 185/310: cheroot 11.1.2 206/350, granian 2.8.7 104/236
-(from a child process, on no socket of ours).
-"""
+"""The server: a port, a thread for each connection, and a stop that loses no answer."""
 
 from __future__ import annotations
 
@@ -14,29 +6,25 @@ import contextlib
 import errno
 import logging
 import math
-import os
 import select
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
 
-from gym_server.budget import Budget
 from gym_server.http_server import connections
 from gym_server.http_server.connection import Connection
 from gym_server.http_server.connections import Connections
+from gym_server.http_server.interface import Answer, Budget, Refuse, refuse_in_plain_text
 
 log = logging.getLogger(__name__)
 
-# Between two looks after those who do not read, and between two warnings.
-_LOOK_SECONDS = 1.0
+# Between two searches for clients that do not read their answers, and between two warnings.
+_SEARCH_SECONDS = 1.0
 _WARN_SECONDS = 10.0
 
-# How many of the largest bodies may be on their way at a time; parts of bodies, and small ones,
-# which do not count, make it many more.
-_LARGEST_BODIES = 16
-
-# A client that sent half a request when the stop came may be gone.
+# After the stop a client that has sent half a request has this long to send the rest.
 _HALF_SENT_SECONDS = 2.0
 
 
@@ -48,22 +36,22 @@ def bind(host: str, port: int) -> socket.socket:
         port: a number; 0 takes a free one.
 
     Returns:
-        A listening socket: from now on connections are accepted.
+        A listening socket: from now on clients can connect.
 
     Raises:
-        OSError: the port is taken, or the host is none of this machine's.
+        OSError: the port is taken, or the host is not an address of this machine.
     """
     family, kind, protocol, _, address = socket.getaddrinfo(
         host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]
     listener = socket.socket(family, kind, protocol)
     try:
-        if os.name == "nt":
-            # There SO_REUSEADDR would let another process take the port over.
+        if sys.platform == "win32":
+            # On Windows SO_REUSEADDR would let another process take the port over.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         else:
-            # Lets a new server start while the old one's connections linger; a port that
-            # somebody listens on stays refused.
+            # A new server can start while connections of the old one linger. A port on which
+            # another process listens stays refused.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(1024)
@@ -81,28 +69,34 @@ class Server:
         app: Callable,
         listener: socket.socket,
         max_body_bytes: int,
+        bodies: Budget,
         on_stop: Callable[[], None] = lambda: None,
-        admit: Callable[[dict], None] = lambda environ: None,
-        knows: Callable[[dict], bool] = lambda environ: True,
+        admit: Callable[[dict], Answer | None] = lambda environ: None,
+        recognizes: Callable[[dict], bool] = lambda environ: True,
+        refuse: Refuse = refuse_in_plain_text,
     ) -> None:
-        """Serve nothing yet: ``run()`` does.
+        """Prepare; ``run()`` serves.
 
         Args:
             app: a WSGI application.
             listener: a listening socket, as ``bind()`` returns it.
             max_body_bytes: the size of the largest request body.
+            bodies: the memory for the bodies of all requests; small ones take none of it.
             on_stop: called when the stop has come and requests are still under way.
-            admit: raises the refusal of a request whose large body is still to come.
-            knows: tells by WSGI's environment whether a request comes from one who may stay
-                connected; asked until it does.
+            admit: is given WSGI's environment of a request whose large body is still to come;
+                returns the answer that refuses it, or None.
+            recognizes: tells by the same whether a client may stay connected; it is asked until it
+                says so.
+            refuse: makes the answer to a request that does not reach the application.
         """
         self._app = app
         self._on_stop = on_stop
         self._admit = admit
-        self._knows = knows
+        self._recognizes = recognizes
+        self._refuse = refuse
         self._listener = listener
         self._max_body_bytes = max_body_bytes
-        self._bodies = Budget(_LARGEST_BODIES * max_body_bytes)
+        self._bodies = bodies
         host, self.port = listener.getsockname()[:2]
         self._base_environ = {
             "SCRIPT_NAME": "",
@@ -120,9 +114,9 @@ class Server:
         self._wake, self._waker = socket.socketpair()
 
     def stop(self) -> None:
-        """Ask ``run()`` to come to its end; callable from any thread and signal handler."""
+        """Ask ``run()`` to end; callable from any thread and signal handler."""
         self._stop_asked.set()
-        # After run() there is nobody to wake.
+        # After run() this socket is closed.
         with contextlib.suppress(OSError):
             self._waker.send(b"x")
 
@@ -136,14 +130,14 @@ class Server:
             Whether all of them were answered.
         """
         self._listener.setblocking(False)
-        looked = time.monotonic()
+        searched = time.monotonic()
         while not self._stop_asked.is_set():
-            # Windows tells of a signal only when the wait is over.
+            # Windows handles a signal only when the wait is over.
             if self._listener in select.select([self._listener, self._wake], [], [], 1.0)[0]:
                 self._accept()
-            if time.monotonic() > looked + _LOOK_SECONDS:
-                looked = time.monotonic()
-                self._connections.shed_unsent()
+            if time.monotonic() > searched + _SEARCH_SECONDS:
+                searched = time.monotonic()
+                self._connections.evict_unread()
         self._listener.close()
         self._wake.close()
         self._waker.close()
@@ -176,7 +170,7 @@ class Server:
             if error.errno in (errno.EMFILE, errno.ENFILE):
                 self._warn("No more connections: this process may open no more files")
                 self._connections.make_room()
-            return  # Else it has left again.
+            return  # Otherwise the client has left again.
         client.setblocking(True)
         connection = Connection(
             client,
@@ -185,13 +179,14 @@ class Server:
             self._max_body_bytes,
             self._bodies.share(),
             self._admit,
-            self._knows,
+            self._recognizes,
+            self._refuse,
         )
         if not self._connections.add(connection, address[0]):
             self._warn(f"No more connections from {address[0]}: all that it has are at work")
             client.close()
             return
-        # A daemon: an environment that never comes back must not keep the process.
+        # A daemon: a call of the application that never returns must not keep the process alive.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
             thread.start()
@@ -202,7 +197,7 @@ class Server:
             self._connections.make_room()
 
     def _warn(self, message: str) -> None:
-        # Whoever brings this about can do so a thousand times a second.
+        # A client can cause this a thousand times a second.
         if time.monotonic() > self._warned + _WARN_SECONDS:
             self._warned = time.monotonic()
             log.warning("%s", message)

@@ -1,1 +1,1 @@
-"""What bodies hold: JSON, safetensors, the fields of requests, answers."""
+"""What travels: JSON and safetensors in bodies, the fields of requests, answers."""

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gym_server.errors import invalid_parameter, missing_parameter
 
@@ -45,7 +45,7 @@ def read(body: dict, fields: Iterable[Field]) -> dict:
     Raises:
         GymServerError: ``missing_parameter``, ``invalid_parameter``, ``not_supported``.
     """
-    values = {}
+    values: dict[str, Any] = {}
     for field in fields:
         value = body.get(field.name)
         if value is None or (field.kind.empty_is_absent and value in ("", [])):
@@ -150,6 +150,6 @@ REQUEST_ID = Kind(
 REQUEST = Field(
     "request",
     REQUEST_ID,
-    "Names this request, so that it is done once however often it arrives: a key of the client's "
-    "own, a number that grows. An instance takes 256 keys in a quarter of an hour (429).",
+    "The idempotency key, by which a request is done once however often it arrives: a key of the "
+    "client's own, a number that grows. An instance takes 256 keys in a quarter of an hour (429).",
 )

@@ -156,7 +156,7 @@ NUMBER_1 = RequestId("a", 1)
 
 def test_numbers_grow_for_each_instance_by_itself():
     once, act = Once(living=["i", "j"]), Counter()
-    # Who guessed a key blocks nobody's but his own instance.
+    # A guessed key blocks only the instance on which it is used.
     once.answer(RequestId("a", 2**62), "step", Counter(), "j")
     assert once.answer(NUMBER_1, "step", act) == 1
     assert once.answer(NUMBER_1, "step", act) == 1
@@ -245,17 +245,17 @@ def test_what_never_comes_back_is_answered_by_another_thread():
         target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
     )
     waiting.start()
-    assert once.give_up(thread.ident, lambda request_id: f"gave up {request_id.number}") == (
-        "gave up 1"
+    assert once.abandon(thread.ident, lambda request_id: f"abandoned {request_id.number}") == (
+        "abandoned 1"
     )
     waiting.join(10)
-    assert repetition == ["gave up 1"]
+    assert repetition == ["abandoned 1"]
     assert once.answer(RequestId("a", 2), "step", act) == 1
     may_end.set()
     thread.join(10)
-    # What came too late is nobody's answer.
+    # The answer that came too late is dropped.
     assert once.answer(RequestId("a", 2), "step", act) == 1
-    assert once.give_up(thread.ident, str) is None
+    assert once.abandon(thread.ident, str) is None
 
 
 def test_what_all_keep_together_is_bounded():
@@ -286,6 +286,6 @@ def test_what_is_kept_is_looked_through_from_time_to_time_and_when_much_came(mon
         once.answer(RequestId("a", number), "step", Counter())
         once.forget_in_time()
     assert len(looks) == 1
-    monkeypatch.setattr("gym_server.api.exactly_once._LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("gym_server.api.exactly_once._SEARCH_SECONDS", 0.0)
     once.forget_in_time()
     assert len(looks) == 2

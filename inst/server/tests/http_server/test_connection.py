@@ -1,4 +1,4 @@
-"""One connection's code, whose patience is short, and a client that behaves badly."""
+"""One connection's code, whose timeouts are short, and a client that behaves badly."""
 
 import gc
 import socket
@@ -28,14 +28,14 @@ def app(environ, start_response):
 
 
 @pytest.fixture
-def patience(monkeypatch):
+def short_timeouts(monkeypatch):
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_STRANGER_SECONDS", 0.5)
+    monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
     monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 2**20)
 
 
 @pytest.fixture
-def converse(patience):
+def converse(short_timeouts):
     """Return a function that connects a client to a connection of its own, and that thread."""
     listener = socket.create_server(("127.0.0.1", 0))
     clients, threads = [], []
@@ -78,14 +78,14 @@ def read_head(client):
 
 
 @pytest.mark.parametrize("asked", [1, 50])
-def test_an_answer_that_is_not_read_is_given_up(converse, asked):
+def test_an_answer_that_is_not_read_ends_the_connection(converse, asked):
     client, thread = converse()
     client.sendall(GET % b"%d" % LARGE * asked)
     thread.join(20)
     assert not thread.is_alive()
 
 
-def test_an_answer_that_is_read_drop_by_drop_is_given_up(converse):
+def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
     client, thread = converse()
     client.sendall(GET % b"%d" % LARGE)
     received = 0
@@ -109,7 +109,7 @@ def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
     assert b"200 OK" in read_head(client)
 
 
-def test_a_client_that_is_known_may_be_silent_for_long(converse):
+def test_a_client_that_is_recognized_may_be_silent_for_long(converse):
     client, _ = converse()
     for _ in range(2):
         client.sendall(GET % b"")
@@ -117,15 +117,15 @@ def test_a_client_that_is_known_may_be_silent_for_long(converse):
         time.sleep(1.2)
 
 
-# Those who have not shown that they belong here ----------------------------------------------
+# Clients that are not recognized -------------------------------------------------------------
 
 
-def strangers(environ):
+def recognizes_nobody(environ):
     return False
 
 
-def test_a_stranger_gets_one_answer(converse):
-    client, _ = converse(knows=strangers)
+def test_an_unrecognized_client_gets_one_answer(converse):
+    client, _ = converse(recognizes=recognizes_nobody)
     client.sendall((GET % b"") * 2)
     answer = b""
     while more := client.recv(65536):
@@ -134,15 +134,15 @@ def test_a_stranger_gets_one_answer(converse):
 
 
 @pytest.mark.parametrize("begun", [b"", GET[:20], POST % 1000])
-def test_a_stranger_may_not_be_silent(converse, begun):
-    client, _ = converse(knows=strangers)
+def test_an_unrecognized_client_may_not_be_silent(converse, begun):
+    client, _ = converse(recognizes=recognizes_nobody)
     client.sendall(begun)
     assert client.recv(1) == b""
 
 
-def test_a_client_is_asked_for_until_it_is_known(converse):
+def test_it_is_asked_about_a_client_until_that_is_recognized(converse):
     asked = []
-    client, _ = converse(knows=lambda environ: asked.append(environ["PATH_INFO"]) or True)
+    client, _ = converse(recognizes=lambda environ: asked.append(environ["PATH_INFO"]) or True)
     for path in (b"1", b"2"):
         client.sendall(GET % path)
         read_head(client)
@@ -181,7 +181,7 @@ def test_what_was_half_sent_leaves_nothing_for_the_garbage_collection(converse):
     gc.disable()
     try:
         client, thread = converse(
-            seen=lambda connection: readers.append(weakref.ref(connection._reader))
+            seen=lambda connection: readers.append(weakref.ref(connection._parser))
         )
         client.sendall(POST % ROOM + bytes(ROOM - 1))
         client.close()

@@ -1,4 +1,4 @@
-"""Who leaves when others come."""
+"""Which connections are evicted when more clients come."""
 
 import math
 
@@ -13,49 +13,49 @@ class Fake:
 
     thread = 0
 
-    def __init__(self, turn, unsent_bytes=0):
-        self.turn, self.unsent_bytes = turn, unsent_bytes
-        self.waiting_since = math.inf if turn is None else turn[1]
-        self.left = False
+    def __init__(self, rank, unsent_bytes=0):
+        self.rank, self.unsent_bytes = rank, unsent_bytes
+        self.waiting_since = math.inf if rank is None else rank[1]
+        self.is_evicted = False
 
-    def turn_to_leave(self, now):
-        return self.turn
+    def eviction_rank(self, now):
+        return self.rank
 
-    def give_way(self):
-        self.left = self.turn is not None
-        return self.left
+    def evict(self):
+        self.is_evicted = self.rank is not None
+        return self.is_evicted
 
 
 @pytest.fixture
 def few(monkeypatch):
     monkeypatch.setattr(module, "MOST_CONNECTIONS", 8)
     monkeypatch.setattr(module, "MOST_OF_ONE_ADDRESS", 4)
-    monkeypatch.setattr(module, "MAKES_ROOM", 2)
+    monkeypatch.setattr(module, "EVICTED_AT_ONCE", 2)
     return Connections()
 
 
-def filled(connections, address, turns):
-    fakes = [Fake(turn) for turn in turns]
+def filled(connections, address, ranks):
+    fakes = [Fake(rank) for rank in ranks]
     assert all(connections.add(fake, address) for fake in fakes)
     return fakes
 
 
-def test_those_leave_first_whose_turn_it_is(few):
+def test_those_of_the_lowest_rank_are_evicted_first(few):
     fakes = filled(few, "10.0.0.1", [(2, 1.0), None, (0, 9.0)])
     fakes += filled(few, "10.0.0.2", [(1, 5.0)])
     few.make_room()
-    assert [fake.left for fake in fakes] == [False, False, True, True]
+    assert [fake.is_evicted for fake in fakes] == [False, False, True, True]
     assert len(few) == 4
     few.make_room()
-    assert [fake.left for fake in fakes] == [True, False, True, True]
+    assert [fake.is_evicted for fake in fakes] == [True, False, True, True]
 
 
 def test_an_address_makes_room_for_its_own(few):
     others = filled(few, "10.0.0.2", [(0, 0.0)] * 3)
     fakes = filled(few, "10.0.0.1", [(2, 4.0), (2, 1.0), (2, 2.0), None])
     assert few.add(Fake(None), "10.0.0.1")
-    assert [fake.left for fake in fakes] == [False, True, True, False]
-    assert not any(fake.left for fake in others)
+    assert [fake.is_evicted for fake in fakes] == [False, True, True, False]
+    assert not any(fake.is_evicted for fake in others)
 
 
 def test_an_address_whose_connections_are_all_at_work_gets_no_more(few):
@@ -80,11 +80,11 @@ def test_a_network_of_one_owner_is_one_address(few, one, other, same):
     assert few.add(Fake(None), other) is not same
 
 
-def test_answers_that_nobody_reads_do_not_pile_up(few, monkeypatch):
+def test_answers_that_are_not_read_do_not_pile_up(few, monkeypatch):
     monkeypatch.setattr(module, "MOST_UNSENT_BYTES", 100)
     sizes = {5.0: 60, 1.0: 60, 3.0: 60, 9.0: 0}
     fakes = [Fake((1, since), size) for since, size in sizes.items()]
     for number, fake in enumerate(fakes):
         few.add(fake, f"10.0.0.{number}")
-    few.shed_unsent()
-    assert [fake.left for fake in fakes] == [False, True, True, False]
+    few.evict_unread()
+    assert [fake.is_evicted for fake in fakes] == [False, True, True, False]

@@ -3,43 +3,43 @@ import tracemalloc
 import pytest
 
 from gym_server.budget import Budget
-from gym_server.http_server.request_parser import Reader
+from gym_server.http_server.request_parser import RequestParser
 
 CHUNKED = b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
 
 
 @pytest.fixture
-def said():
+def sent():
     return []
 
 
 @pytest.fixture
-def reader(said):
-    return Reader(2**20, said.append, lambda request: None, Budget(2**20).share())
+def parser(sent):
+    return RequestParser(2**20, sent.append, lambda request: None, Budget(2**20).share())
 
 
-def test_a_body_in_small_chunks_takes_its_own_size(reader):
-    reader.feed(CHUNKED)
+def test_a_body_in_small_chunks_takes_its_own_size(parser):
+    parser.feed(CHUNKED)
     tracemalloc.start()
     for _ in range(2**8):
-        reader.feed(b"2\r\nab\r\n" * 2**10)
+        parser.feed(b"2\r\nab\r\n" * 2**10)
     size, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert size < 1.5 * 2**19
-    (request,) = reader.feed(b"0\r\n\r\n")
+    (request,) = parser.feed(b"0\r\n\r\n")
     assert bytes(request.body) == b"ab" * 2**18
 
 
-def test_a_body_in_one_piece_is_not_copied(reader):
+def test_a_body_in_one_piece_is_not_copied(parser):
     body = b"x" * 1000
-    (request,) = reader.feed(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\n" + body)
+    (request,) = parser.feed(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\n" + body)
     assert bytes(request.body) is request.body
     assert request.body == body
 
 
-def test_requests_without_a_large_body_ask_for_no_room(said):
-    reader = Reader(2**20, said.append, lambda request: None, Budget(0).share())
-    (request,) = reader.feed(CHUNKED + b"ffff\r\n" + bytes(0xFFFF) + b"\r\n0\r\n\r\n")
+def test_requests_without_a_large_body_take_no_memory(sent):
+    parser = RequestParser(2**20, sent.append, lambda request: None, Budget(0).share())
+    (request,) = parser.feed(CHUNKED + b"ffff\r\n" + bytes(0xFFFF) + b"\r\n0\r\n\r\n")
     assert request.refusal is None
 
 
@@ -50,19 +50,19 @@ UPGRADE = b"%s / HTTP/1.1\r\nHost: a\r\nUpgrade: h2c\r\nConnection: %s\r\n%s\r\n
     ("wishes", "keep_alive"),
     [(b"upgrade", True), (b"close, upgrade", False), (b"Upgrade ,keep-alive", True)],
 )
-def test_the_wish_to_close_outlives_that_for_another_protocol(reader, wishes, keep_alive):
-    (request,) = reader.feed(UPGRADE % (b"GET", wishes, b""))
+def test_close_stays_when_the_wish_for_another_protocol_is_dropped(parser, wishes, keep_alive):
+    (request,) = parser.feed(UPGRADE % (b"GET", wishes, b""))
     assert request.keep_alive is keep_alive
 
 
-def test_the_wish_to_close_may_be_a_header_of_its_own(reader):
-    (request,) = reader.feed(UPGRADE % (b"GET", b"upgrade", b"Connection: close\r\n"))
+def test_the_wish_to_close_may_be_a_header_of_its_own(parser):
+    (request,) = parser.feed(UPGRADE % (b"GET", b"upgrade", b"Connection: close\r\n"))
     assert not request.keep_alive
 
 
-def test_a_client_that_asks_before_it_sends_is_told_once_to_go_on(reader, said):
+def test_a_client_that_asks_before_it_sends_is_answered_once_to_go_on(parser, sent):
     more = b"Expect: 100-continue\r\nContent-Length: 2\r\n"
-    assert reader.feed(UPGRADE % (b"POST", b"upgrade", more)) == []
-    assert said == [b"HTTP/1.1 100 Continue\r\n\r\n"]
-    (request,) = reader.feed(b"{}")
+    assert parser.feed(UPGRADE % (b"POST", b"upgrade", more)) == []
+    assert sent == [b"HTTP/1.1 100 Continue\r\n\r\n"]
+    (request,) = parser.feed(b"{}")
     assert request.body == b"{}"
