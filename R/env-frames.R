@@ -11,10 +11,6 @@ new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
 }
 
-frames_of <- function(record, vector_env) {
-  lapply(record$blocks, function(block) new_frames(block$frames, vector_env$spec$render_fps))
-}
-
 #' @export
 `[.gym_frames` <- function(x, i) new_frames(unclass(x)[i], attr(x, "fps"))
 

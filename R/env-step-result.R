@@ -1,6 +1,8 @@
 # What a step of an environment returns that somebody has written in R: it plays by the same
 # rules as those of the server, but nothing has checked that it does.
 
+flags <- c("terminated", "truncated")
+
 #' Take a step, and check what comes of it if the environment is of the user's own making
 #' @param n For how many sub-environments it steps.
 #' @param ... As `env$step()` takes them.

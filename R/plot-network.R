@@ -45,7 +45,7 @@ plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = N
   if (...length()) {
     return(plot_decision(x, env, ..., main = main, client = client))
   }
-  policy <- bind_named(x, env, client)
+  policy <- bind_to(x, env, client)
   data <- network_plot_data(policy, neurons, digits)
   old <- graphics::par(mar = c(2.5, 1, 4, 1))
   on.exit(graphics::par(old))
@@ -58,6 +58,11 @@ plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = N
     col = weight_colours(), pch = NA, lty = weight_types
   )
   invisible(x)
+}
+
+# With the names of the environment in which it is drawn, or of that in which it was played.
+bind_to <- function(policy, env, client, call = rlang::caller_env()) {
+  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
 }
 
 network_title <- function(x) {
@@ -164,7 +169,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
   if (...length()) {
     return(autoplot_decision(object, env, ..., client = client))
   }
-  policy <- bind_named(object, env, client)
+  policy <- bind_to(object, env, client)
   data <- network_plot_data(policy, neurons, digits)
   weights <- data$weights[order(data$weights$width), ]
   widest <- if (nrow(weights) > 60L) 1.5 else 3

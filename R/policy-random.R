@@ -57,10 +57,10 @@ act.gym_policy_random <- function(policy, observation, ...) {
       value = policy
     )
   }
-  # What is observed matters only for how many there are, and observations that
-  # are lists (of an environment with several parts) come one at a time.
-  observed <- if (counts_sub_envs(observation, policy$observation_space)) {
-    observation_sub_envs(observation, policy$observation_space)
+  # An observation matters only in that each one needs an action. Observations that are lists, of an
+  # environment with several parts, are given one at a time.
+  observed <- if (can_count_observations(observation, policy$observation_space)) {
+    observation_rows(observation, policy$observation_space)
   }
   if (is.null(observed) || observed$one) {
     space_sample(space)
@@ -70,12 +70,12 @@ act.gym_policy_random <- function(policy, observation, ...) {
 }
 
 #' @exportS3Method
-act_sub_envs.gym_policy_random <- function(policy, observation, playing, vector_env) {
+act_batch.gym_policy_random <- function(policy, observation, playing, vector_env) {
   sample_sub_envs(policy$action_space, length(playing))
 }
 
-# Only of numbers can it be said how many observations there are.
-counts_sub_envs <- function(observation, space) {
+# Only where observations are numbers can the number of observations be told.
+can_count_observations <- function(observation, space) {
   !is.list(observation) && (is.null(space) || is_stackable(space))
 }
 

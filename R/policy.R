@@ -70,9 +70,9 @@ act.function <- function(policy, observation, ...) {
   if (is.list(action)) {
     return(action)
   }
-  given <- stack_length(action)
-  if (given != 1L) {
-    abort_action_count(action, given, 1L, list(call = rlang::caller_env()))
+  count <- stack_length(action)
+  if (count != 1L) {
+    abort_action_count(action, count, 1L, list(call = rlang::caller_env()))
   }
   shape <- dim(action)
   dim(action) <- if (length(shape) > 2L) shape[-1L]
@@ -132,7 +132,7 @@ policy_text <- function(policy) {
   if (inherits(policy, "gym_policy")) format(policy) else describe_argument(policy)
 }
 
-# Questions that whoever plays or searches asks of a policy ------------------
+# What rollouts and searches ask of a policy ------------------------------------
 
 #' Fit a policy to an environment
 #'
@@ -143,11 +143,6 @@ policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("poli
 
 #' @exportS3Method
 policy_bind.default <- function(policy, env, call = rlang::caller_env()) policy
-
-# For what is drawn, an environment may be left out.
-bind_named <- function(policy, env, client, call = rlang::caller_env()) {
-  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
-}
 
 #' Draw another policy of the same kind
 #' @noRd
@@ -168,21 +163,21 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
   )
 }
 
-#' Choose an action for each sub-environment that plays
+#' Choose an action for each sub-environment that is playing
 #'
-#' @param policy A policy that is bound to the sub-environments.
-#' @param observation What is observed, one row for each of the sub-environments `playing`.
+#' @param policy A policy that is bound to the environment.
+#' @param observation A batch of observations, one for each of the sub-environments `playing`.
 #' @param playing The numbers of these sub-environments.
-#' @param sub-environments As [vector_env_of()] returns them.
-#' @return The actions, in the form in which sub-environments take them.
+#' @param vector_env As [vector_env_of()] returns it.
+#' @return A batch of actions, one for each of these sub-environments.
 #' @noRd
-act_sub_envs <- function(policy, observation, playing, vector_env) UseMethod("act_sub_envs")
+act_batch <- function(policy, observation, playing, vector_env) UseMethod("act_batch")
 
 #' @exportS3Method
-act_sub_envs.default <- function(policy, observation, playing, vector_env) {
+act_batch.default <- function(policy, observation, playing, vector_env) {
   plain <- is.function(policy) && !has_act_method(policy)
   actions <- if (plain) policy(observation) else act(policy, observation)
-  sub_env_actions(actions, length(playing), vector_env)
+  batch_actions(actions, length(playing), vector_env)
 }
 
 # Observations as rows of numbers -------------------------------------------------
@@ -191,11 +186,11 @@ act_sub_envs.default <- function(policy, observation, playing, vector_env) {
 #'
 #' @param space The observation space, `NULL` for a policy that knows none and
 #'   takes a vector for one observation and a matrix for many.
-#' @return A list: `values`, the matrix, in each row the numbers of an observation
-#'   in row-major order, as Gymnasium flattens them; `one`, whether what came was
-#'   a single observation rather than a number of them.
+#' @return A list: `values`, a matrix with an observation in each row, its numbers in row-major
+#'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation
+#'   rather than a batch.
 #' @noRd
-observation_sub_envs <- function(observation, space) {
+observation_rows <- function(observation, space) {
   axes <- dim(observation)
   rank <- observation_rank(space)
   if (is.null(axes) && rank == 1L) {

@@ -2,18 +2,18 @@
 
 #' Make a result of a search
 #'
-#' @param record Its rounds, as [new_rounds()] keeps them. Only those count before which
+#' @param history Its candidates, as [new_candidates()] keeps them. Only those count before which
 #'   none is unfinished.
 #' @noRd
-new_search <- function(record, settings, started, interrupted = FALSE) {
-  n <- count_finished(record)
-  episodes <- search_episodes_table(record, n)
-  rounds <- rounds_table(record, episodes, n)
+new_search <- function(history, settings, started, interrupted = FALSE) {
+  n <- count_finished(history)
+  episodes <- search_episodes_table(history, n)
+  rounds <- rounds_table(history, episodes, n)
   best <- which.max(rounds$mean_return)
   found <- length(best) == 1L
   structure(
     list(
-      policy = if (found) record$policies[[best]],
+      policy = if (found) history$policies[[best]],
       solved = found && reaches(rounds$mean_return[[best]], settings$target),
       round = if (found) best else NA_integer_,
       rounds = rounds,
@@ -34,16 +34,16 @@ new_search <- function(record, settings, started, interrupted = FALSE) {
   )
 }
 
-search_episodes_table <- function(record, n) {
-  episodes <- episodes_table(record, n * record$size)
-  episodes$episode <- rep(seq_len(record$size), n)
-  data.frame(round = rep(seq_len(n), each = record$size), episodes)
+search_episodes_table <- function(history, n) {
+  episodes <- episodes_table(history, n * history$episodes_each)
+  episodes$episode <- rep(seq_len(history$episodes_each), n)
+  data.frame(round = rep(seq_len(n), each = history$episodes_each), episodes)
 }
 
-rounds_table <- function(record, episodes, n) {
+rounds_table <- function(history, episodes, n) {
   steps <- colSums(matrix(episodes$length, ncol = n))
   data.frame(
-    round = seq_len(n), mean_return = record$means[seq_len(n)], steps = as.integer(steps)
+    round = seq_len(n), mean_return = history$means[seq_len(n)], steps = as.integer(steps)
   )
 }
 
@@ -174,7 +174,7 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
   if (type == "action") {
     return(act(policy, observation))
   }
-  values <- observation_sub_envs(observation, policy$observation_space)$values
+  values <- observation_rows(observation, policy$observation_space)$values
   outputs <- network_outputs(policy, values, call)
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
 }

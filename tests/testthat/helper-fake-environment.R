@@ -128,10 +128,10 @@ scripted_environment <- function(returns, ...) {
 }
 
 # Sub-environments whose episodes have these returns and lengths, in the order in which they begin,
-# block after block. The return comes with the last step.
+# batch after batch. The return comes with the last step.
 scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) {
-  block <- -1L
-  at <- function(seed) block * num_envs + match(seed, current)
+  batch <- -1L
+  at <- function(seed) batch * num_envs + match(seed, current)
   current <- NULL
   env <- fake_vector_env(
     num_envs, mode,
@@ -144,7 +144,7 @@ scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) 
   reset <- env$reset
   env$reset <- function(seed = NULL, options = NULL) {
     observation <- reset(seed, options)
-    block <<- block + 1L
+    batch <<- batch + 1L
     current <<- env$seed
     observation
   }

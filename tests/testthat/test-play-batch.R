@@ -30,7 +30,7 @@ one_by_one <- function(seeds, policy, ...) {
   )
 }
 
-test_that("each sub-environment plays one episode of a block, from its reset to its end", {
+test_that("each sub-environment plays one episode of a batch, from its reset to its end", {
   for (env in every_kind(4, ends = of_some_length)) {
     episodes <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
     expect_identical(episodes$sub_env, c(1:4, 1:4, 1:2))

@@ -311,10 +311,10 @@ test_that("CartPole: 200 pushes at most in v0, and a policy's mistake is the env
 
 test_that("what was played survives an environment that cannot be closed", {
   env <- list(close = function() gym_abort("gone", class = "gym_error_connection"))
-  expect_warning(close_made(env, finished = TRUE), "could not be closed",
+  expect_warning(close_or_warn(env), "could not be closed",
                  class = "gym_warning_close")
   # After an error there is that error to hear of.
-  expect_silent(close_made(env, finished = FALSE))
+  expect_silent(close_quietly(env))
 })
 
 test_that("Blackjack: observations with several parts have named columns", {

@@ -72,10 +72,10 @@ test_that("observations and actions with parts have them batched, in any order o
   ))
   sub_envs <- list(action_space = space, observation_space = space)
   actions <- list(b = c(1, 2), a = rbind(1:2, 3:4))
-  expect_identical(sub_env_actions(actions, 2L, sub_envs), list(a = rbind(1:2, 3:4), b = c(1, 2)))
-  expect_error(sub_env_actions(actions["a"], 2L, sub_envs),
+  expect_identical(batch_actions(actions, 2L, sub_envs), list(a = rbind(1:2, 3:4), b = c(1, 2)))
+  expect_error(batch_actions(actions["a"], 2L, sub_envs),
                "each of 2 observations, not a list of length 1", class = "gym_error_argument")
-  expect_error(sub_env_actions(actions, 3L, sub_envs), "each of 3 observations, not 2 actions",
+  expect_error(batch_actions(actions, 3L, sub_envs), "each of 3 observations, not 2 actions",
                class = "gym_error_argument")
 })
 
