@@ -63,4 +63,5 @@ the_session$made <- new.env(parent = emptyenv())
 .onLoad <- function(libname, pkgname) {
   the_session$pid <- Sys.getpid()
   reg.finalizer(the_session, end_session, onexit = TRUE)
+  register_with_gganimate()
 }

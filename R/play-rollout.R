@@ -166,6 +166,15 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
   x$steps %||% x$episodes
 }
 
+#' @rdname rollout
+#' @param object What `rollout()` returned.
+#' @param newdata,type,... As for [predict()][predict.gym_policy()] of a policy.
+#' @export
+predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  predict_policy(object$policy, newdata, type, object$env_id)
+}
+
 # Printing and summarising ---------------------------------------------------------
 
 #' @export

@@ -8,13 +8,9 @@
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
 #' policy knows its environment: because it was played there, or because `env` says it.
 #'
-#' With `x` and `y` the names of two parts of an observation it is a [decision_map()] that
-#' is drawn instead: `plot(policy, env, x = "pole_angle", y = "pole_angular_velocity")`.
-#'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
-#' @param x,object A network, as [policy_network()] makes it. In a call that names two
-#'   observations as `x` and `y` the network comes first and has no name.
+#' @param x,object A network, as [policy_network()] makes it.
 #' @param env The environment: an id, such as `"CartPole-v1"` or what [gym_wrap()] returns, or
 #'   an environment made by [gym_make()]. `NULL`, the default, is that in which the policy
 #'   was played.
@@ -25,12 +21,11 @@
 #' @param main The title; `NULL`, the default, tells the sizes.
 #' @param client The client of the server that is asked about an environment named by its id;
 #'   the default is the session's own, [gym_client()].
-#' @param ... For a decision map: the arguments of [decision_map()], `x` and `y` first, and
-#'   of its [plot()][plot.gym_decision_map()].
-#' @return `x`, invisibly, for a decision map what [decision_map()] returns; `autoplot()` a
-#'   ggplot.
+#' @param ... Not used.
+#' @return `x`, invisibly; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when the network does not fit the environment, and
 #'   for a policy that has no weights to draw, such as [policy_random()].
+#' @seealso [decision_map()] shows what a network does.
 #' @export
 #' @examples
 #' set.seed(1)
@@ -39,12 +34,9 @@
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
 #' plot(search$policy)
-#' plot(search$policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity")
 plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = NULL,
                                     main = NULL, client = gym_client()) {
-  if (...length()) {
-    return(plot_decision(x, env, ..., main = main, client = client))
-  }
+  check_dots_empty(...)
   policy <- bind_to(x, env, client)
   data <- network_plot_data(policy, neurons, digits)
   old <- graphics::par(mar = c(2.5, 1, 4, 1))
@@ -166,9 +158,7 @@ draw_layer_names <- function(layers, room) {
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
                                         client = gym_client()) {
-  if (...length()) {
-    return(autoplot_decision(object, env, ..., client = client))
-  }
+  check_dots_empty(...)
   policy <- bind_to(object, env, client)
   data <- network_plot_data(policy, neurons, digits)
   weights <- data$weights[order(data$weights$width), ]

@@ -22,6 +22,9 @@
 #' row, an array, or a list of these for the parts. [rollout()] asks it about a single one
 #' before the first step, so that a function which cannot answer that fails at once.
 #'
+#' `predict()` gives the same actions, or the outputs that they follow from, for observations in a
+#' data frame, too. It never touches R's generator.
+#'
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
 #' @param observation What is observed. For the usual environments a numeric
@@ -34,10 +37,12 @@
 #' @return For one observation one action: a whole number for a discrete action
 #'   space, a numeric vector (or array) in the shape of the space for a Box. For
 #'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
-#'   (an array with `n` as its first dimension).
+#'   (an array with `n` as its first dimension). `predict()` returns the same, and with
+#'   `type = "output"` a numeric vector of length `n` (a matrix with `n` rows where the network has
+#'   several outputs).
 #' @section Errors: `gym_error_argument` when `policy` is no policy, the observation
 #'   does not have as many numbers as the policy takes, or a function does not return one
-#'   action for one observation.
+#'   action for one observation; from `predict()` also when the policy is no network.
 #' @export
 #' @examples
 #' policy <- policy_network(sizes = c(4, 2, 1))
@@ -50,6 +55,9 @@
 #' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 #' act(follow_pole, c(0.01, -0.2, 0.03, 0.4))
 #' act(follow_pole, observations)
+#'
+#' predict(policy, observations)
+#' predict(policy, observations, type = "output")
 act <- function(policy, observation, ...) UseMethod("act")
 
 #' @export

@@ -61,11 +61,7 @@ rounds_table <- function(history, episodes, n) {
 #'
 #' @param x,object A search, as [search_random()] returns it.
 #' @param row.names,optional,... Not used.
-#' @param newdata Observations: a numeric vector for a single one, a matrix with one in each
-#'   row, or a data frame, such as the steps of a [rollout()], with a column for each number
-#'   of an observation under its name there.
-#' @param type `"action"`, the default, for the policy's actions, or `"output"` for the
-#'   outputs of the network that they follow from.
+#' @param newdata,type As for [predict()][predict.gym_policy()] of a policy.
 #' @param episodes How many fresh episodes to play, a whole number of at least 1; the
 #'   default is 100.
 #' @param seed A whole number that fixes the fresh episodes and leaves the session's
@@ -152,54 +148,6 @@ predict.gym_search <- function(object, newdata, type = c("action", "output"), ..
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
   check_found(object)
   predict_policy(object$policy, newdata, type, object$env_id)
-}
-
-#' @rdname rollout
-#' @param object What `rollout()` returned.
-#' @param newdata,type,... As for [predict()][predict.gym_search()] of a search.
-#' @export
-predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
-  type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object$policy, newdata, type, object$env_id)
-}
-
-predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
-  if (!inherits(policy, "gym_policy_network")) {
-    gym_abort(
-      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
-      class = "gym_error_argument", argument = "object", value = policy, call = call
-    )
-  }
-  observation <- observations_from(newdata, policy, env_id, call)
-  if (type == "action") {
-    return(act(policy, observation))
-  }
-  values <- observation_rows(observation, policy$observation_space)$values
-  outputs <- network_outputs(policy, values, call)
-  if (ncol(outputs) == 1L) outputs[, 1L] else outputs
-}
-
-# Of a data frame, the columns with an observation's names; where it has none of
-# those it must consist of the observation alone.
-observations_from <- function(newdata, policy, env_id, call) {
-  if (!is.data.frame(newdata)) {
-    return(newdata)
-  }
-  discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  size <- if (discrete) 1L else policy$sizes[[1L]]
-  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
-  names <- observation_names(env_id, columns)
-  if (any(names %in% names(newdata))) {
-    absent <- setdiff(names, names(newdata))
-    if (length(absent)) {
-      gym_abort(
-        paste0("`newdata` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
-        class = "gym_error_argument", argument = "newdata", value = newdata, call = call
-      )
-    }
-    newdata <- newdata[names]
-  }
-  if (discrete) newdata[[1L]] else unname(as.matrix(newdata))
 }
 
 check_found <- function(object, call = rlang::caller_env()) {

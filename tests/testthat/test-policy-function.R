@@ -94,7 +94,7 @@ test_that("policies of other classes are asked by their own method, in sub-envir
   follower <- structure(list(), class = "follower")
   played <- rollout(fake_environment(), follower)
   expect_output(print(played), "Policy: an object of class follower")
-  map <- decision_map(follower, fake_environment(), x = 3, y = 4)
+  map <- decision_map(fake_environment(), follower, x = 3, y = 4)
   expect_output(print(map), "Policy: an object of class follower")
   expect_error(search_random(fake_environment(), follower),
                "weights to draw, not an object of class follower", class = "gym_error_argument")
