@@ -5,8 +5,8 @@
 #' environment need none: [gym_client()] has one ready.
 #'
 #' In an interactive session, where nobody listens at an address of this machine such
-#' as `"http://127.0.0.1:5000"`, it offers once to start a server there, as
-#' [gym_server_start()] does. A script is asked nothing: with no server there the first
+#' as `"http://127.0.0.1:5000"`, the first call asks once whether to start a server there, as
+#' [gym_server_start()] does. A script is not asked: with no server there the first
 #' call fails and says what starts one.
 #'
 #' A client may be saved with [saveRDS()], sent to another process and used in a
@@ -40,7 +40,7 @@
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https
 #'   URL, the timeout not a positive number or the token no string of visible ASCII
-#'   characters; `gym_error_server_start` when a server
+#'   characters. The first call raises `gym_error_server_start` when a server
 #'   that was to be started could not be, and `gym_error_install` when what it needs
 #'   could not be installed.
 #' @export
@@ -73,37 +73,8 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
     abort_argument(config, must, "config", rlang::current_env())
   }
   client <- new_client(remote_base, timeout, config, token)
-  offer_server(client)
+  client$state$may_prompt <- TRUE
   client
-}
-
-new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
-  structure(
-    list(
-      remote_base = sub("/+$", "", remote_base),
-      timeout = timeout,
-      # As for httr's own verbs.
-      config = c(getOption("httr_config", httr::config()), config),
-      token = token,
-      state = new.env(parent = emptyenv())
-    ),
-    class = "GymClient"
-  )
-}
-
-#' @export
-print.GymClient <- function(x, ...) {
-  cat(format(x), "\n", sep = "")
-  invisible(x)
-}
-
-#' @export
-format.GymClient <- function(x, ...) paste0("<GymClient: ", x$remote_base, ">")
-
-check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (!inherits(x, "GymClient")) {
-    abort_argument(x, "a client, as create_GymClient() or gym_client() makes it", arg, call)
-  }
 }
 
 #' Send a request to any route of the server

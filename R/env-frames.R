@@ -74,6 +74,3 @@ frame_from_png <- function(file) {
   shape <- c(dim(values), 1L)[1:3]
   new_frame(array(as.integer(round(255 * values)), shape))
 }
-
-# Width and height stand in the header of the file.
-png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")

@@ -31,7 +31,7 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   }
   close_abandoned(x)
   instance_id <- make_instance(x, fields, call)
-  if (isTRUE(connection(x)$classic)) {
+  if (isTRUE(client_state(x)$classic)) {
     withCallingHandlers(
       check_classic_fields(x, fields, c("env_id", "seed"), call),
       gym_error = function(cnd) close_if_there(x, instance_id, call)
@@ -43,14 +43,10 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   instance_id
 }
 
-instance_route <- function(instance_id) {
-  paste0("/v1/envs/", curl::curl_escape(instance_id), "/")
-}
-
 close_instance <- function(x, instance_id, call = rlang::caller_env()) {
   post_once(x, paste0(instance_route(instance_id), "close/"), call = call)
   forget_made(made_place(x, instance_id))
-  instances <- connection(x)$instances
+  instances <- client_state(x)$instances
   if (!is.null(instances[[instance_id]])) {
     rm(list = instance_id, envir = instances)
   }
@@ -74,7 +70,7 @@ gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "en
 known_instance <- function(x, instance_id, call = rlang::caller_env()) {
   check_client(x, call = call)
   check_string(instance_id, call = call)
-  instances <- connection(x)$instances
+  instances <- client_state(x)$instances
   instances[[instance_id]] %||% (instances[[instance_id]] <- ask_instance(x, instance_id, call))
 }
 

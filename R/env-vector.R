@@ -140,10 +140,6 @@ check_step_sub_envs <- function(which, instance, call) {
   }
 }
 
-are_whole <- function(x, min, max) {
-  is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
-}
-
 check_has_sub_envs <- function(instance, x, arg, call) {
   if (is.null(instance$num_envs)) {
     gym_abort(

@@ -51,17 +51,9 @@
 #' @keywords internal
 "_PACKAGE"
 
-# What this R session holds: the local servers it started and its own client.
-# Being an environment it is never identical to a copy that was read from a
-# file or sent to another process, which is how a client notices that it has
-# been moved.
-the_session <- new.env(parent = emptyenv())
-the_session$servers <- list()
-the_session$client <- NULL
-the_session$made <- new.env(parent = emptyenv())
-
 .onLoad <- function(libname, pkgname) {
   the_session$pid <- Sys.getpid()
+  the_session$prompt_for_server <- prompt_for_server
   reg.finalizer(the_session, end_session, onexit = TRUE)
   register_with_gganimate()
 }

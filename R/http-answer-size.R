@@ -1,7 +1,7 @@
-# How much of this session's memory an answer may take, whatever a server sends.
+# The limit on the size of an answer, so that no server can fill this session's memory.
 
-# 5,000 pictures of Atari's games, and as JSON some millions of numbers. R takes up to eight times
-# the bytes of a tensor, and seventy times those of JSON.
+# Room for 5,000 frames of Atari's games, or for some millions of numbers as JSON. R needs up to
+# eight times the bytes of a tensor, and up to seventy times those of JSON.
 default_answer_bytes <- 2^29
 json_share <- 1 / 16
 
@@ -13,40 +13,40 @@ max_answer_bytes <- function(call = NULL) {
   bytes
 }
 
-# Which is taken whatever the option says: each call pays for looking at it.
+# So much is accepted whatever the option says, as reading the option costs time in each call.
 small_answer <- 2^16
 
 #' Have a handle stop an answer that is too large
 #'
-#' Nothing is unpacked: how much a few bytes become cannot be known beforehand, and libcurl
-#' unpacks all that has come before it looks at the clock. libcurl tells how much has come about
-#' ten times in a call.
-#' @param state The client's, which hears in `overlong` why a call was ended.
+#' Compressed answers are not accepted: how large a few bytes become cannot be known beforehand,
+#' and libcurl decompresses all that has come before it calls `xferinfofunction`, which it does
+#' about ten times in a request.
+#' @param state The client's. Its `too_large` says afterwards whether the request was ended.
 #' @noRd
-bound_answers <- function(handle, state) {
+limit_answer_size <- function(handle, state) {
   curl::handle_setopt(
     handle,
     accept_encoding = NULL,
     noprogress = FALSE,
     xferinfofunction = function(down, up) {
       down[[2L]] <= small_answer || {
-        # Where the option is no number that is said when the call has ended.
+        # An option that is no number is reported when the request has ended.
         most <- answer_bytes_option()
-        state$overlong <- !is_number(most) || down[[2L]] > most
-        !state$overlong
+        state$too_large <- !is_number(most) || down[[2L]] > most
+        !state$too_large
       }
     }
   )
 }
 
-# Before it is parsed.
+# Checks the size of a JSON text before it is parsed.
 check_json_size <- function(content) {
   if (length(content) > small_answer && length(content) > max_answer_bytes() * json_share) {
-    abort_overlong(json_share, "It is JSON, of which R makes much: that may have a sixteenth.")
+    abort_too_large(json_share, "It is JSON, of which R makes much: that may have a sixteenth.")
   }
 }
 
-abort_overlong <- function(share = 1, reason = NULL, base = NULL, call = NULL) {
+abort_too_large <- function(share = 1, reason = NULL, base = NULL, call = NULL) {
   most <- max_answer_bytes(call) * share
   gym_abort(
     c(

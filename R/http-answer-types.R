@@ -215,3 +215,6 @@ check_png <- function(file) {
   }
   file
 }
+
+# Width and height stand in the header of the file.
+png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")

@@ -1,6 +1,6 @@
-# What an answer says.
+# Reading an answer: its JSON or tensors, or the error that it reports.
 
-#' Read an answer or raise its error
+#' Read an answer or raise the error that it reports
 #' @param response What [send()] returned.
 #' @return The parsed answer, `NULL` for an empty one.
 #' @noRd
@@ -16,12 +16,12 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer
 }
 
-# An answer as a list; NULL for an empty one, an error for what is none.
-parsed_body <- function(response, layouts = NULL, request = NULL) {
+# Returns an answer as a list, NULL for an empty one; what cannot be parsed is an error.
+parsed_body <- function(response, layouts = NULL, key = NULL) {
   if (response$status_code == 204L) {
     NULL
   } else if (identical(response$type, tensors_type)) {
-    tensors_answer(response$content, layouts, request)
+    tensors_answer(response$content, layouts, key)
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
   } else {
@@ -31,19 +31,20 @@ parsed_body <- function(response, layouts = NULL, request = NULL) {
   }
 }
 
-# An answer to another call would be worse than none.
+# The server repeats a request's idempotency key in its answer: with another key the answer
+# belongs to another request.
 check_echo <- function(response, answer, call) {
-  sent <- response$request
+  sent <- response$key
   if (is.null(sent)) {
     return()
   }
   echo <- if (response$status_code == 204L) echo_in_header(response) else answer$request
-  if (!is.null(echo) && !is_same_request(echo, sent)) {
+  if (!is.null(echo) && !is_same_key(echo, sent)) {
     abort_connection(response$url, "The answer that came belongs to another call.", call)
   }
 }
 
-is_same_request <- function(echo, sent) {
+is_same_key <- function(echo, sent) {
   is.list(echo) && identical(echo$key, sent$key) && is_number(echo$number) &&
     echo$number == sent$number
 }
@@ -56,12 +57,12 @@ echo_in_header <- function(response) {
   }
 }
 
-# An answer of tensors has the fields of the JSON answer that it stands for, and
-# beside them the tensors and the texts by their names.
-tensors_answer <- function(bytes, layouts, request = NULL) {
-  file <- read_tensors(bytes, layouts, if (!is.null(request)) bare_metadata(request))
+# An answer with tensors has the fields of the JSON answer that it replaces, and beside them the
+# tensors and the texts by their names.
+tensors_answer <- function(bytes, layouts, key = NULL) {
+  file <- read_tensors(bytes, layouts, if (!is.null(key)) bare_metadata(key))
   if (is.null(file$metadata)) {
-    return(list(tensors = file$tensors, info = empty_object, request = request))
+    return(list(tensors = file$tensors, info = empty_object, request = key))
   }
   field <- function(name) {
     text <- file$metadata[[name]]
@@ -76,11 +77,11 @@ tensors_answer <- function(bytes, layouts, request = NULL) {
   )
 }
 
-# The metadata of an answer that echoes the request and has an empty info.
-bare_metadata <- function(request) {
+# The metadata of an answer that repeats the idempotency key and has an empty info.
+bare_metadata <- function(key) {
   sprintf(
     '{"info":"{}","request":"{\\"key\\":\\"%s\\",\\"number\\":%.0f}"}}',
-    request$key, request$number
+    key$key, key$number
   )
 }
 

@@ -1,70 +1,35 @@
-# A client's line to its server: keys, curl's handles, what they send and take.
+# A client's connection to its server: idempotency keys, curl's handles, the body that is sent.
 
-# What a client holds besides its address: its line to the server and what it
-# knows of the server's instances. Made anew when the client finds itself in
-# another process or restored from a file, where a line is void and its key
-# belongs to the original.
-connection <- function(client) {
-  state <- client$state
-  if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
-    line <- open_line(client)
-    suspendInterrupts({
-      state$line <- line
-      state$instances <- new.env(parent = emptyenv())
-      state$creations <- new_numbers()
-      state$to_close <- character()
-      state$layouts <- new.env(parent = emptyenv())
-      state$pid <- Sys.getpid()
-      state$session <- the_session
-    })
-  }
-  state
+# Makes a connection: its idempotency keys, the function that performs a request, the body under
+# way, and the handles that were made so far.
+new_connection <- function(client, keys = keys_of_process(client),
+                           fetch = curl::curl_fetch_memory) {
+  connection <- new.env(parent = emptyenv())
+  connection$keys <- keys
+  connection$fetch <- fetch
+  connection$busy <- FALSE
+  connection$body <- raw()
+  connection$sent <- 0L
+  connection$handles <- new.env(parent = emptyenv())
+  connection
 }
 
-# The line that a call may use. R may run a finalizer at any time, also while curl
-# waits for an answer, and a finalizer may close an environment: a call inside
-# another one gets a line of its own.
-free_line <- function(client) {
-  line <- connection(client)$line
-  while (line$busy) {
-    if (is.null(line$inner)) {
-      line$inner <- open_line(client, new_numbers(), fetch_aside)
+# The connection that a request may use. R may run a finalizer at any time, also while curl waits
+# for an answer, and a finalizer may close an environment: a request inside of another one gets a
+# connection of its own.
+free_connection <- function(client) {
+  connection <- client_state(client)$connection
+  while (connection$busy) {
+    if (is.null(connection$inner)) {
+      connection$inner <- new_connection(client, new_idempotency_keys(), fetch_in_own_pool)
     }
-    line <- line$inner
+    connection <- connection$inner
   }
-  line
+  connection
 }
 
-# The key and number of the last call that must not be done twice, the body under way,
-# and the channels that were opened so far.
-open_line <- function(client, numbers = process_numbers(client), fetch = curl::curl_fetch_memory) {
-  line <- new.env(parent = emptyenv())
-  line$numbers <- numbers
-  line$fetch <- fetch
-  line$busy <- FALSE
-  line$body <- raw()
-  line$sent <- 0L
-  line$channels <- new.env(parent = emptyenv())
-  line
-}
-
-# All clients of one server in one process share a key: an instance takes a limited number of
-# keys, and a script may make a client for each call.
-process_numbers <- function(client) {
-  place <- paste(client$remote_base, Sys.getpid())
-  the_session$numbers[[place]] %||% (the_session$numbers[[place]] <- new_numbers())
-}
-
-# A key, and the last number used under it.
-new_numbers <- function() {
-  numbers <- new.env(parent = emptyenv())
-  numbers$key <- new_key()
-  numbers$number <- 0
-  numbers
-}
-
-# As curl_fetch_memory(), which has one engine for all and cannot run inside itself.
-fetch_aside <- function(url, handle) {
+# Does what curl_fetch_memory() does, which has one pool for all and cannot run inside of itself.
+fetch_in_own_pool <- function(url, handle) {
   pool <- curl::new_pool()
   outcome <- NULL
   curl::handle_setopt(handle, url = url)
@@ -79,52 +44,88 @@ fetch_aside <- function(url, handle) {
   outcome
 }
 
-# Called by curl when it wants more of the body. Asked for the body a second time
-# (curl repeating a call by itself) there is nothing left and curl gives up: only
-# send() may repeat a call.
-read_body <- function(line, nbytes) {
-  if (line$sent == 0L && length(line$body) <= nbytes) {
-    line$sent <- length(line$body)
-    return(line$body)
-  }
-  size <- min(nbytes, length(line$body) - line$sent)
-  chunk <- line$body[line$sent + seq_len(size)]
-  line$sent <- line$sent + size
-  chunk
+# Idempotency keys ------------------------------------------------------------------
+
+# A source of idempotency keys, by which the server knows a repeated request: a random text, and
+# the number of the last request that was sent with it.
+new_idempotency_keys <- function() {
+  keys <- new.env(parent = emptyenv())
+  keys$key <- random_key()
+  keys$number <- 0
+  keys
 }
+
+# The idempotency key of the next request, as its field `request` has it.
+next_key <- function(keys) {
+  keys$number <- keys$number + 1
+  list(key = keys$key, number = keys$number)
+}
+
+# All clients of one server in one process share their keys: the server remembers a limited number
+# of them for an instance, and a script may make a client for each call.
+keys_of_process <- function(client) {
+  place <- paste(client$remote_base, Sys.getpid())
+  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
+}
+
+# Unlike anything drawn from R's generator this is never the same twice.
+random_key <- function() {
+  the_session$key_count <- (the_session$key_count %||% 0) + 1
+  rlang::hash(list(
+    Sys.info()[["nodename"]], Sys.getpid(), as.numeric(Sys.time()), tempfile(""),
+    the_session$key_count
+  ))
+}
+
+# Handles ---------------------------------------------------------------------------
 
 json_type <- "application/json"
 tensors_type <- "application/x-safetensors"
 
-# What a call sends and takes. Headers and the source of the body are set once for each
-# kind, on a curl handle of its own, as setting them costs more than the call.
-channel_kinds <- list(
-  get = list(post = FALSE, sends = json_type, takes = json_type),
-  get_tensors = list(post = FALSE, sends = json_type, takes = tensors_type),
-  post = list(post = TRUE, sends = json_type, takes = json_type),
-  post_tensors = list(post = TRUE, sends = json_type, takes = tensors_type),
-  send_tensors = list(post = TRUE, sends = tensors_type, takes = tensors_type)
+# What a request sends and what answer it accepts. Each kind has a handle of its own, on which the
+# headers and the source of the body are set once: setting them costs more than the request.
+handle_kinds <- list(
+  get = list(post = FALSE, sends = json_type, accepts = json_type),
+  get_tensors = list(post = FALSE, sends = json_type, accepts = tensors_type),
+  post = list(post = TRUE, sends = json_type, accepts = json_type),
+  post_tensors = list(post = TRUE, sends = json_type, accepts = tensors_type),
+  send_tensors = list(post = TRUE, sends = tensors_type, accepts = tensors_type)
 )
 
-find_channel <- function(client, line, kind) {
-  line$channels[[kind]] %||% (line$channels[[kind]] <- open_channel(client, line, kind))
+# A connection's handle of one kind: curl's handle, and the length of body that is set on it.
+handle_of_kind <- function(client, connection, kind) {
+  connection$handles[[kind]] %||%
+    (connection$handles[[kind]] <- new_handle_of_kind(client, connection, kind))
 }
 
-open_channel <- function(client, line, kind) {
-  kind <- channel_kinds[[kind]]
-  channel <- new.env(parent = emptyenv())
-  channel$handle <- open_handle(client, kind$sends, kind$takes)
-  channel$body_size <- -1
-  channel$kind <- kind
+new_handle_of_kind <- function(client, connection, kind) {
+  kind <- handle_kinds[[kind]]
+  handle <- new.env(parent = emptyenv())
+  handle$curl <- new_handle(client, kind$sends, kind$accepts)
+  handle$body_size <- -1
+  handle$kind <- kind
   if (kind$post) {
-    curl::handle_setopt(channel$handle, post = TRUE, readfunction = function(nbytes, ...) {
-      read_body(line, nbytes)
+    curl::handle_setopt(handle$curl, post = TRUE, readfunction = function(nbytes, ...) {
+      read_body(connection, nbytes)
     })
   }
-  channel
+  handle
 }
 
-open_handle <- function(client, sends, takes) {
+# Called by curl when it wants more of the body. When curl repeats a request by itself it asks for
+# the body a second time. Then nothing is left, and curl fails: only send() may repeat a request.
+read_body <- function(connection, nbytes) {
+  if (connection$sent == 0L && length(connection$body) <= nbytes) {
+    connection$sent <- length(connection$body)
+    return(connection$body)
+  }
+  size <- min(nbytes, length(connection$body) - connection$sent)
+  chunk <- connection$body[connection$sent + seq_len(size)]
+  connection$sent <- connection$sent + size
+  chunk
+}
+
+new_handle <- function(client, sends, accepts) {
   handle <- httr::handle(client$remote_base)$handle
   curl::handle_setopt(
     handle,
@@ -139,10 +140,10 @@ open_handle <- function(client, sends, takes) {
     curl::handle_setopt(handle, noproxy = "*")
   }
   curl::handle_setopt(handle, .list = client$config$options)
-  bound_answers(handle, client$state)
-  # An empty Expect keeps curl from asking for leave before it sends a body.
+  limit_answer_size(handle, client$state)
+  # An empty Expect keeps curl from asking for permission before it sends a body.
   headers <- c(
-    "Content-Type" = sends, "Accept" = takes, "Expect" = "",
+    "Content-Type" = sends, "Accept" = accepts, "Expect" = "",
     "User-Agent" = paste0("gym-R/", utils::packageVersion("gym"))
   )
   if (!is.null(client$token)) {
@@ -159,16 +160,4 @@ open_handle <- function(client, sends, takes) {
     curl::handle_setopt(handle, fresh_connect = TRUE, forbid_reuse = TRUE)
   }
   handle
-}
-
-is_loopback <- function(base) {
-  grepl("^https?://(127[.][0-9.]+|localhost|\\[::1\\])(:[0-9]+)?(/|$)", base)
-}
-
-# Unlike anything drawn from R's generator this is never the same twice.
-new_key <- function() {
-  the_session$keys <- (the_session$keys %||% 0) + 1
-  rlang::hash(list(
-    Sys.info()[["nodename"]], Sys.getpid(), as.numeric(Sys.time()), tempfile(""), the_session$keys
-  ))
 }

@@ -1,61 +1,74 @@
-# The attempts at a call, and when there is another.
+# The attempts at a request, and when there is another one.
 
-fetch <- function(client, line, channel, route, request, repeatable, call) {
-  handle <- channel$handle
+fetch <- function(client, connection, handle, route, key, repeatable, call) {
   url <- paste0(client$remote_base, route)
   started <- proc.time()[["elapsed"]]
   attempt <- 1L
   reached <- FALSE
   state <- client$state
-  state$overlong <- FALSE
+  state$too_large <- FALSE
   repeat {
-    response <- exchange(client, line, handle, url, request)
+    response <- attempt_request(client, connection, handle, url, key)
     if (!inherits(response, "error")) {
+      state$may_prompt <- FALSE
       return(response)
     }
     reason <- conditionMessage(response)
-    if (state$overlong) {
-      abort_overlong(base = client$remote_base, call = call)
+    if (state$too_large) {
+      abort_too_large(base = client$remote_base, call = call)
     }
     if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
       rlang::interrupt()
     }
     reached <- reached | curl::handle_data(handle)$times[["pretransfer"]] > 0
-    left <- patience(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
+    left <- timeout_of(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
     again <- repeatable && attempt < max_attempts && left > 0 && connection_broke(reason)
+    if (!again && !reached && prompted_server_starts(client, call)) {
+      return(fetch(client, connection, handle, route, key, repeatable, call))
+    }
     if (!again) {
       abort_connection(client$remote_base, reason, call, reached)
     }
     Sys.sleep(0.1 * attempt)
-    # All attempts together may take as long as one call.
+    # All attempts together may take as long as one request.
     curl::handle_setopt(handle, timeout_ms = left * 1000)
-    on.exit(curl::handle_setopt(handle, timeout_ms = patience(client) * 1000))
+    on.exit(curl::handle_setopt(handle, timeout_ms = timeout_of(client) * 1000))
     attempt <- attempt + 1L
   }
 }
 
-# httr's timeout() goes before the client's own.
-patience <- function(client) {
-  own <- client$config$options$timeout_ms
-  if (is.null(own)) client$timeout else own / 1000
+# Whether somebody was asked, at the first request of a client that found nobody listening, and had
+# a server started there. Only clients of create_GymClient() ask. What asks belongs to an upper
+# floor: .onLoad() registers it.
+prompted_server_starts <- function(client, call) {
+  state <- client$state
+  prompts <- isTRUE(state$may_prompt)
+  state$may_prompt <- FALSE
+  prompts && the_session$prompt_for_server(client, call)
 }
 
-# One attempt: the response with its answer parsed, or the error of the connection.
-exchange <- function(client, line, handle, url, request) {
-  line$sent <- 0L
+# httr's timeout() takes precedence over the client's own.
+timeout_of <- function(client) {
+  configured <- client$config$options$timeout_ms
+  if (is.null(configured)) client$timeout else configured / 1000
+}
+
+# Makes one attempt. Returns the response with its answer parsed, or the connection's error.
+attempt_request <- function(client, connection, handle, url, key) {
+  connection$sent <- 0L
   response <- NULL
   problem <- tryCatch(
     {
       fetched <- withCallingHandlers(
-        line$fetch(url, handle),
-        # So newer versions of curl tell that an answer was stopped for its size.
-        interrupt = function(cnd) if (client$state$overlong) stop("Too large")
+        connection$fetch(url, handle),
+        # Newer versions of curl signal an interrupt when an answer was stopped for its size.
+        interrupt = function(cnd) if (client$state$too_large) stop("Too large")
       )
       if (ends_in_header(fetched)) {
         stop("Connection died within the header of the answer")
       }
       response <- fetched
-      response$answer <- parsed_body(response, client$state$layouts, request)
+      response$answer <- parsed_body(response, client$state$layouts, key)
       NULL
     },
     error = identity
@@ -81,8 +94,8 @@ ends_in_header <- function(response) {
 
 max_attempts <- 4L
 
-# What libcurl says when a connection that stood went away, as opposed to one that
-# could not be made or an answer that took too long.
+# What libcurl says when an open connection was lost, as opposed to one that could not be made or
+# an answer that took too long.
 connection_broke <- function(reason) {
   grepl(
     paste(

@@ -104,14 +104,6 @@ json_atoms <- function(x) {
   )
 }
 
-# The elements of an array with its last index running fastest, as on the wire.
-row_major <- function(x) {
-  if (!is.object(x) || !inherits(x, "integer64")) {
-    return(if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x))
-  }
-  structure(row_major(unclass(x)), class = "integer64")
-}
-
 # Parse an answer. Integers beyond 2^53 come as text, so that none is rounded.
 from_json <- function(text) {
   Encoding(text) <- "UTF-8"
@@ -158,6 +150,30 @@ number_from_json <- function(x) {
 is_json_number <- function(x) {
   length(x) == 1L &&
     (is.numeric(x) || is.character(x) && grepl("^(-?[0-9]+|NaN|-?Infinity)$", x))
+}
+
+# From JSON, where integers beyond 2^53 are text.
+whole_from_json <- function(json) {
+  numbers <- unlist(json, use.names = FALSE)
+  if (is.character(numbers)) {
+    if (!all(grepl("^-?[0-9]+$", numbers))) {
+      abort_answer(paste(describe_value(numbers), "is no whole number"))
+    }
+    return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
+  }
+  if (is.double(numbers)) {
+    check_exact(numbers)
+  }
+  if (is.null(numbers)) integer() else numbers
+}
+
+# The parser gives up on what int64 cannot hold and rounds it, as it does with
+# the least int64. Every other integer beyond 2^53 has come as text.
+check_exact <- function(numbers) {
+  lost <- abs(numbers) > 2^53
+  if (any(lost)) {
+    abort_whole(sprintf("%.0f", numbers[lost][[1L]]))
+  }
 }
 
 # Infos --------------------------------------------------------------------------
@@ -222,5 +238,3 @@ stack_rows <- function(rows, json) {
     rows
   }
 }
-
-array_shape <- function(x) dim(x) %||% length(x)

@@ -1,43 +1,42 @@
-# Calls, each of which becomes one request.
+# Calls of the server's routes, each of which is one request.
 
 #' Send a request
 #'
-#' The one function that speaks HTTP. A GET whose connection broke is sent again,
-#' and so is a POST that is done `once`, under the number by which the server
-#' knows the repeat.
+#' All requests of a client go through here. A GET whose connection broke is sent again, and so is
+#' a POST that is done `once`, with the same idempotency key, by which the server knows the repeat.
 #' @param fields JSON texts of the fields of a POST's body, named; `NULL` for a GET.
 #' @param tensors Tensors for a body that is not JSON, see [write_tensors()].
 #' @param take_tensors Whether the answer should come as tensors.
-#' @param request The key and number of a POST that is done once; by default the line's next.
-#' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the
-#'   `request` that was sent (its `key` and `number`) and the parsed `answer`, `NULL`
-#'   for none or one that cannot be read.
+#' @param key The idempotency key of a POST that is done once, a list of `key` and `number`; by
+#'   default the connection's next.
+#' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the idempotency key
+#'   that was sent, `key`, and the parsed `answer`, `NULL` for none or one that cannot be read.
 #' @noRd
 send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FALSE,
-                 once = FALSE, request = NULL, call = rlang::caller_env()) {
-  # Arguments may hold calls of their own, as in env_reset(x, env_create(x, id)):
-  # those come first and have the line for themselves.
+                 once = FALSE, key = NULL, call = rlang::caller_env()) {
+  # Arguments may contain requests of their own, as in env_reset(x, env_create(x, id)): those are
+  # evaluated first, while the connection is free.
   force(route)
   force(fields)
   force(tensors)
-  line <- free_line(client)
-  line$busy <- TRUE
-  on.exit(line$busy <- FALSE)
-  channel <- find_channel(client, line, channel_kind(fields, tensors, take_tensors))
-  if (once && is.null(request)) {
-    request <- next_request(line$numbers)
+  connection <- free_connection(client)
+  connection$busy <- TRUE
+  on.exit(connection$busy <- FALSE)
+  handle <- handle_of_kind(client, connection, handle_kind(fields, tensors, take_tensors))
+  if (once && is.null(key)) {
+    key <- next_key(connection$keys)
   }
   if (!is.null(fields)) {
-    load_body(line, channel, request_body(fields, request, tensors))
+    load_body(connection, handle, request_body(fields, key, tensors))
   }
-  # A classic server would do the repeat as well.
+  # A server with the classic protocol knows no idempotency keys and would do the repeat, too.
   repeatable <- once && !isTRUE(client$state$classic) || is.null(fields)
-  response <- fetch(client, line, channel, route, request, repeatable, call)
-  response$request <- request
+  response <- fetch(client, connection, handle$curl, route, key, repeatable, call)
+  response$key <- key
   response
 }
 
-channel_kind <- function(fields, tensors, take_tensors) {
+handle_kind <- function(fields, tensors, take_tensors) {
   if (!is.null(tensors)) {
     "send_tensors"
   } else if (is.null(fields)) {
@@ -47,31 +46,26 @@ channel_kind <- function(fields, tensors, take_tensors) {
   }
 }
 
-next_request <- function(numbers) {
-  numbers$number <- numbers$number + 1
-  list(key = numbers$key, number = numbers$number)
-}
-
-request_body <- function(fields, request, tensors = NULL) {
-  fields <- c(fields, request = request_json(request))
+request_body <- function(fields, key, tensors = NULL) {
+  fields <- c(fields, request = key_json(key))
   if (is.null(tensors)) charToRaw(json_object(fields)) else write_tensors(tensors, fields)
 }
 
-request_json <- function(request) {
-  if (!is.null(request)) {
-    sprintf('{"key":"%s","number":%.0f}', request$key, request$number)
+key_json <- function(key) {
+  if (!is.null(key)) {
+    sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
   }
 }
 
 # curl needs the length of a body beforehand, and setting it costs as much as half a
-# call: small bodies are padded with blanks to one length.
-load_body <- function(line, channel, bytes) {
-  line$body <- padded(bytes, channel$kind)
-  size <- length(line$body)
-  if (size != channel$body_size) {
+# request: small bodies are padded with blanks to one length.
+load_body <- function(connection, handle, bytes) {
+  connection$body <- padded(bytes, handle$kind)
+  size <- length(connection$body)
+  if (size != handle$body_size) {
     suspendInterrupts({
-      curl::handle_setopt(channel$handle, postfieldsize_large = size)
-      channel$body_size <- size
+      curl::handle_setopt(handle$curl, postfieldsize_large = size)
+      handle$body_size <- size
     })
   }
 }
@@ -82,19 +76,20 @@ padded <- function(bytes, kind) {
   if (padding > 0L && kind$sends == json_type) c(bytes, rep(as.raw(0x20), padding)) else bytes
 }
 
-# Make a call that the server carries out exactly once, and read its answer.
+# Makes a POST that the server carries out exactly once, and reads its answer.
 post_once <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FALSE,
-                      request = NULL, call = rlang::caller_env()) {
+                      key = NULL, call = rlang::caller_env()) {
   fields <- fields %||% character()
-  response <- send(client, route, fields, tensors, take_tensors, TRUE, request, call)
+  response <- send(client, route, fields, tensors, take_tensors, TRUE, key, call)
   read_answer(response, "POST", call)
 }
 
-# Make any other call, and read its answer.
+# Makes a GET, and reads its answer.
 get_answer <- function(client, route, take_tensors = FALSE, call = rlang::caller_env()) {
   read_answer(send(client, route, take_tensors = take_tensors, call = call), "GET", call)
 }
 
+# Makes a POST without an idempotency key, and reads its answer.
 post_answer <- function(client, route, fields = character(), call = rlang::caller_env()) {
   read_answer(send(client, route, fields, call = call), "POST", call)
 }

@@ -36,7 +36,7 @@ gym_server_bundle <- function(dir, extras = character()) {
   dir <- absolute_path(dir)
   check_bundle_place(dir, call)
   extras <- server_extras[server_extras %in% extras]
-  in_turn({
+  with_install_lock({
     plan <- install_plan(extras, call)
     dir <- empty_bundle(dir, call)
     cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))

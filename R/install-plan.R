@@ -51,8 +51,10 @@ find_base_python <- function(with_venv, versions = lock_pythons) {
 # What a Python is: its version, whether the lock files are for it, and whether it can make
 # environments; NULL for what does not run.
 probe_python <- function(python) {
-  said <- run_quietly(python, c("-I", "-c", probe), timeout = 60, env = tool_environment())$stdout
-  words <- strsplit(trimws(said), " ", fixed = TRUE)[[1L]]
+  output <- ask_program(
+    python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
+  )$stdout
+  words <- strsplit(trimws(output), " ", fixed = TRUE)[[1L]]
   if (length(words) != 5L || words[[1L]] != "python") {
     return(NULL)
   }

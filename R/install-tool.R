@@ -52,11 +52,18 @@ run_tool <- function(command, arguments, env = character()) {
     lines <- process$read_output_lines()
     if (length(lines)) write_log(lines)
     output <- c(output, lines)
-    keep_turn()
+    touch_install_lock()
     if (!process$is_incomplete_output() && !process$is_alive()) {
       return(structure(output, status = process$get_exit_status()))
     }
   }
+}
+
+# Runs a program that is only asked something. As several may be asked one after the other, the
+# install lock is touched after each.
+ask_program <- function(command, arguments, timeout = 30, env = NULL) {
+  on.exit(touch_install_lock())
+  run_quietly(command, arguments, timeout, env)
 }
 
 failed <- function(output) !identical(attr(output, "status"), 0L)

@@ -45,9 +45,9 @@ uv_candidates <- function() {
 }
 
 uv_works <- function(uv, timeout = 30) {
-  said <- run_quietly(uv, "--version", timeout)$stdout
-  version <- regmatches(said, regexpr("[0-9]+[.][0-9]+[.][0-9]+", said))
-  startsWith(said, "uv ") && length(version) == 1L && package_version(version) >= least_uv
+  output <- ask_program(uv, "--version", timeout)$stdout
+  version <- regmatches(output, regexpr("[0-9]+[.][0-9]+[.][0-9]+", output))
+  startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
 # The release that is brought where there is none, and the SHA-256 of its archives, as published
@@ -133,7 +133,7 @@ download_uv <- function(url, archive, call) {
     # Bytes in a second, and for how many seconds: one that stands still would never end.
     low_speed_limit = 100, low_speed_time = 60,
     noprogress = FALSE, progressfunction = function(down, up) {
-      keep_turn()
+      touch_install_lock()
       TRUE
     }
   )

@@ -54,7 +54,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
     needed <- if (!is.null(plan)) "; the bundle was not needed"
     cli::cli_inform(c(v = "The server is installed already, in {.path {there$folder}}{needed}."))
     if (length(install_folders()) > 1L) {
-      in_turn(remove_other_folders(keep = there$folder))
+      with_install_lock(remove_other_folders(keep = there$folder))
     }
     return(invisible(there$python))
   }
@@ -62,7 +62,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
-  python <- telling_of_interrupts(in_turn({
+  python <- telling_of_interrupts(with_install_lock({
     there <- installed_server()
     if (has_all(there, wanted)) {
       cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))

@@ -1,54 +1,6 @@
 # Local servers: started by this session, ended with it. The server ends when its
 # standard input closes, which happens however the R session ends.
 
-#' Use the session's server
-#'
-#' Returns the client that functions take when they are given none. It talks to
-#' the server that the environment variable `GYM_SERVER_URL` names or, without
-#' it, to one on this machine, which is started at the first call and stops with
-#' the session. A server that asks for a token gets the one that `GYM_SERVER_TOKEN` holds.
-#'
-#' @inheritSection gym_server_start Where there is no Python
-#' @return A client, as [create_GymClient()] makes it.
-#' @section Errors: `gym_error_server_start` when no server could be started;
-#'   `gym_error_install` when a Python environment was to be installed first, and could not be.
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' gym_client()
-gym_client <- function() {
-  session_client()
-}
-
-# `install` as start_server() takes it.
-session_client <- function(install = TRUE, call = rlang::caller_env()) {
-  url <- Sys.getenv("GYM_SERVER_URL")
-  if (nzchar(url)) {
-    return(named_client(url, call))
-  }
-  if (is.null(the_session$client) || !is_running(the_session$client$remote_base)) {
-    the_session$client <- start_server(install = install, call = call)
-  }
-  the_session$client
-}
-
-# One client for all calls, so that they share its connection.
-named_client <- function(url, call = rlang::caller_env()) {
-  if (!grepl("^https?://[^/]", url)) {
-    gym_abort(
-      paste0("The variable GYM_SERVER_URL must be the address of a server, such as ",
-             "\"http://127.0.0.1:5000\", not \"", url, "\"."),
-      class = "gym_error_argument",
-      call = call
-    )
-  }
-  names <- list(url, Sys.getenv(token_variable), getOption("httr_config"))
-  if (!identical(the_session$named_by, names)) {
-    the_session$named_client <- new_client(url, token = variable_token(call))
-    the_session$named_by <- names
-  }
-  the_session$named_client
-}
-
 # In a forked child the parent's server is as good as its own.
 is_running <- function(base) {
   server <- the_session$servers[[base]]
@@ -135,11 +87,12 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     }
   }
   launch_first(python_candidates(python)) %||%
-    (if (install && is.null(named_python(python))) launch_first(offered_python())) %||%
+    (if (install && is.null(named_python(python))) launch_first(prompt_for_python())) %||%
     abort_no_python(python, refusals, call)
 }
 
 register_server <- function(server) {
+  server$extra_hint <- function(extra) installed_extra_hint(extra, server$python)
   the_session$servers[[server$url]] <- server
   # R ends what is youngest first. An end that is registered after the process finds the process
   # there still; kept, as it must not come before the session's.
@@ -147,6 +100,19 @@ register_server <- function(server) {
   reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
   the_session$endings <- c(the_session$endings, ending)
   new_client(server$url, token = server$token)
+}
+
+# How to install an extra on a server that runs from what gym_server_install() made; NULL for a
+# server with another Python, which somebody else looks after.
+installed_extra_hint <- function(extra, python) {
+  if (!is_installed_python(python)) {
+    return(NULL)
+  }
+  anew <- "`gym_server_stop()` ends this server, and the next `gym_make()` starts one that has it"
+  if (extra %in% installed_server()$extras) {
+    return(paste0("it has been installed meanwhile: ", anew))
+  }
+  paste0("`gym_server_install(extras = \"", extra, "\")` installs it; ", anew)
 }
 
 # Extra options as the command line takes them: log_level = "info" becomes
@@ -257,12 +223,4 @@ await_ends <- function(servers, deadline) {
   for (server in servers) {
     await_end(server$process, deadline - proc.time()[["elapsed"]])
   }
-}
-
-# For the examples: whether the session has a server or can have one, as things are.
-can_start_server <- function() {
-  tryCatch(
-    inherits(session_client(install = FALSE), "GymClient"),
-    gym_error_server_start = function(cnd) FALSE
-  )
 }

@@ -108,23 +108,6 @@ decode_numbers <- function(dtype, json) {
   )
 }
 
-# Put elements that come row by row (last index fastest) into an array.
-shape_values <- function(values, shape) {
-  if (length(shape) <= 1L) {
-    return(values)
-  }
-  wide <- inherits(values, "integer64")
-  values <- unclass(values)
-  if (length(shape) == 2L) {
-    # A third of what aperm() takes.
-    values <- matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
-  } else {
-    dim(values) <- rev(shape)
-    values <- aperm(values)
-  }
-  if (wide) structure(values, class = "integer64") else values
-}
-
 # Checking --------------------------------------------------------------------------
 
 #' @exportS3Method

@@ -154,7 +154,7 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 #' All sub-environments at once, as nearly always they all fit; if not, one after the other, so that
 #' the error tells which sub-environment it is and shows that sub-environment's value.
 #' @param space The space of one sub-environment, `batch` that of all `n`.
-#' @param sub-environments Their numbers; `NULL` for 1 to `n`.
+#' @param sub_envs Their numbers; `NULL` for 1 to `n`.
 #' @noRd
 check_sub_envs <- function(space, batch, values, n, call, sub_envs = NULL) {
   if (fits_space(batch, values)) {

@@ -45,8 +45,6 @@ print.gym_space <- function(x, ...) {
   invisible(x)
 }
 
-shape_text <- function(shape) paste0("[", paste(shape, collapse = ", "), "]")
-
 # Values --------------------------------------------------------------------------
 
 #' Turn a value from the wire into an R value

@@ -58,6 +58,5 @@ run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
     ),
     error = function(cnd) silent
   ))
-  keep_turn()
   if (isTRUE(run$timeout)) silent else run[c("status", "stdout")]
 }

@@ -4,28 +4,8 @@
 
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
-# From JSON, where integers beyond 2^53 are text.
-whole_from_json <- function(json) {
-  numbers <- unlist(json, use.names = FALSE)
-  if (is.character(numbers)) {
-    if (!all(grepl("^-?[0-9]+$", numbers))) {
-      abort_answer(paste(describe_value(numbers), "is no whole number"))
-    }
-    return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
-  }
-  if (is.double(numbers)) {
-    check_exact(numbers)
-  }
-  if (is.null(numbers)) integer() else numbers
-}
-
-# The parser gives up on what int64 cannot hold and rounds it, as it does with
-# the least int64. Every other integer beyond 2^53 has come as text.
-check_exact <- function(numbers) {
-  lost <- abs(numbers) > 2^53
-  if (any(lost)) {
-    abort_whole(sprintf("%.0f", numbers[lost][[1L]]))
-  }
+are_whole <- function(x, min, max) {
+  is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
 }
 
 # From decimal digits.

@@ -43,13 +43,13 @@ watch_steps <- function(env) {
       value
     }
   }
-  line <- gym:::connection(env$client)$line
-  fetch <- line$fetch
-  line$fetch <- watch("curl", fetch)
+  connection <- gym:::client_state(env$client)$connection
+  fetch <- connection$fetch
+  connection$fetch <- watch("curl", fetch)
   originals <- mget(watched, asNamespace("gym"))
   for (name in watched) utils::assignInNamespace(name, watch(name, originals[[name]]), "gym")
   on.exit({
-    line$fetch <- fetch
+    connection$fetch <- fetch
     for (name in watched) utils::assignInNamespace(name, originals[[name]], "gym")
   })
   names <- c("whole", watched, "curl")

@@ -86,9 +86,9 @@ test_that("a timeout of httr's goes before the client's, after a repeat too", {
   server <- local_server()
   client <- local_cut_client(server, "answered", "GET /v1/envs/ ")
   client$config <- httr::timeout(3)
-  expect_identical(patience(client), 3)
+  expect_identical(timeout_of(client), 3)
   expect_type(env_list_all(client), "list")
-  expect_identical(patience(server), 60)
+  expect_identical(timeout_of(server), 60)
 })
 
 test_that("a step whose answer was lost is not taken twice", {
@@ -156,9 +156,9 @@ test_that("a client survives saveRDS() and makes calls of its own", {
   expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
   expect_equal(env_step(client, id, 0)$reward, 1)
   # Of one process all have one key, and no number of it twice.
-  numbers <- lapply(c(list(client), copies), function(copy) copy$state$line$numbers)
-  expect_identical(numbers[[2]], numbers[[1]])
-  expect_identical(numbers[[3]], numbers[[1]])
+  keys <- lapply(c(list(client), copies), function(copy) copy$state$connection$keys)
+  expect_identical(keys[[2]], keys[[1]])
+  expect_identical(keys[[3]], keys[[1]])
 })
 
 test_that("a script may make a client for each call", {
@@ -173,7 +173,7 @@ test_that("a client works in forked workers", {
   skip_on_os("windows")
   client <- test_client()
   env_list_all(client)
-  key <- function(...) connection(client)$line$numbers$key
+  key <- function(...) client_state(client)$connection$keys$key
   keys <- c(key(), unlist(parallel::mclapply(1:2, key, mc.cores = 2)))
   expect_length(unique(keys), 3)
   answers <- parallel::mclapply(1:4, function(seed) {
@@ -230,9 +230,9 @@ test_that("a call inside another call disturbs neither", {
   env_reset(server, id)
   env_reset(server, twin)
   # curl asks R for a call's body, and there R may run finalizers: here it does.
-  line <- connection(server)$line
-  curl::handle_setopt(line$channels$post$handle, readfunction = function(nbytes, ...) {
-    if (line$sent == 0L) {
+  connection <- client_state(server)$connection
+  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {
+    if (connection$sent == 0L) {
       thrown_away <- new.env()
       reg.finalizer(thrown_away, function(x) {
         env_close(server, env_create(server, "CartPole-v1"))
@@ -240,7 +240,7 @@ test_that("a call inside another call disturbs neither", {
       rm(thrown_away)
       gc()
     }
-    read_body(line, nbytes)
+    read_body(connection, nbytes)
   })
   other <- create_GymClient(server$remote_base)
   for (action in c(1, 0, 1)) {
@@ -278,7 +278,7 @@ test_that("an answer to another call is an error, in a body and in a header", {
   sent <- list(key = "k", number = 4)
   answer <- function(status, body, headers = "") {
     list(status_code = status, content = charToRaw(body), headers = charToRaw(headers),
-         url = "http://127.0.0.1:1/v1/envs/", request = sent)
+         url = "http://127.0.0.1:1/v1/envs/", key = sent)
   }
   echo <- function(number) sprintf('{"request":{"key":"k","number":%d}}', number)
   header <- function(number) {

@@ -115,17 +115,19 @@ local_answers <- function(answers, frame = parent.frame()) {
   asked
 }
 
-test_that("where nobody listens a server is offered, and the script goes on", {
+test_that("where nobody listens the first call asks for a server, and the script goes on", {
   skip_if_no_server()
   for (host in c("127.0.0.1", "localhost")) {
     base <- paste0("http://", host, ":", free_port())
     asked <- local_answers(list(TRUE))
-    expect_message(server <- create_GymClient(paste0(base, "/")), "stops with this R session")
+    server <- create_GymClient(paste0(base, "/"))
+    expect_length(asked$questions, 0)
+    expect_message(id <- env_create(server, "CartPole-v0"), "stops with this R session")
     expect_match(asked$questions, base, fixed = TRUE)
-    expect_length(env_reset(server, env_create(server, "CartPole-v0")), 4)
+    expect_length(env_reset(server, id), 4)
     expect_type(gym_server_log(server), "character")
     # Now somebody listens.
-    create_GymClient(base)
+    env_list_all(create_GymClient(base))
     expect_length(asked$questions, 1)
     gym_server_stop(server)
     expect_error(env_list_all(server), class = "gym_error_connection")
@@ -135,39 +137,46 @@ test_that("where nobody listens a server is offered, and the script goes on", {
 test_that("whoever declines a server is not asked again for that address", {
   base <- paste0("http://127.0.0.1:", free_port())
   asked <- local_answers(list(FALSE, FALSE))
-  client <- create_GymClient(base)
-  create_GymClient(base)
-  expect_length(asked$questions, 1)
-  error <- expect_error(env_list_all(client), class = "gym_error_connection")
+  first_call <- function(base) {
+    expect_error(env_list_all(create_GymClient(base)), class = "gym_error_connection")
+  }
+  error <- first_call(base)
   expect_match(conditionMessage(error), "gym_server_start(port = ", fixed = TRUE)
-  create_GymClient(paste0("http://127.0.0.1:", free_port()))
+  first_call(base)
+  expect_length(asked$questions, 1)
+  first_call(paste0("http://127.0.0.1:", free_port()))
   expect_length(asked$questions, 2)
 })
 
-test_that("nothing is offered in a script, elsewhere, or where somebody listens", {
+test_that("nobody is asked in a script, elsewhere, or where somebody listens", {
   asked <- local_answers(list())
+  expect_unasked <- function(base, ...) {
+    client <- create_GymClient(base, timeout = 1, ...)
+    expect_error(env_list_all(client), class = "gym_error_connection")
+  }
   for (elsewhere in c("http://lab.example.org:5000", "https://127.0.0.1:5000", "http://127.0.0.1",
                       paste0("http://127.0.0.1:", free_port(), "/gym"))) {
-    expect_s3_class(create_GymClient(elsewhere), "GymClient")
+    expect_unasked(elsewhere)
   }
   port <- free_port()
   socket <- serverSocket(port)
-  expect_s3_class(create_GymClient(paste0("http://127.0.0.1:", port)), "GymClient")
+  expect_unasked(paste0("http://127.0.0.1:", port))
   close(socket)
   base <- paste0("http://127.0.0.1:", port)
-  expect_s3_class(create_GymClient(base, config = httr::use_proxy("proxy", 80)), "GymClient")
+  expect_unasked(base, config = httr::use_proxy("proxy", 80))
   withr::local_options(rlang_interactive = FALSE)
-  expect_s3_class(create_GymClient(base), "GymClient")
+  expect_unasked(base)
   expect_length(asked$questions, 0)
 })
 
-test_that("offering a server leaves R's generator alone", {
+test_that("asking for a server leaves R's generator alone", {
   skip_if_no_server()
   local_answers(list(TRUE))
   base <- paste0("http://127.0.0.1:", free_port())
   set.seed(1)
   before <- .Random.seed
-  server <- suppressMessages(create_GymClient(base))
+  server <- create_GymClient(base)
+  suppressMessages(env_list_all(server))
   withr::defer(gym_server_stop(server))
   expect_identical(.Random.seed, before)
 })
@@ -176,10 +185,11 @@ test_that("an address of the other kind gets its server, too", {
   skip_if_no_server()
   base <- paste0("http://[::1]:", free_port())
   local_answers(list(TRUE))
-  server <- tryCatch(
-    suppressMessages(create_GymClient(base)),
+  server <- create_GymClient(base)
+  environments <- tryCatch(
+    suppressMessages(env_list_all(server)),
     gym_error_server_start = function(cnd) skip("no IPv6 on this machine")
   )
   withr::defer(gym_server_stop(server))
-  expect_type(env_list_all(server), "list")
+  expect_type(environments, "list")
 })

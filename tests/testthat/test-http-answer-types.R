@@ -295,7 +295,7 @@ test_that("a watch page's key cannot change its address", {
 
 test_that("an echo that is none is another call's", {
   response <- list(
-    request = list(key = "k", number = 4), status_code = 200L, url = "http://127.0.0.1:1/"
+    key = list(key = "k", number = 4), status_code = 200L, url = "http://127.0.0.1:1/"
   )
   for (echo in list(3, "k", list("k", 4), list(key = "k", number = c(4, 5)), list(key = "k"))) {
     expect_wrong(check_echo(response, list(request = echo), NULL), "another call")

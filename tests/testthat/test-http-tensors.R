@@ -172,12 +172,12 @@ test_that("metadata are left unread only where they are what was expected", {
 test_that("the server's answer to a step of sub-environments is what is expected", {
   env <- local_env(num_envs = 2)
   env$reset()
-  line <- free_line(env$client)
-  fetch <- line$fetch
-  withr::defer(line$fetch <- fetch)
+  connection <- free_connection(env$client)
+  fetch <- connection$fetch
+  withr::defer(connection$fetch <- fetch)
   answer <- NULL
-  line$fetch <- function(url, handle) answer <<- fetch(url, handle)
+  connection$fetch <- function(url, handle) answer <<- fetch(url, handle)
   env$step(c(0, 1))
-  sent <- list(key = line$numbers$key, number = line$numbers$number)
+  sent <- list(key = connection$keys$key, number = connection$keys$number)
   expect_null(read_tensors(answer$content, expected = bare_metadata(sent))$metadata)
 })

@@ -110,7 +110,7 @@ test_that("a cache folder that cannot be made is an error that says what to set"
   file <- withr::local_tempfile(lines = "not a folder")
   withr::local_envvar(R_USER_CACHE_DIR = file)
   expect_error(make_folder(NULL), "R_USER_CACHE_DIR", class = "gym_error_install")
-  expect_error(in_turn(1), "R_USER_CACHE_DIR", class = "gym_error_install")
+  expect_error(with_install_lock(1), "R_USER_CACHE_DIR", class = "gym_error_install")
 })
 
 test_that("tests see nothing of what the user has installed", {

@@ -11,14 +11,14 @@ closing_time <- 2
 #' @return The instance's id.
 #' @noRd
 make_instance <- function(x, fields, call) {
-  state <- connection(x)
-  request <- next_request(state$creations)
-  place <- paste(request$key, request$number)
+  state <- client_state(x)
+  key <- next_key(state$creation_keys)
+  place <- paste(key$key, key$number)
   outcome <- "lost"
   on.exit(end_creation(state, place, outcome))
-  keep_made(place, x, body = padded(request_body(fields, request), channel_kinds$post))
+  keep_made(place, x, body = padded(request_body(fields, key), handle_kinds$post))
   answer <- withCallingHandlers(
-    post_once(x, "/v1/envs/", fields, request = request, call = call),
+    post_once(x, "/v1/envs/", fields, key = key, call = call),
     gym_error_http = function(cnd) outcome <<- "refused",
     gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
   )
@@ -31,11 +31,15 @@ make_instance <- function(x, fields, call) {
   answer$instance_id
 }
 
+instance_route <- function(instance_id) {
+  paste0("/v1/envs/", curl::curl_escape(instance_id), "/")
+}
+
 # One whose answer was lost is asked for it when the next is made. Until then its key must
 # see no other number.
 end_creation <- function(state, place, outcome) {
   if (outcome == "lost") {
-    state$creations <- new_numbers()
+    state$creation_keys <- new_idempotency_keys()
     state$to_close <- c(state$to_close, place)
   } else {
     forget_made(place)
@@ -79,7 +83,7 @@ abandon_instance <- function(x, instance_id) {
 queue_closing <- function(x, instance_id) {
   place <- made_place(x, instance_id)
   if (exists(place, envir = the_session$made, inherits = FALSE)) {
-    state <- connection(x)
+    state <- client_state(x)
     state$to_close <- c(state$to_close, place)
   }
 }
@@ -90,7 +94,7 @@ queue_closing <- function(x, instance_id) {
 #' that hangs delays a call once.
 #' @noRd
 close_abandoned <- function(x) {
-  state <- connection(x)
+  state <- client_state(x)
   if (length(state$to_close)) {
     places <- state$to_close
     state$to_close <- character()
@@ -154,7 +158,7 @@ close_aside <- function(places, seconds) {
 is_own_made <- function(entry) !is.null(entry) && entry$pid == Sys.getpid()
 
 aside_handle <- function(client, route, body, seconds) {
-  handle <- open_handle(client, json_type, json_type)
+  handle <- new_handle(client, json_type, json_type)
   curl::handle_setopt(
     handle,
     url = paste0(client$remote_base, route), post = TRUE,

@@ -21,7 +21,7 @@ test_that("what a session made on another's server is closed with it, classic id
     server,
     "classic <- env_create(server, 'CartPole-v1')",
     "env <- gym_make('CartPole-v1', client = server)",
-    "sub-environments <- gym_make('CartPole-v1', num_envs = 3, client = create_GymClient(server$remote_base))",
+    "three <- gym_make('CartPole-v1', num_envs = 3, client = create_GymClient(server$remote_base))",
     "invisible(env$reset())",
     "cat(length(env_list_all(server)))"
   )
@@ -110,7 +110,7 @@ test_that("an environment that was closed is not closed again", {
   env$close()
   rm(env)
   gc()
-  expect_length(connection(server)$to_close, 0)
+  expect_length(client_state(server)$to_close, 0)
   expect_false(made_place(server, id) %in% ls(the_session$made))
   gone <- gym_make("CartPole-v1", client = server)
   post_once(server, paste0("/v1/envs/", gone$instance_id, "/close/"))

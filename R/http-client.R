@@ -1,0 +1,50 @@
+# A client: where a server is, and what this session keeps of the connection to it.
+
+new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
+  structure(
+    list(
+      remote_base = sub("/+$", "", remote_base),
+      timeout = timeout,
+      # As for httr's own verbs.
+      config = c(getOption("httr_config", httr::config()), config),
+      token = token,
+      state = new.env(parent = emptyenv())
+    ),
+    class = "GymClient"
+  )
+}
+
+#' @export
+print.GymClient <- function(x, ...) {
+  cat(format(x), "\n", sep = "")
+  invisible(x)
+}
+
+#' @export
+format.GymClient <- function(x, ...) paste0("<GymClient: ", x$remote_base, ">")
+
+check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!inherits(x, "GymClient")) {
+    abort_argument(x, "a client, as create_GymClient() or gym_client() makes it", arg, call)
+  }
+}
+
+# What a client holds besides its address: its connection to the server and what it knows of the
+# server's instances. It is made anew when the client finds itself in another process or restored
+# from a file: there the connection is void, and its idempotency keys belong to the original.
+client_state <- function(client) {
+  state <- client$state
+  if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
+    connection <- new_connection(client)
+    suspendInterrupts({
+      state$connection <- connection
+      state$instances <- new.env(parent = emptyenv())
+      state$creation_keys <- new_idempotency_keys()
+      state$to_close <- character()
+      state$layouts <- new.env(parent = emptyenv())
+      state$pid <- Sys.getpid()
+      state$session <- the_session
+    })
+  }
+  state
+}

@@ -1,0 +1,169 @@
+# Errors of a call: the server refused it, nobody answered, or what answered is no Gym server.
+
+abort_http <- function(response, method, call) {
+  status <- response$status_code
+  problem <- lapply(
+    list(message = "message", code = "code", hint = "hint", extra = "extra"),
+    function(name) shown_text(string_or_null(response$answer[[name]]))
+  )
+  request <- paste(method, response$url)
+  status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
+  hint <- extra_hint(problem$extra, response$url) %||% token_hint(problem$code) %||%
+    in_r(problem$hint)
+  gym_abort(
+    c(
+      if (is.null(problem$message)) foreign_answer_message(response) else sentence(problem$message),
+      i = sentence(hint),
+      " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
+    ),
+    class = c(
+      if (identical(problem$code, "action_not_in_space")) "gym_error_space",
+      paste0("gym_error_http_", status),
+      "gym_error_http"
+    ),
+    status = status,
+    code = problem$code,
+    hint = hint,
+    call = call
+  )
+}
+
+token_hint <- function(code) {
+  if (identical(code, "unauthorized")) {
+    paste0("`create_GymClient(token = )` takes the server's token, and so does the environment ",
+           "variable ", token_variable)
+  }
+}
+
+# The server's hints name its routes, as its clients are written in many languages.
+in_r <- function(hint) {
+  if (!is.null(hint)) sub("GET /v1/instances/", "`env_list()`", hint, fixed = TRUE)
+}
+
+# How to install an extra that the server lacks. What runs a server of this session's has put a
+# function for that into the server's entry; another server is its operator's affair.
+extra_hint <- function(extra, url) {
+  server <- the_session$servers[[base_of(url)]]
+  if (!is.null(extra) && !is.null(server$extra_hint)) server$extra_hint(extra)
+}
+
+# The server's messages begin in lower case and have no full stop, so that they fit anywhere. After
+# a command that ends in a quote there is no full stop either: it would be copied along.
+sentence <- function(text) {
+  if (is.null(text)) {
+    return(NULL)
+  }
+  if (!grepl("^[a-z_]+\\(", text)) {
+    text <- paste0(toupper(substr(text, 1L, 1L)), substring(text, 2L))
+  }
+  if (grepl("[.?!\"]$", text)) text else paste0(text, ".")
+}
+
+# `reached`: whether the server may have received the request.
+abort_connection <- function(url, reason, call, reached = TRUE) {
+  base <- base_of(url)
+  hangs <- reached && grepl("timed out|timeout", reason, ignore.case = TRUE)
+  gym_abort(
+    c(
+      paste0("No answer from the server at ", base, "."),
+      x = reason,
+      i = if (hangs) hanging_hint(base) else connection_hint(base, reason)
+    ),
+    class = "gym_error_connection",
+    url = base,
+    reached = reached,
+    call = call
+  )
+}
+
+hanging_hint <- function(base) {
+  paste(
+    "It took the call, but works longer on it than the client's `timeout`, or it hangs.",
+    if (!is.null(the_session$servers[[base]])) {
+      "`gym_server_stop()` ends a server of this session's; `gym_make()` then starts another."
+    } else {
+      "`create_GymClient(timeout = )` waits longer; a server that hangs must be started anew."
+    }
+  )
+}
+
+connection_hint <- function(base, reason) {
+  if (grepl("certificate|SSL peer", reason)) {
+    return(paste(
+      "Its certificate is not one that this machine trusts.",
+      "`httr::set_config(httr::config(cainfo = \"FILE\"))` names one that is your own."
+    ))
+  }
+  if (!is.null(the_session$servers[[base]])) {
+    return(paste(
+      "This session started it; `gym_server_log()` has its last words.",
+      "`gym_make()` starts another when it has ended."
+    ))
+  }
+  place <- local_place(base)
+  if (is.null(place)) {
+    "Is that its address, and is it running there?"
+  } else {
+    paste0("Is a server running there? `", start_call(place), "` starts one.")
+  }
+}
+
+abort_no_answer <- function(response, call) {
+  gym_abort(
+    c(
+      "The answer is not what a Gym server sends.",
+      x = paste0(response$url, " gave status ", response$status_code, " and ",
+                 response$type %||% "content of no type", "."),
+      i = foreign_server_hint(response$url, server_name(response))
+    ),
+    class = "gym_error_connection",
+    url = response$url,
+    call = call
+  )
+}
+
+# The program's own name for itself, from an answer of curl's or httr's.
+server_name <- function(response) {
+  headers <- response$headers
+  if (is.raw(headers)) {
+    headers <- curl::parse_headers_list(headers)
+  }
+  shown_line(headers[["server"]])
+}
+
+# The statuses by which a proxy reports that the server behind it gave no answer.
+proxy_statuses <- 502:504
+
+# The message for a refusal that no Gym server wrote.
+foreign_answer_message <- function(response) {
+  if (response$status_code %in% proxy_statuses) {
+    c("There is a proxy at this address, and the server behind it does not answer.",
+      i = "It may be starting anew. If that lasts, its operator should know.")
+  } else if (response$status_code == 413L) {
+    c("The request is larger than the proxy at this address takes.",
+      i = "Its operator sets that limit, in nginx `client_max_body_size`.")
+  } else {
+    c("The answer is not what a Gym server sends.",
+      i = foreign_server_hint(response$url, server_name(response)))
+  }
+}
+
+#' Guess what a program is that is no Gym server, and say what helps
+#' @param url Where it answered.
+#' @param name What it calls itself, a string or `NULL`.
+#' @return One or two sentences.
+#' @noRd
+foreign_server_hint <- function(url, name) {
+  if (grepl("^AirTunes", name %||% "")) {
+    return(paste(
+      "That is AirPlay, to which macOS gives port 5000. `server <- gym_server_start()` takes a",
+      "free port; or switch \"AirPlay Receiver\" off in the System Settings (General, AirDrop &",
+      "Handoff)."
+    ))
+  }
+  called <- if (!is.null(name)) paste0("It calls itself \"", name, "\". ")
+  free <- if (!is.null(local_place(base_of(url)))) {
+    " If another program has that port: `server <- gym_server_start()` takes a free one."
+  }
+  paste0(called, "Is the address that of a Gym server?", free)
+}

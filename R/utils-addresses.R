@@ -1,0 +1,31 @@
+# Addresses of servers, taken apart.
+
+is_loopback <- function(base) {
+  grepl("^https?://(127[.][0-9.]+|localhost|\\[::1\\])(:[0-9]+)?(/|$)", base)
+}
+
+#' Find the host and port of a server on this machine
+#' @return A list of `host`, as the server takes it, and `port`; `NULL` for any other address
+#'   and one that no server of ours can have.
+#' @noRd
+local_place <- function(base) {
+  pattern <- "^http://(127([.][0-9]{1,3}){3}|localhost|\\[::1\\]):([0-9]{1,5})$"
+  parts <- regmatches(base, regexec(pattern, base))[[1L]]
+  if (!length(parts)) {
+    return(NULL)
+  }
+  port <- as.integer(parts[[4L]])
+  if (port < 1L || port > 65535L) {
+    return(NULL)
+  }
+  host <- gsub("[][]", "", parts[[2L]])
+  list(host = if (host == "localhost") "127.0.0.1" else host, port = port)
+}
+
+# The call that starts a server at a place.
+start_call <- function(place) {
+  host <- if (place$host != "127.0.0.1") paste0(", host = \"", place$host, "\"")
+  paste0("gym_server_start(port = ", place$port, host, ")")
+}
+
+base_of <- function(url) sub("(//[^/]*).*", "\\1", url)

@@ -1,0 +1,63 @@
+# Texts that no error may show, such as tokens.
+
+# Remembers a token that no error may show: an error keeps the call as the script wrote it, perhaps
+# with the token in it.
+hide_token <- function(token) {
+  if (is.character(token)) {
+    the_session$hidden <- unique(c(the_session$hidden, token[nzchar(token)]))
+  }
+}
+
+#' Take the tokens out of what an error keeps
+#' @param x A call, or a part of one.
+#' @return `x` with `"<token>"` in place of each text that is or contains a token.
+#' @noRd
+without_tokens <- function(x) {
+  if (!length(the_session$hidden)) {
+    x
+  } else if (is.character(x)) {
+    x[is_token_text(x)] <- "<token>"
+    x
+  } else if (is.call(x) || is.pairlist(x)) {
+    without_tokens_in_parts(x)
+  } else if (is.list(x) && !is.object(x)) {
+    # Data that do.call() has put there may be large.
+    rapply(x, without_tokens, classes = c("character", "call"), how = "replace")
+  } else {
+    x
+  }
+}
+
+without_tokens_in_parts <- function(x) {
+  # With options(keep.source = TRUE) a call also has the text of its source.
+  for (source in c("srcref", "srcfile", "wholeSrcref")) {
+    attr(x, source) <- NULL
+  }
+  if (is.call(x) && identical(x[[1L]], quote(`function`))) {
+    x <- x[1:3]
+  }
+  # An argument may be missing, as in x[1, ].
+  for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
+    x[[i]] <- without_tokens(x[[i]])
+  }
+  x
+}
+
+is_token_text <- function(texts) {
+  found <- texts %in% the_session$hidden
+  # A short token may by chance be a part of any text.
+  for (token in Filter(function(token) nchar(token) >= 8L, the_session$hidden)) {
+    found <- found | grepl(token, texts, fixed = TRUE)
+  }
+  found
+}
+
+# The calls that led to an error, without tokens. NULL where no token is known: rlang then makes
+# the trace itself.
+hidden_trace <- function(frame) {
+  if (length(the_session$hidden)) {
+    trace <- rlang::trace_back(bottom = frame)
+    trace$call <- lapply(trace$call, without_tokens)
+    trace
+  }
+}
