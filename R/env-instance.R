@@ -29,8 +29,8 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   if (for_eyes) {
     check_viewer(call)
   }
-  close_abandoned(x)
-  instance_id <- make_instance(x, fields, call)
+  close_queued(x)
+  instance_id <- create_and_register(x, fields, call)
   if (isTRUE(client_state(x)$classic)) {
     withCallingHandlers(
       check_classic_fields(x, fields, c("env_id", "seed"), call),
@@ -45,7 +45,7 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
 
 close_instance <- function(x, instance_id, call = rlang::caller_env()) {
   post_once(x, paste0(instance_route(instance_id), "close/"), call = call)
-  forget_made(made_place(x, instance_id))
+  unregister_created(created_name(x, instance_id))
   instances <- client_state(x)$instances
   if (!is.null(instances[[instance_id]])) {
     rm(list = instance_id, envir = instances)
@@ -58,7 +58,7 @@ close_if_there <- function(x, instance_id, call = rlang::caller_env()) {
     close_instance(x, instance_id, call),
     gym_error_http = function(cnd) {
       if (!isTRUE(cnd$code %in% gone_codes)) rlang::cnd_signal(cnd)
-      forget_made(made_place(x, instance_id))
+      unregister_created(created_name(x, instance_id))
     }
   )
 }
@@ -129,7 +129,7 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
 reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask = NULL,
                            call = rlang::caller_env()) {
   check_mask(mask, instance, call)
-  close_abandoned(x)
+  close_queued(x)
   fields <- c(
     seed = encode_seed(seed, instance$num_envs, call),
     options = encode_options(options, call),

@@ -19,7 +19,7 @@
 #' env$close()
 env_list <- function(x = gym_client()) {
   check_client(x)
-  close_abandoned(x)
+  close_queued(x)
   instances <- get_answer(x, "/v1/instances/")$instances
   data.frame(
     instance_id = listed_texts(instances, "instance_id", ""),

@@ -87,7 +87,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   check_client(client)
   env <- NULL
   instance_id <- NULL
-  on.exit(if (is.null(env)) abandon_instance(client, instance_id))
+  on.exit(if (is.null(env)) close_without_waiting(client, instance_id))
   # No interrupt comes between the instance and its name.
   create <- function(call) {
     create_instance(
@@ -201,7 +201,7 @@ gym_env <- R6Class(
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
-        queue_closing(self$client, self$instance_id)
+        queue_for_closing(self$client, self$instance_id)
       }
     }
   )

@@ -150,7 +150,7 @@ abort_server_start <- function(message, log_lines, call, hint = NULL) {
 
 stop_server <- function(server, patience = 15) {
   process <- server$process
-  forget_made_on(server$url)
+  unregister_created_on(server$url)
   if (!process$is_alive()) {
     return(invisible())
   }

@@ -3,7 +3,7 @@
 #   pid             the process that loaded the package: a forked child has another one
 #   servers         the servers that this session started, by their addresses
 #   client          the client of the session's own server; named_client that of GYM_SERVER_URL
-#   made            the instances that this session has created on servers, see http-instances.R
+#   created         the instances that this session has created on servers, see http-instances.R
 #   numbers, keys   the idempotency keys, see http-connection.R
 #   hidden          texts that no error may show
 #   ...             what was declined, what is installed at the moment, what was registered
@@ -13,4 +13,4 @@
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
 the_session$client <- NULL
-the_session$made <- new.env(parent = emptyenv())
+the_session$created <- new.env(parent = emptyenv())

@@ -54,8 +54,8 @@ test_that("a session ends at once with a server behind a broken line, and its ow
   full <- create_GymClient(local_stalling("full"))
   run <- run_session(
     full,
-    "gym:::keep_made('there', server, 'abcdef01')",
-    "gym:::keep_made('unanswered', server, body = charToRaw('{}'))",
+    "gym:::register_created('there', server, 'abcdef01')",
+    "gym:::register_created('unanswered', server, body = charToRaw('{}'))",
     "own <- gym_server_start()",
     "pid <- gym:::the_session$servers[[1]]$pid",
     "tools::pskill(pid, tools::SIGSTOP)",
@@ -111,11 +111,11 @@ test_that("an environment that was closed is not closed again", {
   rm(env)
   gc()
   expect_length(client_state(server)$to_close, 0)
-  expect_false(made_place(server, id) %in% ls(the_session$made))
+  expect_false(created_name(server, id) %in% ls(the_session$created))
   gone <- gym_make("CartPole-v1", client = server)
   post_once(server, paste0("/v1/envs/", gone$instance_id, "/close/"))
   expect_error(gone$close(), NA)
-  expect_false(made_place(server, gone$instance_id) %in% ls(the_session$made))
+  expect_false(created_name(server, gone$instance_id) %in% ls(the_session$created))
 })
 
 test_that("an interrupted gym_make() leaves nothing, whenever the interrupt comes", {
@@ -130,11 +130,11 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
     "  system(paste('(sleep 0.5; kill -INT', Sys.getpid(), ') &'))",
     "  gym_make('odd_environments:SlowToMake-v0', client = server)",
     "}, interrupt = function(cnd) 'interrupted')",
-    "cat(said, length(ls(gym:::the_session$made)), '')",
+    "cat(said, length(ls(gym:::the_session$created)), '')",
     # It is not made yet when it is first asked for.
     "for (i in 1:20) {",
     "  Sys.sleep(2)",
-    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$made)))",
+    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$created)))",
     "  if (!any(left)) break",
     "}",
     "cat(left)"
@@ -153,20 +153,20 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
 })
 
 test_that("what was refused or never sent is not remembered", {
-  made <- function() length(ls(the_session$made))
-  before <- made()
+  created <- function() length(ls(the_session$created))
+  before <- created()
   expect_error(env_create(test_client(), "Nothing-v0"), class = "gym_error_http_400")
   nobody <- create_GymClient(paste0("http://127.0.0.1:", free_port()))
   error <- expect_error(env_create(nobody, "CartPole-v1"), class = "gym_error_connection")
   expect_false(error$reached)
-  expect_identical(made(), before)
+  expect_identical(created(), before)
 })
 
 test_that("a server that was stopped has nothing left to close", {
   server <- local_server()
   env_create(server, "CartPole-v1")
   gym_server_stop(server)
-  expect_false(any(startsWith(ls(the_session$made), server$remote_base)))
+  expect_false(any(startsWith(ls(the_session$created), server$remote_base)))
 })
 
 test_that("an error in a search closes its environment without waiting for a server that hangs", {
@@ -184,7 +184,7 @@ test_that("an error in a search closes its environment without waiting for a ser
   )
   expect_lt(taken[["elapsed"]], 20)
   tools::pskill(pid, tools::SIGCONT)
-  close_session <- function() close_aside(ls(the_session$made), closing_time)
+  close_session <- function() close_within(ls(the_session$created), closing_time)
   close_session()
   expect_length(open_after_a_while(server), 0)
 })
