@@ -82,7 +82,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
                        autoreset_mode = NULL, name = NULL) {
   check_client(x)
   check_named_list(kwargs)
-  create_instance(
+  create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
     name
   )
@@ -224,7 +224,11 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' env_close(client, sub-environments)
 env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
   check_flag(render)
-  step_instance(x, known_instance(x, instance_id), action, render, which)
+  instance <- known_instance(x, instance_id)
+  if (render && !instance$classic) {
+    watch_once(x, instance)
+  }
+  step_instance(x, instance, action, render, which)
 }
 
 #' Ask for an environment's spaces

@@ -88,14 +88,14 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_without_waiting(client, instance_id))
-  # No interrupt comes between the instance and its name.
   create <- function(call) {
-    create_instance(
+    create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
-      autoreset_mode, name, call
+      autoreset_mode, name, call = call
     )
   }
   call <- rlang::current_env()
+  # No interrupt may come between creating the instance and keeping its id.
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create(call),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
@@ -104,7 +104,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   env
 }
 
-# In R's words, where the environment has been given an argument that it does not have.
+# Explains in R's terms an error about an argument that the environment does not have.
 explain_unknown_argument <- function(cnd, given, call) {
   pattern <- "unexpected keyword argument '([^']+)'"
   name <- regmatches(cnd$message, regexec(pattern, cnd$message))[[1L]][2L]
@@ -193,7 +193,7 @@ gym_env <- R6Class(
   ),
   private = list(
     instance = NULL,
-    # The client; each step asks for it, and `private$` costs less than `self$`.
+    # The client. Each step reads it, and `private$` costs less than `self$`.
     connected = NULL,
     pid = NULL,
     closed = FALSE,
@@ -207,9 +207,9 @@ gym_env <- R6Class(
   )
 )
 
-# A name that is none is an error: R's own `$` gives NULL, and "attempt to apply non-function" if
-# that is called. `[[` asks without an error. Every step comes through here: no call that is not
-# needed.
+# A name that an environment does not have is an error. (R's own `$` gives NULL, and calling that
+# fails with "attempt to apply non-function".) `[[` gives NULL. Every step calls this method, so it
+# makes no call that is not needed.
 #' @export
 `$.gym_env` <- function(x, name) {
   member <- .subset2(x, name)
@@ -232,7 +232,7 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
   )
 }
 
-# R6's own asks for `x$format`, which there is not.
+# R6's own method reads `x$format`, which an environment does not have.
 #' @export
 format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
 

@@ -25,8 +25,7 @@ observation_parts <- list(
 )
 observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 
-# Falls back to the names of the columns where the environment is unknown or a
-# wrapper has changed what it shows.
+# The names of the columns where the environment is unknown or a wrapper has changed what it shows.
 observation_names <- function(env_id, columns) {
   parts <- observation_parts[[environment_family(env_id), exact = TRUE]]
   if (length(parts) == length(columns)) parts else columns

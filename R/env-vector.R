@@ -1,15 +1,16 @@
-# What a vector environment takes and gives beyond a single one: sub-environments, by number or by
-# mask, how they are made and begun again, and what each of them tells.
+# Vector environments: how their sub-environments are picked by number or by mask, how they are
+# stepped, and what is checked of both.
 
 vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
-# The space of what is sent and received: a batch where there are sub-environments.
+# The space of what is sent and received: for a vector environment that of a batch.
 sub_envs_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Sub-environments always do where they can. A file must have a tensor, though.
+# Whether values are sent as tensors. Those of a vector environment always are where that is possible;
+# but a safetensors file needs at least one number.
 travels_as_tensors <- function(space, num_envs) {
   if (is.null(num_envs)) {
     tensors_pay(space)
@@ -20,7 +21,7 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_sub_envs <- function(x, instance, action, fields, which, call) {
+step_sub_envs <- function(client, instance, action, fields, which, call) {
   check_step_sub_envs(which, instance, call)
   n <- instance$num_envs
   actions <- instance$actions
@@ -35,7 +36,7 @@ step_sub_envs <- function(x, instance, action, fields, which, call) {
   single <- instance$single_action_space
   check_sub_envs(single, actions, action, n, call, which)
   answer <- send_action(
-    x, instance, actions, action, write_sub_envs(single, action, n), fields, call
+    client, instance, actions, action, write_sub_envs(single, action, n), fields, call
   )
   result <- read_values(numbers_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
@@ -74,7 +75,7 @@ final_observations <- function(instance, answer, n) {
   final
 }
 
-# The server draws sub-environment by sub-environment.
+# The server draws an action for each sub-environment.
 decode_sample <- function(instance, json) {
   single <- instance$single_action_space
   if (is.null(instance$num_envs)) {
