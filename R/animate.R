@@ -86,9 +86,9 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
 #' @export
 animate.function <- animate.gym_policy
 
-# gganimate has a generic function of the same name. Whichever of the two packages was attached last,
-# `animate()` finds these methods. They are registered when gganimate is loaded, so that it need not
-# be installed.
+# gganimate has a generic function of the same name. Whichever of the two packages was attached
+# last, `animate()` finds these methods. They are registered when gganimate is loaded, so that it
+# need not be installed.
 register_with_gganimate <- function() {
   if (isNamespaceLoaded("gganimate")) {
     register_animate(asNamespace("gganimate"))
@@ -239,8 +239,8 @@ format.gym_animation <- function(x, ...) {
   )
 }
 
-# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show a GIF,
-# so there it is a filmstrip.
+# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show a
+# GIF, so there it is a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
   hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)

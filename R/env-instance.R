@@ -67,7 +67,8 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   check_client(client, "x", call)
   check_string(instance_id, call = call)
   instances <- client_state(client)$instances
-  instances[[instance_id]] %||% (instances[[instance_id]] <- ask_instance(client, instance_id, call))
+  instances[[instance_id]] %||%
+    (instances[[instance_id]] <- ask_instance(client, instance_id, call))
 }
 
 ask_instance <- function(client, instance_id, call) {

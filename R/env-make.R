@@ -1,5 +1,3 @@
-# Environments as objects.
-
 #' Make an environment
 #'
 #' Makes an environment that is played with `$reset()` and `$step()`, as
@@ -10,11 +8,11 @@
 #' thrown away, or at the session's end: keep the object for as long as the environment is
 #' played.
 #'
-#' With `num_envs` it has sub-environments: copies of the environment that are reset and stepped
-#' together, with one call for all of them. Observations then have a row a sub-environment, and so
-#' have actions; [env_reset()] and [env_step()] tell the forms of all kinds. An
-#' environment's own implementation of sub-environments may be another game than the single one
-#' in details, such as the size of the Atari games' pictures.
+#' With `num_envs` it is a vector environment: it has sub-environments, copies of the environment
+#' that are reset and stepped together, with one call for all of them. Observations and actions then
+#' have a row for each sub-environment; [env_reset()] and [env_step()] describe their forms. An
+#' environment's own vector implementation may differ from the single environment in details, such
+#' as the size of the Atari games' pictures.
 #'
 #' # After an episode's end
 #'
@@ -22,7 +20,7 @@
 #' `num_envs` `autoreset_mode` says what becomes of a sub-environment that has ended while the
 #' others play on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken,
 #' its observation is the first of the new episode, its reward is 0, and neither `terminated` nor
-#' `truncated` is set. Whoever sums rewards or counts steps leaves that step out, as [rollout()]
+#' `truncated` is set. Leave that step out when you sum rewards or count steps, as [rollout()]
 #' does. With `"SameStep"` the step that ends an episode already returns the first observation of
 #' the next one, with `"Disabled"` `$reset(mask = )` does it.
 #'
@@ -42,10 +40,10 @@
 #'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
-#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; without
-#'     sub-environments the same,
+#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
+#'     single environment the same,
 #'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many sub-environments there are
-#'     and what was chosen for them, see [env_create()]; `NULL` without sub-environments,
+#'     and what was chosen for them, see [env_create()]; `NULL` in a single environment,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
 #'     the latter three `NULL` where the environment has none,

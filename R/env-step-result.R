@@ -1,5 +1,5 @@
-# Checks what a step returns of an environment that a user has written in R. It must keep to the same
-# rules as the server's environments, which the server checks.
+# Checks what a step returns of an environment that a user has written in R. It must keep to the
+# same rules as the server's environments, which the server checks.
 
 flags <- c("terminated", "truncated")
 

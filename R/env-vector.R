@@ -9,8 +9,8 @@ sub_envs_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Whether values are sent as tensors. Those of a vector environment always are where that is possible;
-# but a safetensors file needs at least one number.
+# Whether values are sent as tensors. Those of a vector environment always are where that is
+# possible; but a safetensors file needs at least one number.
 travels_as_tensors <- function(space, num_envs) {
   if (is.null(num_envs)) {
     tensors_pay(space)

@@ -31,16 +31,16 @@
 #' `withCallingHandlers(..., gym_message_watch = function(m) invokeRestart("muffleMessage"))`
 #' or [suppressMessages()] keeps it away.
 #'
-#' `options(gym.viewer = )` has it otherwise, in scripts too: a function, such as
+#' `options(gym.viewer = )` changes that, in scripts too: a function, such as
 #' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
 #' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
-#' until the page is there, at most 5 seconds, so that nobody misses the beginning. If it has
+#' until the page is there, at most 5 seconds, so that the beginning is not missed. If it has
 #' not come by then, as when there is no browser, the address is printed as in a script.
 #'
 #' # Who can open it
 #'
-#' Whoever reaches the server, unless it asks for a token. Then the address holds a key, which
-#' opens this environment's page and nothing else. It is good until nobody has used it for 10
+#' Everybody who can reach the server, unless it asks for a token. Then the address holds a key,
+#' which opens this environment's page and nothing else. It is good until nobody has used it for 10
 #' minutes; each call makes a new one.
 #'
 #' @inheritParams env_reset

@@ -28,8 +28,8 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   )
 }
 
-# How far each part goes from the middle to either side: a position to where an episode ends, a speed
-# as fast as it gets. NULL where that is not known of all parts.
+# How far each part goes from the middle to either side: a position to where an episode ends, a
+# speed as fast as it gets. NULL where that is not known of all parts.
 usual_ranges <- function(env_id, names) {
   family <- environment_family(env_id)
   limits <- lapply(episode_limits[[family, exact = TRUE]], function(limit) max(limit$at))
@@ -37,8 +37,8 @@ usual_ranges <- function(env_id, names) {
   if (all(names %in% names(usual))) usual
 }
 
-# These ranges contain 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes of 60
-# random networks.
+# These ranges contain 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes
+# of 60 random networks.
 usual_speeds <- list(CartPole = list(cart_velocity = 2, pole_angular_velocity = 2.5))
 
 #' Find the two numbers of an observation to map

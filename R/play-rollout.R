@@ -145,12 +145,13 @@ draw_batch_seeds <- function(vector_env, episodes) {
 
 new_rollout <- function(history, policy, vector_env, seed, keep_steps) {
   episodes <- episodes_table(history)
+  fps <- vector_env$spec$render_fps
   structure(
     list(
       episodes = episodes,
       steps = if (keep_steps) steps_table(history, episodes, vector_env),
       frames = if (!is.null(vector_env$frame)) {
-        lapply(history$batches, function(batch) new_frames(batch$frames, vector_env$spec$render_fps))
+        lapply(history$batches, function(batch) new_frames(batch$frames, fps))
       },
       policy = policy,
       env_id = environment_label(vector_env),
