@@ -1,6 +1,6 @@
 #' Repeat a random search with many seeds
 #'
-#' One search says little about how long searches take: its round is luck.
+#' One search says little about how long searches take, as its round is a matter of chance.
 #' `search_repeat()` plays [search_random()] once with each of many seeds, in an environment
 #' that is made once, and keeps in one row what came of each. Plotted, the rounds that
 #' the searches needed stand beside the geometric distribution that they follow.
@@ -15,8 +15,8 @@
 #' Each round draws its weights anew, so that all have the same chance to reach the target,
 #' and how many it takes is geometrically distributed. The chance is estimated by maximum
 #' likelihood: the searches that were solved divided by all rounds that were played, in
-#' searches that were given up after `rounds` rounds too (they are censored, and leaving
-#' them out would make luck look better than it is).
+#' searches that were not solved within `rounds` rounds, too (they are censored, and leaving
+#' them out would make the chance look better than it is).
 #'
 #' # When it ends early
 #'
@@ -144,7 +144,7 @@ play_searches <- function(vector_env, template, settings, seeds, progress, call)
   new_searches(rows, settings, started, interrupted)
 }
 
-# A search that is interrupted ends all of them, which is said once, for all.
+# An interrupt of one search ends all of them. The message comes once, for all.
 play_seed <- function(vector_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
@@ -181,7 +181,7 @@ new_searches <- function(rows, settings, started, interrupted) {
   )
 }
 
-#' Estimate the chance of a round, as ?search_repeat tells
+#' Estimate the chance of a round, as `?search_repeat` describes
 #' @noRd
 round_chance <- function(searches) {
   solved <- sum(searches$solved)

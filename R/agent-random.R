@@ -9,8 +9,8 @@
 #' # What is drawn
 #'
 #' The weights of each round and the seeds of its episodes are drawn from R's generator, so
-#' that [set.seed()] alone fixes the whole search. The policy that is given tells only the sizes
-#' and activations: its own weights are not played, in the first round either, and drawing
+#' that [set.seed()] alone fixes the whole search. Of the policy that is given only the sizes and
+#' activations matter: its own weights are not played, in the first round either, and drawing
 #' them in the call (as the default does) leaves the generator alone.
 #'
 #' # Rounds side by side
@@ -44,7 +44,7 @@
 #' With a `checkpoint` the search keeps what it has played in a file, after each batch of
 #' episodes (with a single environment made by [gym_make()], where a batch is one episode and
 #' may be over in milliseconds, as often as takes a tenth of the time at most). The file is
-#' replaced by a rename, so that it is whole whenever R, the server or the machine's queue ends
+#' replaced by a rename, so that it is complete whenever R, the server or the machine's queue ends
 #' the search. The same call then goes on where the file has it, and comes to the result that an
 #' undisturbed search comes to, the generator's state afterwards included: in a script that
 #' is submitted to a cluster again and again, that one line is enough. The batch that was under

@@ -292,7 +292,7 @@ upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
 shutdown_server <- function(x) {
   check_client(x)
   response <- send(x, "/v1/shutdown/", character())
-  # The original server says so in words, not in JSON.
+  # The original server answers with plain text instead of JSON.
   if (response$status_code != 200L) {
     read_answer(response, "POST")
   }

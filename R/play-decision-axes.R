@@ -9,7 +9,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
       c(paste0("A decision map shows two numbers of an observation, but what is observed ",
                if (!is.null(place$env_id)) paste0("in ", place$env_id, " "), "is of ",
                format(space), "."),
-        i = "`act(policy, )` tells the action for each single observation."),
+        i = "`act(policy, )` gives the action for each single observation."),
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }

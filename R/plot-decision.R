@@ -9,7 +9,7 @@
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
 #' @param x,object What [decision_map()] returned.
-#' @param main The title; `NULL`, the default, tells the environment and the policy.
+#' @param main The title; `NULL`, the default, names the environment and the policy.
 #' @param xlab,ylab The axes' labels; the default are the names of the parts, with their units
 #'   where Gymnasium's documentation has them.
 #' @param ... Further arguments of [plot()][graphics::plot.default()]; not used by
@@ -102,7 +102,7 @@ diverging_colours <- function() {
   grDevices::colorRampPalette(c("#EFB549", "#FAF7F0", "#4797C8"))(101L)
 }
 
-# Lighter than the colours of lines, for names and paths to be read on them.
+# Lighter than the colours of lines, so that names and paths can be read on them.
 choice_palette <- function(n) {
   strong <- c(okabe_ito$orange, okabe_ito$sky_blue, okabe_ito$green, okabe_ito$purple,
               okabe_ito$yellow, okabe_ito$vermillion, okabe_ito$blue)

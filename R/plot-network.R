@@ -3,10 +3,10 @@
 #' Draws the diagram of a network: its layers from left to right, neurons as circles,
 #' weights as lines that are the wider the further from 0, blue where they are positive,
 #' vermillion and dashed where they are negative. Few weights are written on the
-#' lines as numbers; of a layer with many neurons some are left out, which the dots say.
+#' lines as numbers; of a layer with many neurons some are left out, which dots show.
 #'
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
-#' policy knows its environment: because it was played there, or because `env` says it.
+#' policy knows its environment: because it was played there, or because it is given as `env`.
 #'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
@@ -18,7 +18,7 @@
 #'   the default is 12.
 #' @param digits With how many digits to write weights on their lines. `NULL`, the
 #'   default, is 2 for up to 24 lines and none for more; 0 writes none.
-#' @param main The title; `NULL`, the default, tells the sizes.
+#' @param main The title; `NULL`, the default, gives the sizes.
 #' @param client The client of the server that is asked about an environment named by its id;
 #'   the default is the session's own, [gym_client()].
 #' @param ... Not used.
@@ -52,7 +52,8 @@ plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = N
   invisible(x)
 }
 
-# With the names of the environment in which it is drawn, or of that in which it was played.
+# The policy with the spaces of `env`, whose names the diagram shows; without `env` it keeps those
+# of the environment in which it was played.
 bind_to <- function(policy, env, client, call = rlang::caller_env()) {
   if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
 }
@@ -137,7 +138,7 @@ draw_neurons <- function(data, room) {
   draw_layer_names(data$layers, room)
 }
 
-# Where neurons are left out.
+# Three dots where neurons are left out.
 draw_dots <- function(dots) {
   for (i in seq_len(nrow(dots))) {
     graphics::points(rep(dots$x[[i]], 3L), dots$y[[i]] + c(-0.5, 0, 0.5) * graphics::strheight("M"),
@@ -145,7 +146,7 @@ draw_dots <- function(dots) {
   }
 }
 
-# Under the layers, small enough for their neighbours.
+# The layers' names below them, small enough not to overlap.
 draw_layer_names <- function(layers, room) {
   cex <- min(room$cex, 0.95 * room$gap / max(graphics::strwidth(layers$label, "inches", font = 3L)))
   graphics::mtext(layers$label, 1L, line = 0.5, at = layers$x, cex = cex * graphics::par("cex"),

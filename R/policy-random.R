@@ -74,7 +74,7 @@ act_batch.gym_policy_random <- function(policy, observation, playing, vector_env
   sample_sub_envs(policy$action_space, length(playing))
 }
 
-# Only where observations are numbers can the number of observations be told.
+# The number of observations is known only where they are numbers.
 can_count_observations <- function(observation, space) {
   !is.list(observation) && (is.null(space) || is_stackable(space))
 }
@@ -100,7 +100,7 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy
 }
 
-# Is each value of a space, as far as kind and shape tell, one of the other's?
+# Whether each value of one space is a value of the other, judged by their kinds and shapes.
 space_within <- function(inner, outer) {
   if (inherits(inner, "gym_space_discrete") && inherits(outer, "gym_space_discrete")) {
     inner$start >= outer$start && inner$start + inner$n <= outer$start + outer$n

@@ -20,7 +20,7 @@ search_settings <- function(env, policy, rounds, episodes, target, max_steps,
   )
 }
 
-# Adds what the environment says to the settings.
+# Completes the settings with those of the environment.
 settings_in <- function(vector_env, settings) {
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings["num_envs"] <- list(vector_env$num_envs)
@@ -79,7 +79,7 @@ play_search <- function(vector_env, template, settings, progress, call, checkpoi
 #'
 #' @param play Code that plays.
 #' @param text A message for an interrupt, for cli, with `{finished}` and `{total}`.
-#' @param count_finished A function that tells how many of the `total` are finished.
+#' @param count_finished A function that returns how many of the `total` are finished.
 #' @return Whether there was an interrupt, logical.
 #' @noRd
 until_interrupted <- function(play, text, count_finished, total) {

@@ -1,4 +1,4 @@
-# What every search returns, whatever its method: class gym_search.
+# The result of a search, whatever its method: class gym_search.
 
 #' Make a result of a search
 #'
@@ -52,12 +52,12 @@ rounds_table <- function(history, episodes, n) {
 #' A search returns an object of class `gym_search`, which R's usual functions know:
 #' `print()` says in a few lines what came of it, `as.data.frame()` gives its episodes,
 #' `predict()` what the policy that was found does, and `summary()` plays that policy in
-#' fresh episodes to tell how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
+#' fresh episodes to estimate how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
 #' never touch R's generator.
 #'
 #' The best of many rounds of a few episodes has also been lucky, so its mean return in the
-#' search says too much. `summary()` therefore plays it again. Gym's own definition of solved
-#' is a mean return of at least the environment's threshold over 100 consecutive episodes.
+#' search is too high an estimate. `summary()` therefore plays it again. Gym's own definition of
+#' solved is a mean return of at least the environment's threshold over 100 consecutive episodes.
 #'
 #' @param x,object A search, as [search_random()] returns it.
 #' @param row.names,optional,... Not used.
