@@ -21,7 +21,8 @@ test_that("what a session made on another's server is closed with it, classic id
     server,
     "classic <- env_create(server, 'CartPole-v1')",
     "env <- gym_make('CartPole-v1', client = server)",
-    "three <- gym_make('CartPole-v1', num_envs = 3, client = create_GymClient(server$remote_base))",
+    "again <- create_GymClient(server$remote_base)",
+    "envs <- gym_make('CartPole-v1', num_envs = 3, client = again)",
     "invisible(env$reset())",
     "cat(length(env_list_all(server)))"
   )
