@@ -49,7 +49,7 @@ results$versions <- c(
 )
 results$date <- format(Sys.Date())
 
-# A client belongs to the session that made it.
+# A client belongs to the session that created it.
 strip <- function(search) {
   search$client <- NULL
   search

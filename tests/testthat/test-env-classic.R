@@ -59,7 +59,7 @@ test_that("a seed that is none is refused before anything is sent", {
   }
 })
 
-test_that("a reset tells what the environment tells besides, when asked", {
+test_that("a reset returns the info, when asked", {
   client <- test_client()
   env <- local_env(seed = 1)
   both <- env$reset(seed = 3, return_info = TRUE)
@@ -176,7 +176,7 @@ test_that("a step after the end warns once an episode", {
   }
 })
 
-test_that("an exception inside an environment is told and touches no other", {
+test_that("an exception inside an environment is an error that leaves the others alone", {
   server <- local_odd_server()
   env <- make_odd("Failing", server)
   other <- make_odd("Image", server)
@@ -191,7 +191,7 @@ test_that("an exception inside an environment is told and touches no other", {
   expect_error(gone$close(), NA)
 })
 
-test_that("what an environment tells besides arrives", {
+test_that("the info of an environment arrives", {
   env <- make_odd("Telling", local_odd_server())
   env$reset()
   out <- env$step(0)

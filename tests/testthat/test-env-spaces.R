@@ -1,4 +1,4 @@
-test_that("the classic calls tell the spaces", {
+test_that("the classic calls return the spaces", {
   client <- test_client()
   id <- env_create(client, "CartPole-v0")
   withr::defer(env_close(client, id))
@@ -11,7 +11,7 @@ test_that("the classic calls tell the spaces", {
   expect_identical(space$low, -space$high)
 })
 
-test_that("what belongs to a space is told from what does not", {
+test_that("values that belong to a space are distinguished from those that do not", {
   env <- local_env()
   member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
   expect_true(member(0))

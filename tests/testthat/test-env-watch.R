@@ -57,7 +57,7 @@ test_that("the first step with render = TRUE opens the page, and no other", {
   expect_match(seen$addresses, instance_id)
 })
 
-test_that("an environment made for people opens its page when it is made", {
+test_that("an environment with render_mode \"human\" opens its page when it is made", {
   seen <- local_viewer()
   env <- local_env(render_mode = "human")
   expect_match(seen$addresses, env$instance_id)

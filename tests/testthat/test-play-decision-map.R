@@ -154,7 +154,8 @@ test_that("a network that was played needs no environment, one of its own no nam
 
 test_that("what cannot be mapped says why", {
   bad <- function(policy, env = NULL, ..., message) {
-    expect_error(decision_map(env, policy, ...), message, fixed = TRUE, class = "gym_error_argument")
+    expect_error(decision_map(env, policy, ...), message, fixed = TRUE,
+                 class = "gym_error_argument")
   }
   bad(policy_random(), cartpole(), message = "a random policy draws its actions")
   bad(function(observation) 1, message = "What is observed and done is known of networks")

@@ -1,4 +1,5 @@
-map_of <- function(policy = policy_network(c(2, 1)), env = NULL, ..., xlim = c(-2, 2), ylim = c(-1, 1)) {
+map_of <- function(policy = policy_network(c(2, 1)), env = NULL, ..., xlim = c(-2, 2),
+                   ylim = c(-1, 1)) {
   decision_map(env, policy, ..., x = 1, y = 2, xlim = xlim, ylim = ylim, size = 21)
 }
 

@@ -31,7 +31,7 @@ test_that("where all were solved the bars end with the last", {
   expect_false(any(bars$unsolved))
 })
 
-test_that("the mark tells the chance of that many rounds or fewer, and what was seen", {
+test_that("the mark has the chance of that many rounds or fewer, and their share of the searches", {
   searches <- searches_of(c(1, 1, 3, 7, NA))
   data <- searches_plot_data(searches, mark = 3)
   expect_equal(data$marked$expected, 1 - (1 - searches$chance)^3)

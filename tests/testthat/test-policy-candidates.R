@@ -1,5 +1,7 @@
 fake_with <- function(observation_space, action_space) {
-  vector_env_of(fake_vector_env(12, observation_space = observation_space, action_space = action_space))
+  vector_env_of(
+    fake_vector_env(12, observation_space = observation_space, action_space = action_space)
+  )
 }
 
 # Every candidate in three sub-environments.
@@ -12,7 +14,7 @@ alone <- function(policies, observations, playing) {
   lapply(playing, function(i) act(policies[[(i + 2L) %/% 3L]], observations[i, ]))
 }
 
-test_that("candidates side by side act as each of them alone, in all sub-environments or in some", {
+test_that("candidates act together as each of them alone, in all sub-environments or in some", {
   set.seed(1)
   for (sizes in list(c(4, 1), c(4, 2, 1), c(4, 8, 8, 3), c(4, 1, 3))) {
     actions <- discrete_space(max(2L, sizes[[length(sizes)]]))

@@ -11,7 +11,7 @@ test_that("a function is asked about a matrix, also when there is one observatio
                "one action for the one observation, not 2 actions", class = "gym_error_argument")
 })
 
-test_that("a rollout asks for all sub-environments that play at once", {
+test_that("a rollout asks once for the actions of all sub-environments that are playing", {
   rows <- integer()
   count <- function(observation) {
     rows <<- c(rows, nrow(observation))
@@ -79,7 +79,7 @@ test_that("observations and actions with parts have them batched, in any order o
                class = "gym_error_argument")
 })
 
-test_that("policies of other classes are asked by their own method, in sub-environments too", {
+test_that("policies of other classes are asked by their own method, in vector environments too", {
   registerS3method("act", "follower", function(policy, observation, ...) follow_pole(observation),
                    envir = asNamespace("gym"))
   for (follower in list(

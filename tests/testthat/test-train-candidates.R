@@ -37,7 +37,7 @@ test_that("once the search is decided nothing more is played", {
   expect_length(env$resets, 1)
 })
 
-test_that("sub-environments of rounds after one that has reached the target are not waited for", {
+test_that("rounds after one that has reached the target are not waited for", {
   env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(5, 5, 1, 1, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
   # After the first step only the first round plays, of which it is not yet known.
@@ -90,7 +90,7 @@ test_that("the policy returned is the one that was played in its round", {
   expect_identical(again, played$return)
 })
 
-test_that("set.seed() alone fixes a search in sub-environments, and seed = gives the same", {
+test_that("set.seed() alone fixes a search in a vector environment, and seed = gives the same", {
   play <- function(...) {
     figures(search_random(fake_vector_env(8, "vector_entry_point", reward = first_action), ...))
   }
@@ -167,7 +167,9 @@ test_that("an interrupt finds no round that has ended without a mean", {
   makeActiveBinding("means", function(value) {
     if (missing(value)) numeric() else rlang::interrupt()
   }, history)
-  interrupted <- tryCatch(end_candidate_episodes(history, 1L, 5), interrupt = function(cnd) "interrupt")
+  interrupted <- tryCatch(
+    end_candidate_episodes(history, 1L, 5), interrupt = function(cnd) "interrupt"
+  )
   expect_identical(interrupted, "interrupt")
   expect_equal(count_finished(history), 0)
 })

@@ -157,7 +157,8 @@ test_that("arguments that differ from the file's are named, with both values", {
   refused(policy = policy_network(c(4, 1)), argument = "policy", message = "`policy` is network")
   refused(env = fake_environment(id = "Other-v0"), argument = "env",
           message = "`env` is Fake-v0 there, and Other-v0 here.")
-  refused(env = fake_vector_env(3), argument = "env", message = "Fake-v0 with 3 sub-environments here")
+  refused(env = fake_vector_env(3), argument = "env",
+          message = "Fake-v0 with 3 sub-environments here")
   refused(env = gym_wrap("Fake-v0", "TimeLimit", max_episode_steps = 5), argument = "env",
           message = "`env` is another there.")
   refused(seed = 2, rounds = 4, argument = c("rounds", "seed"), message = "`seed`")
@@ -268,7 +269,7 @@ test_that("a relative path is that of the folder at the start", {
   expect_identical(list.files(folder), "here.rds")
 })
 
-test_that("a server that plays otherwise than the one before is told", {
+test_that("a server that plays other episodes than the one before is an error", {
   kept <- local_kept_files()
   play <- function(threshold, path) {
     quiet_search(fake_environment(reward_threshold = threshold), rounds = 3, checkpoint = path)
@@ -316,7 +317,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
 
-test_that("with sub-environments each batch is kept, however long writing takes", {
+test_that("in a vector environment the file is written after each batch, however long that takes", {
   written <- function(env) {
     kept <- local_kept_files()
     local_functions(rest_per_writing = 1e6)
