@@ -11,8 +11,8 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
-  check_sub_env_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
-  check_sub_env_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_vector_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
+  check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
@@ -92,8 +92,8 @@ ask_instance <- function(client, instance_id, call) {
   instance$single_observation_space <- read_values(
     space_of(answer$observation_space), "Its `observation_space`"
   )
-  instance$actions <- sub_envs_space(instance$single_action_space, answer$num_envs)
-  instance$observations <- sub_envs_space(instance$single_observation_space, answer$num_envs)
+  instance$actions <- sent_space(instance$single_action_space, answer$num_envs)
+  instance$observations <- sent_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
   instance$takes_tensors <- as_tensors(instance$single_observation_space)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
@@ -172,7 +172,7 @@ step_instance <- function(client, instance, action, render, which = NULL,
                           call = rlang::caller_env()) {
   fields <- c(render = if (render) "true" else "false")
   if (!is.null(which) || !is.null(instance$num_envs)) {
-    return(step_sub_envs(client, instance, action, fields, which, call))
+    return(step_vector_env(client, instance, action, fields, which, call))
   }
   space <- instance$actions
   # A classic server's error does not say that an action was wrong, so bounds are checked here.

@@ -81,7 +81,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   instance <- known_instance(x, instance_id, call = call)
   single <- instance[[paste0("single_", which)]]
   num_envs <- instance$num_envs
-  space <- sub_envs_space(single, num_envs)
+  space <- sent_space(single, num_envs)
   if (instance$classic) {
     return(fits_space(space, value, bounds = TRUE))
   }

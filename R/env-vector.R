@@ -5,7 +5,7 @@ vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
 # The space of what is sent and received: for a vector environment that of a batch.
-sub_envs_space <- function(space, num_envs) {
+sent_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
@@ -21,8 +21,8 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_sub_envs <- function(client, instance, action, fields, which, call) {
-  check_step_sub_envs(which, instance, call)
+step_vector_env <- function(client, instance, action, fields, which, call) {
+  check_which(which, instance, call)
   n <- instance$num_envs
   actions <- instance$actions
   observations <- instance$observations
@@ -38,7 +38,7 @@ step_sub_envs <- function(client, instance, action, fields, which, call) {
   answer <- send_action(
     client, instance, actions, action, write_sub_envs(single, action, n), fields, call
   )
-  result <- read_values(numbers_by_sub_env(answer), "Its `reward`")
+  result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
   info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
@@ -55,7 +55,7 @@ step_sub_envs <- function(client, instance, action, fields, which, call) {
   )
 }
 
-numbers_by_sub_env <- function(answer) {
+results_by_sub_env <- function(answer) {
   answer$tensors %||% list(
     reward = as.numeric(numbers_from_json(answer$reward)),
     terminated = unlist(answer$terminated),
@@ -88,7 +88,7 @@ decode_sample <- function(instance, json) {
 
 # Checks --------------------------------------------------------------------------------
 
-check_sub_env_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
+check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
   if (is.null(x)) {
     return(invisible())
   }
@@ -119,7 +119,7 @@ check_mask <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(invisible())
   }
-  check_has_sub_envs(instance, mask, "mask", call)
+  check_is_vector_env(instance, mask, "mask", call)
   n <- instance$num_envs
   if (!is.logical(mask) || length(mask) != n || anyNA(mask) || !any(mask)) {
     must <- paste0(
@@ -129,11 +129,11 @@ check_mask <- function(mask, instance, call) {
   }
 }
 
-check_step_sub_envs <- function(which, instance, call) {
+check_which <- function(which, instance, call) {
   if (is.null(which)) {
     return(invisible())
   }
-  check_has_sub_envs(instance, which, "which", call)
+  check_is_vector_env(instance, which, "which", call)
   n <- instance$num_envs
   if (!are_whole(which, 1, n) || length(which) == 0L || is.unsorted(which, strictly = TRUE)) {
     must <- paste0("numbers of sub-environments from 1 to ", n, ", in increasing order")
@@ -141,7 +141,7 @@ check_step_sub_envs <- function(which, instance, call) {
   }
 }
 
-check_has_sub_envs <- function(instance, x, arg, call) {
+check_is_vector_env <- function(instance, x, arg, call) {
   if (is.null(instance$num_envs)) {
     gym_abort(
       c(

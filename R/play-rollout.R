@@ -127,19 +127,16 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
       warn_of_own_limit(max_steps, vector_env, call)
       policy <- policy_bind(policy, vector_env, call = call)
       history <- new_history(episodes)
-      seeds <- draw_batch_seeds(vector_env, episodes)
+      # The seeds of all batches are drawn before the first episode, so that a policy that draws is
+      # played in the same episodes as one that does not.
+      batches <- ceiling(episodes / vector_env$batch_size)
+      seeds <- replicate(batches, vector_env$draw_seeds(), simplify = FALSE)
       begin <- function(batch, episodes) list(seeds = seeds[[batch]], policy = policy)
       play_episodes(vector_env, history, begin, max_steps, keep_steps = steps)
       new_rollout(history, policy, vector_env, seed, steps)
     }
     with_vector_env(env, episodes, client, play, frames)
   })
-}
-
-# The seeds of all batches are drawn before the first episode, so that a policy that draws is played
-# in the same episodes as one that does not.
-draw_batch_seeds <- function(vector_env, episodes) {
-  replicate(ceiling(episodes / vector_env$batch_size), vector_env$draw_seeds(), simplify = FALSE)
 }
 
 # Tables --------------------------------------------------------------------------

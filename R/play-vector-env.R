@@ -111,7 +111,7 @@ vector_env_of <- function(env, batch_size = NULL, call = rlang::caller_env(), fr
   } else if (identical(env$vectorization_mode, "sync")) {
     vector_env <- independent_sub_envs(env, batch_size %||% env$num_envs, call)
   } else {
-    check_ended_sub_envs_step(env, call)
+    check_ended_can_step(env, call)
     vector_env <- joint_sub_envs(env, call)
   }
   vector_env$spec <- env$spec
@@ -206,7 +206,7 @@ warn_of_own_limit <- function(max_steps, vector_env, call) {
   }
 }
 
-check_ended_sub_envs_step <- function(env, call) {
+check_ended_can_step <- function(env, call) {
   if (identical(env$autoreset_mode, "Disabled")) {
     gym_abort(
       c(

@@ -13,7 +13,8 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
   cex <- panel_cex(grid)
   graphics::par(cex = cex)
   left <- left_margins(data, grid)
-  graphics::layout(grid, widths = column_widths(left, cex))
+  # So that the plots of all columns are equally wide.
+  graphics::layout(grid, widths = (left + 0.8) * line_inches(cex) + plot_width(left, cex))
   graphics::par(cex = cex, oma = c(2.8, 0, 3.2, 0), mgp = c(3, 0.5, 0), tcl = -0.25, las = 1,
                 xpd = FALSE)
   title_cex <- panel_title_cex(data$panels$panel, left)
@@ -44,11 +45,6 @@ left_margins <- function(data, grid) {
   column <- which(grid == nrow(data$panels), arr.ind = TRUE)[1L, 2L]
   left[[column]] <- max(left[[column]], max(words) / line + 1)
   left
-}
-
-# So wide that the plots of all columns are equally wide.
-column_widths <- function(left, cex) {
-  (left + 0.8) * line_inches(cex) + plot_width(left, cex)
 }
 
 plot_width <- function(left, cex) {

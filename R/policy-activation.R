@@ -54,5 +54,3 @@ activate <- function(x, activation) {
 unit_outputs <- function(outputs, activation) {
   if (activation == "tanh") (outputs + 1) / 2 else outputs
 }
-
-has_range <- function(activation) activation %in% c("tanh", "logistic", "Gompertz")

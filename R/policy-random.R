@@ -57,10 +57,12 @@ act.gym_policy_random <- function(policy, observation, ...) {
       value = policy
     )
   }
-  # An observation matters only in that each one needs an action. Observations that are lists, of an
-  # environment with several parts, are given one at a time.
-  observed <- if (can_count_observations(observation, policy$observation_space)) {
-    observation_rows(observation, policy$observation_space)
+  # An observation matters only in that each one needs an action. How many there are is known only
+  # where they are numbers; observations that are lists, of an environment with several parts, are
+  # given one at a time.
+  seen_in <- policy$observation_space
+  observed <- if (!is.list(observation) && (is.null(seen_in) || is_stackable(seen_in))) {
+    observation_rows(observation, seen_in)
   }
   if (is.null(observed) || observed$one) {
     space_sample(space)
@@ -72,11 +74,6 @@ act.gym_policy_random <- function(policy, observation, ...) {
 #' @exportS3Method
 act_batch.gym_policy_random <- function(policy, observation, playing, vector_env) {
   sample_sub_envs(policy$action_space, length(playing))
-}
-
-# The number of observations is known only where they are numbers.
-can_count_observations <- function(observation, space) {
-  !is.list(observation) && (is.null(space) || is_stackable(space))
 }
 
 #' @exportS3Method

@@ -200,7 +200,8 @@ act_batch.default <- function(policy, observation, playing, vector_env) {
 #' @noRd
 observation_rows <- function(observation, space) {
   axes <- dim(observation)
-  rank <- observation_rank(space)
+  # How many dimensions an observation has: none in a discrete space, which has no shape.
+  rank <- if (is.null(space)) 1L else length(space$shape)
   if (is.null(axes) && rank == 1L) {
     return(list(values = matrix(observation, nrow = 1L), one = TRUE))
   }
@@ -215,9 +216,4 @@ observation_rows <- function(observation, space) {
   } else {
     list(values = t(matrix(row_major(observation), ncol = axes[[1L]])), one = FALSE)
   }
-}
-
-# A discrete space has no shape: its values are single numbers.
-observation_rank <- function(space) {
-  if (is.null(space)) 1L else length(space$shape)
 }

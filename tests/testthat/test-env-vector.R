@@ -134,7 +134,7 @@ test_that("a mask resets only the sub-environments that it picks", {
   expect_false(identical(after[2, ], before[2, ]))
 })
 
-test_that("with SameStep the step that ends an episode begins one, and keeps the last observation", {
+test_that("with SameStep the step that ends an episode begins one and keeps its observation", {
   env <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "SameStep", seed = 1)
   single <- local_env("CartPole-v1")
   env$reset(seed = c(1, 2, 3))
