@@ -5,7 +5,7 @@
 #' Returns the client that functions take when they are given none. It talks to
 #' the server that the environment variable `GYM_SERVER_URL` names or, without
 #' it, to one on this machine, which is started at the first call and stops with
-#' the session. A server that asks for a token gets the one that `GYM_SERVER_TOKEN` holds.
+#' the session. A server that requires a token is sent the one that `GYM_SERVER_TOKEN` holds.
 #'
 #' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
@@ -48,7 +48,8 @@ named_client <- function(url, call = rlang::caller_env()) {
   the_session$named_client
 }
 
-# For the examples: whether the session has a server or can have one, as things are.
+# Whether the session has a server or can start one without installing anything. The examples of
+# the help pages ask.
 can_start_server <- function() {
   tryCatch(
     inherits(session_client(install = FALSE), "GymClient"),

@@ -29,7 +29,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
     check_viewer(call)
   }
   close_queued(client)
-  instance_id <- create_and_register(client, fields, call)
+  instance_id <- create_on_server(client, fields, call)
   if (isTRUE(client_state(client)$classic)) {
     withCallingHandlers(
       check_classic_fields(client, fields, c("env_id", "seed"), call),
@@ -41,7 +41,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
 
 close_instance <- function(client, instance_id, call = rlang::caller_env()) {
   post_once(client, paste0(instance_route(instance_id), "close/"), call = call)
-  unregister_created(created_name(client, instance_id))
+  forget_instance(instance_place(client, instance_id))
   instances <- client_state(client)$instances
   if (!is.null(instances[[instance_id]])) {
     rm(list = instance_id, envir = instances)
@@ -54,7 +54,7 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
     close_instance(client, instance_id, call),
     gym_error_http = function(cnd) {
       if (!isTRUE(cnd$code %in% gone_codes)) rlang::cnd_signal(cnd)
-      unregister_created(created_name(client, instance_id))
+      forget_instance(instance_place(client, instance_id))
     }
   )
 }

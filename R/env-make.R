@@ -85,7 +85,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   check_client(client)
   env <- NULL
   instance_id <- NULL
-  on.exit(if (is.null(env)) close_without_waiting(client, instance_id))
+  on.exit(if (is.null(env)) close_unused(client, instance_id))
   create <- function(call) {
     create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
@@ -199,7 +199,7 @@ gym_env <- R6Class(
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
-        queue_for_closing(self$client, self$instance_id)
+        queue_closing(self$client, self$instance_id)
       }
     }
   )

@@ -6,6 +6,17 @@
 #' it. The classic client calls ([env_create()], [env_reset()], [env_step()]
 #' and the others) work as they always did.
 #'
+#' @section Words:
+#' * **Environment**: a task. A step takes an *action* and gives an *observation* and a *reward*.
+#' * **Space**: the set to which actions or observations belong, see [space_sample()].
+#' * **Episode**: the steps from a reset to the end, which comes by the task's own rules
+#'   (*terminated*) or by a limit (*truncated*). Its *return* is the sum of its rewards.
+#' * **Vector environment**: `num_envs` *sub-environments* that are stepped at once; the column
+#'   `sub_env` counts them, the argument `which` picks some.
+#' * **Policy**: what chooses the actions, a function of the observation.
+#' * **Candidate**: one set of weights that a search tries; an **iteration** tries one or several.
+#' * **Instance**: an environment on a server, which has an id there.
+#'
 #' @section Errors:
 #' Every error of this package has class `gym_error` and one of these classes:
 #'
@@ -35,8 +46,8 @@
 #' @section Options:
 #' `gym.max_answer_bytes`: how many bytes an answer of a server may have, a number; the default is
 #' 2^29, half a gigabyte. Of JSON, of which R makes much more, it may be a sixteenth. A larger
-#' answer ends with a `gym_error_connection` as soon as so much has come. Answers that a server
-#' packs are not unpacked. `gym.viewer` is told of at [env_watch()].
+#' answer ends with a `gym_error_connection` as soon as so much has come. Compressed
+#' answers are not decompressed. `gym.viewer` is described at [env_watch()].
 #'
 #' Whatever a server says in an error or by a name is shown without control characters, and cut
 #' where it is long.

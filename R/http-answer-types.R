@@ -1,4 +1,4 @@
-# What an answer must hold. Nothing is believed of a server that sends something else.
+# Checks of the fields of answers: a value of another type is refused, whatever server sent it.
 
 abort_answer <- function(problem, call = NULL) {
   gym_abort(
@@ -13,11 +13,11 @@ refuse_field <- function(value, name, must) {
 
 #' Read an answer's values
 #'
-#' R's own errors, by which the many ways of being wrong show, become one that says that it was
-#' the answer, and what in it.
+#' Errors of R's own, which come of answers that are wrong in one of many ways, become an error that
+#' says that it was the answer, and what in it.
 #' @noRd
 read_values <- function(expr, what) {
-  # Each step pays for it: a handler that leaves the call costs three times as much as this one.
+  # Each step takes this time: tryCatch() costs three times as much as a calling handler.
   withCallingHandlers(expr, error = function(cnd) {
     if (inherits(cnd, "gym_error_connection")) {
       abort_answer(paste0(what, ": ", cnd$problem))
@@ -33,8 +33,8 @@ is_object <- function(x) is.list(x) && (!length(x) || !is.null(names(x)))
 
 string_or_null <- function(x) if (rlang::is_string(x)) x
 
-# A field that may be missing.
-check_told <- function(answer, name, is_right, must) {
+# Checks a field that may be missing.
+check_optional <- function(answer, name, is_right, must) {
   value <- answer[[name]]
   if (!is.null(value) && !is_right(value)) {
     refuse_field(value, name, must)
@@ -50,21 +50,21 @@ number_from <- function(x, name) {
   number_from_json(x)
 }
 
-# Classic servers tell only whether the episode is done.
+# Classic servers send `done` alone.
 check_answer_flags <- function(answer) {
   if (!is_flag(answer$done)) {
     refuse_field(answer$done, "done", "true or false")
   }
   if (!is_flag(answer$terminated) || !is_flag(answer$truncated)) {
-    check_told(answer, "terminated", is_flag, "true or false")
-    check_told(answer, "truncated", is_flag, "true or false")
+    check_optional(answer, "terminated", is_flag, "true or false")
+    check_optional(answer, "truncated", is_flag, "true or false")
   }
 }
 
-# Most infos are empty.
+# Quick for an empty info, as most are.
 check_answer_info <- function(answer) {
   if (!identical(answer$info, empty_object)) {
-    check_told(answer, "info", is_object, "an object")
+    check_optional(answer, "info", is_object, "an object")
   }
 }
 
@@ -95,22 +95,22 @@ check_instance_id <- function(id) {
   }
 }
 
-#' Check what is told of an instance
+#' Check the description of an instance
 #'
-#' More sub-environments than these no answer could hold.
+#' No answer could hold the values of more than 2^24 sub-environments.
 #' @noRd
 check_about <- function(about) {
   is_num_envs <- function(x) is_number(x) && are_whole(x, 1, 2^24)
-  check_told(about, "num_envs", is_num_envs, "a whole number")
-  check_told(about, "max_episode_steps", is_number, "a number")
+  check_optional(about, "num_envs", is_num_envs, "a whole number")
+  check_optional(about, "max_episode_steps", is_number, "a number")
   for (name in c("env_id", "vectorization_mode", "autoreset_mode", "render_mode")) {
-    check_told(about, name, rlang::is_string, "a string")
+    check_optional(about, name, rlang::is_string, "a string")
   }
 }
 
 #' Take a column out of the objects that an answer lists
-#' @param is_right,must Tells whether a value is right; what it must be, in words.
-#' @param missing What stands for a value that is not there.
+#' @param is_right,must A function that says whether a value is right; what it must be, in words.
+#' @param missing Stands for a value that is not there.
 #' @noRd
 listed_column <- function(listed, name, missing, is_right, must) {
   if (!is.list(listed) || !all(vapply(listed, is_object, NA))) {
@@ -161,7 +161,7 @@ check_numbers <- function(values, dtype, shape) {
       "A value of shape ", shape_text(shape), " has ", count_of(length(values), "number")
     ))
   }
-  # NaN is a number; bit64 has bits for it that mean another one.
+  # NaN is a number. The bits of an integer64 are not to be looked at as those of a double.
   missing <- !is.object(values) && anyNA(values) && any(is.na(values) & !is.nan(values))
   if (!is.numeric(values) && !is.logical(values) || missing) {
     abort_answer(paste("A value has something that is no", dtype %||% "number"))
@@ -203,7 +203,7 @@ check_frame <- function(values) {
   values
 }
 
-# What is unpacked later may become much larger.
+# Checks a PNG file by its header: the pixels that are decoded from it may take much more memory.
 check_png <- function(file) {
   signature <- as.raw(c(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a))
   if (!is.raw(file) || length(file) < 24L || !identical(file[1:8], signature)) {

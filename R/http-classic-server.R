@@ -1,26 +1,26 @@
-# Servers that know the protocol of gym-http-api alone, as the original one does. They tell less of
-# an environment, ignore fields that they do not know, and carry out a repeated request twice.
+# Servers that know the protocol of gym-http-api alone, as the original one does. They say less
+# about an environment, ignore fields that they do not know, and carry out a repeated request twice.
 
 # A newer server repeats the idempotency key in its answer; `answer` is that to a creation.
 note_protocol <- function(state, answer) state$classic <- is.null(answer$request)
 
-#' Describe an instance by what the classic protocol tells of it
+#' Describe an instance by what the classic protocol has about it
 #'
 #' @param missing The server's error, that it has no route for the whole description.
 #' @return A list like a newer server's answer.
 #' @noRd
-classic_description <- function(x, instance_id, missing, call) {
+classic_description <- function(client, instance_id, missing, call) {
   if (!is.null(missing$code)) {
     rlang::cnd_signal(missing)
   }
   route <- instance_route(instance_id)
   description <- list(
     classic = TRUE,
-    action_space = get_answer(x, paste0(route, "action_space/"), call = call)$info,
-    observation_space = get_answer(x, paste0(route, "observation_space/"), call = call)$info,
-    env_id = get_answer(x, "/v1/envs/", call = call)$all_envs[[instance_id]]
+    action_space = get_answer(client, paste0(route, "action_space/"), call = call)$info,
+    observation_space = get_answer(client, paste0(route, "observation_space/"), call = call)$info,
+    env_id = get_answer(client, "/v1/envs/", call = call)$all_envs[[instance_id]]
   )
-  state <- client_state(x)
+  state <- client_state(client)
   state$classic <- TRUE
   description
 }
@@ -35,13 +35,13 @@ classic_flags <- function(answer) {
 }
 
 # Refuses the fields of a request that a newer server takes and a classic one would ignore.
-check_classic_fields <- function(x, fields, known, call) {
+check_classic_fields <- function(client, fields, known, call) {
   ignored <- setdiff(names(fields), known)
   if (length(ignored)) {
     name <- sub("^reset_", "", ignored[[1L]])
     gym_abort(
       c(
-        paste0("The server at ", x$remote_base, " knows the protocol of gym-http-api alone, ",
+        paste0("The server at ", client$remote_base, " knows the protocol of gym-http-api alone, ",
                "which has no `", name, "` here."),
         i = "`gym_server_start()` starts a server that has it."
       ),

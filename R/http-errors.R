@@ -122,7 +122,7 @@ abort_no_answer <- function(response, call) {
   )
 }
 
-# The program's own name for itself, from an answer of curl's or httr's.
+# The name by which a program identifies itself in an answer, which is curl's or httr's.
 server_name <- function(response) {
   headers <- response$headers
   if (is.raw(headers)) {
@@ -150,7 +150,7 @@ foreign_answer_message <- function(response) {
 
 #' Guess what a program is that is no Gym server, and say what helps
 #' @param url Where it answered.
-#' @param name What it calls itself, a string or `NULL`.
+#' @param name By which it identifies itself, a string or `NULL`.
 #' @return One or two sentences.
 #' @noRd
 foreign_server_hint <- function(url, name) {

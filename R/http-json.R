@@ -1,4 +1,4 @@
-# JSON as the wire wants it: doubles keep 17 significant digits (jsonlite writes
+# JSON as it is sent: doubles keep 17 significant digits (jsonlite writes
 # 15), numbers that JSON cannot write travel as "NaN", "Infinity", "-Infinity".
 
 json_number <- function(x) {
@@ -39,7 +39,7 @@ json_escape <- function(x) {
   x
 }
 
-# The fields of a request: JSON texts under names that need no escaping.
+# A JSON object of JSON texts, under names that need no escaping, as a request's fields have.
 json_object <- function(fields) {
   paste0("{", paste0("\"", names(fields), "\":", fields, recycle0 = TRUE, collapse = ","), "}")
 }
@@ -48,7 +48,7 @@ json_texts <- function(values) vapply(values, to_json, "")
 
 json_array <- function(elements) paste0("[", paste0(elements, collapse = ","), "]")
 
-# Nest the elements of an array, given row by row (last index fastest).
+# Nests the elements of an array, given row by row (last index fastest).
 json_nested <- function(elements, shape) {
   if (length(shape) <= 1L) {
     return(json_array(elements))
@@ -104,7 +104,7 @@ json_atoms <- function(x) {
   )
 }
 
-# Parse an answer. Integers beyond 2^53 come as text, so that none is rounded.
+# Parses JSON. Integers beyond 2^53 become text, so that none is rounded.
 from_json <- function(text) {
   Encoding(text) <- "UTF-8"
   if (grepl("\\u0000", text, fixed = TRUE, useBytes = TRUE)) {
@@ -113,9 +113,9 @@ from_json <- function(text) {
   jsonlite::parse_json(text, bigint_as_char = TRUE)
 }
 
-# An even number of backslashes before it stand for themselves.
+# Refuses the escaped character NUL, but not an escaped backslash before "u0000".
 refuse_nul <- function(text) {
-  # By bytes: what is no UTF-8 is refused by the parser.
+  # By bytes, as the text may not be UTF-8; the parser refuses that later.
   if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE, useBytes = TRUE)) {
     gym_abort(
       "A text from the server has the character NUL, which no string in R can hold.",
@@ -125,8 +125,8 @@ refuse_nul <- function(text) {
   }
 }
 
-# JSON numbers, nested or not, some perhaps the words for NaN and the infinities,
-# as a numeric vector.
+# Returns JSON numbers, nested or not, as a numeric vector; some may be the words for NaN and the
+# infinities.
 numbers_from_json <- function(elements) {
   numbers <- unlist(elements, use.names = FALSE)
   if (is.character(numbers)) {
@@ -146,13 +146,13 @@ number_from_json <- function(x) {
   }
 }
 
-# Integers beyond 2^53 are text, and so is what is not finite.
+# Integers beyond 2^53 come as text, and so do numbers that are not finite.
 is_json_number <- function(x) {
   length(x) == 1L &&
     (is.numeric(x) || is.character(x) && grepl("^(-?[0-9]+|NaN|-?Infinity)$", x))
 }
 
-# From JSON, where integers beyond 2^53 are text.
+# Returns whole numbers from JSON, where integers beyond 2^53 came as text.
 whole_from_json <- function(json) {
   numbers <- unlist(json, use.names = FALSE)
   if (is.character(numbers)) {
@@ -167,8 +167,8 @@ whole_from_json <- function(json) {
   if (is.null(numbers)) integer() else numbers
 }
 
-# The parser gives up on what int64 cannot hold and rounds it, as it does with
-# the least int64. Every other integer beyond 2^53 has come as text.
+# Refuses integers that the parser has rounded: those that int64 cannot hold, and the smallest
+# int64. Every other integer beyond 2^53 has come as text.
 check_exact <- function(numbers) {
   lost <- abs(numbers) > 2^53
   if (any(lost)) {
@@ -178,9 +178,9 @@ check_exact <- function(numbers) {
 
 # Infos --------------------------------------------------------------------------
 
-# Infos hold whatever an environment puts there, and no space says what: arrays of
-# plain values of one kind become vectors, arrays of such arrays that have one
-# shape become arrays, the rest stays a list.
+# Turns an info from JSON into R values. No space describes an info: arrays of plain values of one
+# kind become vectors, arrays of such arrays that have one shape become arrays, the rest stays a
+# list.
 info_from_json <- function(x) {
   if (!is.list(x)) {
     if (is_number_word(x)) number_from_json(x) else x
@@ -197,7 +197,7 @@ info_from_json <- function(x) {
 
 is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
 
-# The words for numbers are text where there is other text beside them.
+# "NaN" and the like are numbers, unless other text stands beside them.
 info_vector <- function(x) {
   kinds <- unique(vapply(x, info_kind, ""))
   if (all(kinds %in% c("number", "word"))) {
@@ -223,7 +223,7 @@ info_kind <- function(x) {
   }
 }
 
-# `rows` as they were read from the JSON arrays `json`.
+# Makes an array of rows that have one shape; `rows` were read from the JSON arrays `json`.
 stack_rows <- function(rows, json) {
   first <- rows[[1L]]
   shape <- array_shape(first)

@@ -1,4 +1,4 @@
-# The header of a safetensors file: what lies where. Nothing is believed that does not add up.
+# The header of a safetensors file, which says what lies where. What does not add up is refused.
 
 header_size <- function(bytes) {
   if (length(bytes) < 8L) {
@@ -25,16 +25,16 @@ known_layout <- function(header, layouts) {
   layout
 }
 
-# As many as there are kinds of answer of a few environments.
+# Enough for the kinds of answer of a few environments.
 max_layouts <- 8L
 
-# Quotes inside of names and texts are escaped, so nothing else looks like this.
+# Marks where the metadata begin: elsewhere, in names and texts, quotes are escaped.
 metadata_key <- ",\"__metadata__\":"
 
 #' Parse a header
-#' @return A list of `entries`, one for each tensor; `metadata` that stands before them;
-#'   `end`, where the last one ends; `start`, what all headers of this layout begin with:
-#'   the whole header, or all up to the metadata where it comes last.
+#' @return A list of `entries`, one for each tensor; `metadata`, where they stand before them;
+#'   `end`, where the last tensor ends; `start`, with which all headers of this layout begin: the
+#'   whole header, or all up to the metadata where they come last; `metadata_last`, whether they do.
 #' @noRd
 read_layout <- function(header) {
   table <- rawToChar(header)
@@ -97,7 +97,7 @@ read_entry <- function(entry) {
   )
 }
 
-# The elements of a JSON array of whole numbers from 0 on, NULL for anything else.
+# Returns the elements of a JSON array of whole numbers from 0 on, NULL for anything else.
 naturals_from_json <- function(elements) {
   is_number <- function(x) is.numeric(x) && length(x) == 1L
   if (!is.list(elements) || !is.null(names(elements)) || !all(vapply(elements, is_number, NA))) {

@@ -9,9 +9,9 @@
 #' @param bytes A raw vector.
 #' @param layouts An environment that remembers the headers read last, `NULL` for
 #'   none: a header seen before is not parsed again. Metadata at its end, where
-#'   our server puts it, differs from answer to answer and does not count.
-#' @param expected JSON text of the metadata that the file has if nothing is to be
-#'   told: then they are not parsed either. `NULL` for none.
+#'   our server puts them, differ from answer to answer and are not compared.
+#' @param expected JSON text of the metadata of an answer that says nothing more than its
+#'   tensors: metadata that are equal to it are not parsed. `NULL` for none.
 #' @return A list of `tensors`, a named list of vectors and arrays, and
 #'   `metadata`, a named list of strings, `NULL` for the `expected` ones.
 #' @noRd
@@ -33,7 +33,8 @@ read_tensors <- function(bytes, layouts = NULL, expected = NULL) {
   list(tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata)
 }
 
-# A connection copies a file once, an index lists the places of all of a tensor's bytes.
+# Up to this size tensors are taken out by an index, which lists the places of all their bytes; from
+# a larger file by a connection of R's, which copies the file once.
 index_up_to <- 65536L
 
 read_entries <- function(entries, bytes, data) {
@@ -55,7 +56,7 @@ read_entries <- function(entries, bytes, data) {
   entries
 }
 
-# Are these all of the header's bytes from a place on, but for the blanks at its end?
+# Whether a header continues with a text from a place on, and has only blanks after it.
 ends_as <- function(header, after, text) {
   if (is.null(text)) {
     return(FALSE)
@@ -81,7 +82,7 @@ read_integer <- function(size, signed = TRUE) {
   }
 }
 
-# Turned over while it is still small.
+# The array is transposed while it is still bytes, a fourth of the size of integers.
 read_byte <- function(bytes, n, shape) {
   if (length(shape) > 1L) {
     bytes <- shape_values(bytes, shape)
@@ -91,7 +92,7 @@ read_byte <- function(bytes, n, shape) {
   }
 }
 
-# For R the bits of the least int32 are those of NA.
+# The bits of the smallest int32 are R's NA.
 read_int32 <- function(bytes, n, shape) {
   values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
   shape_values(if (anyNA(values)) signed_half(values) else values, shape)
@@ -132,7 +133,7 @@ write_byte <- function(x) as.raw(as.integer(x) %% 256L)
 
 write_int64 <- function(x) bytes_of_whole(x)
 
-# By the name in a header: the bytes of a number, how to read and write it.
+# By the name in a header: how many bytes a number has, how it is read and written.
 tensor_types <- list(
   F64 = list(size = 8L, read = read_double(8L), write = write_double(8L)),
   F32 = list(size = 4L, read = read_double(4L), write = write_double(4L)),
@@ -192,7 +193,7 @@ write_tensors <- function(tensors, metadata) {
   do.call(c, c(list(length_bytes, header), lapply(unname(tensors), `[[`, "bytes")))
 }
 
-# The table of the tensors written last: from step to step it is the same.
+# The header's table of tensors that was written last: from step to step it is the same.
 written <- new.env(parent = emptyenv())
 
 tensors_table <- function(tensors) {

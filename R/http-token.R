@@ -1,10 +1,10 @@
-# The token that a server asks for. It goes into one header and nowhere else: nothing that is
-# printed, kept of an error or deparsed shows it.
+# The token that a server requires. It is sent in one header and appears nowhere else: it is not
+# printed, and not kept in errors or deparsed code.
 
-#' Keep a token where nobody sees it by accident
+#' Keep a token where it is not seen by accident
 #' @param text The token, a string, or `NULL`.
-#' @return A function of no arguments that returns it, or `NULL`: what prints, formats or deparses
-#'   a function shows its code.
+#' @return A function without arguments that returns the token, or `NULL`. Printing, formatting or
+#'   deparsing a function shows its code only.
 #' @noRd
 new_token <- function(text) {
   if (is.null(text)) {
@@ -26,8 +26,8 @@ format.gym_token <- function(x, ...) "<token>"
 token_variable <- "GYM_SERVER_TOKEN"
 
 #' Check a token as a script gives it
-#' @param token A string; `NULL` and `""` are none.
-#' @return As [new_token()] returns it.
+#' @param token A string; `NULL` and `""` stand for no token.
+#' @return What [new_token()] returns.
 #' @noRd
 as_token <- function(token, call = rlang::caller_env()) {
   hide_token(token)
@@ -35,7 +35,7 @@ as_token <- function(token, call = rlang::caller_env()) {
     return(NULL)
   }
   token <- if (rlang::is_string(token)) trimws(token)
-  # What else there may be would end the header, or begin another.
+  # Other characters could end the header, or begin another one.
   if (is.null(token) || !grepl("^[!-~]+$", token)) {
     gym_abort(
       c(
@@ -50,11 +50,11 @@ as_token <- function(token, call = rlang::caller_env()) {
   new_token(token)
 }
 
-# The token that the session's environment has for its servers.
+# The token that the environment variable holds.
 variable_token <- function(call = rlang::caller_env()) as_token(Sys.getenv(token_variable), call)
 
-# That of a server which this session started with these options: the server reads the same file
-# and sees the same variable.
+# The token of a server that this session started with these options: the server reads the same
+# file, or the same environment variable.
 server_token <- function(options, call = rlang::caller_env()) {
   if (!is.null(options$token_file)) {
     as_token(paste(readLines(options$token_file, warn = FALSE), collapse = "\n"), call)
@@ -63,7 +63,7 @@ server_token <- function(options, call = rlang::caller_env()) {
   }
 }
 
-# The token for an address of this session's: a server that it started, or a named one.
+# The token for an address: that of a server which this session started, else the variable's.
 known_token <- function(base) {
   server <- the_session$servers[[base]]
   if (is.null(server)) variable_token() else server$token

@@ -1,11 +1,11 @@
 # Bundles: what an installation downloads, in a folder that can be carried to a machine without a
 # network.
 #
-#   bundle.dcf   for what it was made: system, lock, extras, Python
+#   bundle.dcf   the manifest: for which system, lock, extras and Python it was made
 #   wheels/      the packages
-#   lock/        the lock files, for whoever wants to know what is in it
+#   lock/        the lock files, which list the packages
 #   uv/          uv, when it was used
-#   python/      the archive of the Python that uv brings, when it could be had
+#   python/      the archive of the Python that uv installs, when it could be downloaded
 
 #' Fill a folder for installing without a network
 #'
@@ -15,8 +15,8 @@
 #' processor) and the same version of this package.
 #'
 #' Where uv is found or can be downloaded it is part of the bundle, and so is the Python that it
-#' brings. Where that cannot be had the bundle is for the version of the Python that made it,
-#' and the other machines need a Python of that version, too: the function says so.
+#' installs. Where that cannot be downloaded the bundle is for the version of the Python that made
+#' it, and the other machines need a Python of that version, too: the function says so.
 #'
 #' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
 #'   is replaced as soon as it is clear how a new one can be made, anything else refused.
@@ -40,29 +40,29 @@ gym_server_bundle <- function(dir, extras = character()) {
     plan <- install_plan(extras, call)
     dir <- empty_bundle(dir, call)
     cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
-    uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
+    uv <- if (plan$how == "download") install_uv(call) else if (plan$how == "uv") plan$tool
     base <- bundle_python(dir, uv, call)
     download_wheels(dir, base, extras, call)
     uv_hash <- copy_uv(uv, dir)
   })
   dir.create(file.path(dir, "lock"))
   file.copy(lock_files(extras), file.path(dir, "lock"))
-  # Last, as without it the folder is no bundle.
+  # Last, as a folder with the manifest is a complete bundle.
   write.dcf(list(
     System = bundle_system(), Lock = lock_hash(), Extras = paste(extras, collapse = " "),
     Python = probe_python(base$python)$version,
-    Brings = if (is.null(uv_hash)) "packages" else if (base$managed) "uv and Python" else "uv",
+    Contains = if (is.null(uv_hash)) "packages" else if (base$managed) "uv and Python" else "uv",
     UvHash = uv_hash %||% "none"
   ), file.path(dir, "bundle.dcf"))
   unlink(file.path(dir, "making"), recursive = TRUE)
-  tell_bundle(read_bundle(dir, call))
+  inform_of_bundle(read_bundle(dir, call))
   invisible(dir)
 }
 
 bundle_parts <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
 
-# An earlier bundle has bundle.dcf, one that broke off the folder "making": a folder "python"
-# alone may be anybody's.
+# An earlier bundle has bundle.dcf, an incomplete one the folder "making". Other folders may have a
+# folder "python", too.
 check_bundle_place <- function(dir, call) {
   there <- list.files(dir, all.files = TRUE, no.. = TRUE)
   is_bundle <- all(there %in% bundle_parts) && any(c("bundle.dcf", "making") %in% there)
@@ -76,9 +76,9 @@ check_bundle_place <- function(dir, call) {
 }
 
 empty_bundle <- function(dir, call) {
-  # Somebody may have put something there while this session waited for its turn.
+  # Again, as the folder may have changed while this session waited for the install lock.
   check_bundle_place(dir, call)
-  # First the sign of one that broke off, as removing the rest may be interrupted.
+  # First the folder by which an incomplete bundle is known: removing the rest may be interrupted.
   dir.create(file.path(dir, "making"), recursive = TRUE, showWarnings = FALSE)
   if (!dir.exists(file.path(dir, "making"))) {
     abort_install(paste0("The folder ", dir, " cannot be made."), call = call)
@@ -88,14 +88,14 @@ empty_bundle <- function(dir, call) {
   normalizePath(dir, winslash = "/")
 }
 
-# The Python that the packages are downloaded for, and by: uv's own, whose archive is kept, or
-# one of this machine.
+# The Python that downloads the packages, and for which they are: one that uv installs, whose
+# archive becomes a part of the bundle, or one of this machine.
 bundle_python <- function(dir, uv, call) {
   if (!is.null(uv)) {
     place <- file.path(dir, "making", "python")
     output <- run_tool(
       uv, c("python", "install", managed_python_version, "--install-dir", place),
-      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), only_there)
+      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), not_registered)
     )
     found <- list.files(place, paste0("^cpython-", managed_python_version), full.names = TRUE)
     if (!failed(output) && length(found)) {
@@ -108,7 +108,7 @@ bundle_python <- function(dir, uv, call) {
     if (is.null(uv)) output <- character()
     abort_tool(
       "There is no Python for which the packages could be downloaded", output, call,
-      more = "Python 3.10 to 3.13 with `venv` is needed where uv cannot bring one."
+      more = "Python 3.10 to 3.13 with `venv` is needed where uv cannot install one."
     )
   }
   list(python = python, managed = FALSE)
@@ -129,14 +129,14 @@ download_wheels <- function(dir, base, extras, call) {
   }
 }
 
-# Returns the copy's SHA-256, NULL when there is none.
+# Copies uv into the bundle. Returns the copy's SHA-256, NULL when there is no copy that works.
 copy_uv <- function(uv, dir) {
   if (is.null(uv)) {
     return(NULL)
   }
   place <- file.path(dir, "uv", uv_name())
   dir.create(dirname(place))
-  # What is found on the PATH may only call the real one.
+  # The uv on the PATH may be a script that calls the real one.
   if (file.copy(uv, place) && uv_works(place)) {
     return(file_sha256(place))
   }
@@ -144,11 +144,11 @@ copy_uv <- function(uv, dir) {
   NULL
 }
 
-tell_bundle <- function(bundle) {
+inform_of_bundle <- function(bundle) {
   files <- list.files(bundle$dir, recursive = TRUE, full.names = TRUE)
   megabytes <- round(sum(file.size(files)) / 1e6)
-  needs <- if (!bundle$brings_python) {
-    paste0("It brings no Python: the other machine needs Python ", bundle$python, ".")
+  needs <- if (!bundle$has_python) {
+    paste0("It contains no Python: the other machine needs Python ", bundle$python, ".")
   }
   cli::cli_inform(c(
     v = "The bundle is ready: {megabytes} MB in {.path {bundle$dir}}.",
@@ -157,7 +157,7 @@ tell_bundle <- function(bundle) {
   ))
 }
 
-# Wheels for musl are others than those for glibc.
+# Packages for musl differ from those for glibc.
 bundle_system <- function() {
   paste0(system_name(), if (startsWith(system_name(), "linux") && has_musl()) "-musl")
 }
@@ -168,10 +168,10 @@ read_bundle <- function(dir, call) {
     read.dcf(file.path(dir, "bundle.dcf"))[1L, ], error = function(cnd) NULL,
     warning = function(cnd) NULL
   )
-  if (!all(c("System", "Lock", "Extras", "Python", "Brings", "UvHash") %in% names(fields))) {
+  if (!all(c("System", "Lock", "Extras", "Python", "Contains", "UvHash") %in% names(fields))) {
     abort_bundle(
-      paste0("There is no whole bundle in ", dir, "."),
-      "`gym_server_bundle()` makes one; one that broke off has no file bundle.dcf.", call
+      paste0("There is no complete bundle in ", dir, "."),
+      "`gym_server_bundle()` makes one; an incomplete one has no file bundle.dcf.", call
     )
   }
   dir <- normalizePath(dir, winslash = "/")
@@ -180,16 +180,16 @@ read_bundle <- function(dir, call) {
     dir = dir, system = fields[["System"]], lock = fields[["Lock"]],
     extras = strsplit(fields[["Extras"]], " ", fixed = TRUE)[[1L]], python = fields[["Python"]],
     uv = if (fields[["UvHash"]] != "none") uv, hash_of_uv = fields[["UvHash"]],
-    brings_python = fields[["Brings"]] == "uv and Python"
+    has_python = fields[["Contains"]] == "uv and Python"
   )
 }
 
-abort_bundle <- function(problem, mend, call) {
-  abort_install(c(problem, i = mend), call = call)
+abort_bundle <- function(problem, fix, call) {
+  abort_install(c(problem, i = fix), call = call)
 }
 
-# As install_plan(), for what a bundle has. Its uv, `bundle$uv`, is to be taken by
-# take_bundled_uv() before it is run.
+# Plans an installation from a bundle, as install_plan() does. Before the bundle's uv is run,
+# copy_bundled_uv() must copy it.
 bundle_plan <- function(dir, extras, call) {
   bundle <- read_bundle(dir, call)
   check_bundle(bundle, extras, call)
@@ -197,13 +197,13 @@ bundle_plan <- function(dir, extras, call) {
 }
 
 plan_from_bundle <- function(bundle, extras, call) {
-  # Another uv would bring another Python than the one whose archive is there.
+  # Another uv would install another Python than the one whose archive is in the bundle.
   uv <- if (is.null(bundle$uv)) find_uv(call) else bundled_uv()
-  python <- if (is.null(uv) || !bundle$brings_python) {
+  python <- if (is.null(uv) || !bundle$has_python) {
     find_base_python(with_venv = is.null(uv), versions = bundle$python) %||% abort_bundle(
-      paste0("The bundle is for Python ", bundle$python, " and brings none."),
+      paste0("The bundle is for Python ", bundle$python, " and contains none."),
       paste0("Install Python ", bundle$python, " on this machine, or make the bundle on one where ",
-             "uv can bring a Python."),
+             "uv can install a Python."),
       call
     )
   }
@@ -239,12 +239,12 @@ check_bundle <- function(bundle, extras, call) {
   }
 }
 
-# Where a bundle's uv is copied to: a stick or a share may not let programs run.
+# A bundle's uv is copied here: programs cannot be run from some sticks and network shares.
 bundled_uv <- function() file.path(install_root(), "uv", "bundle", uv_name())
 
-# Copy the bundle's uv, unless that was done before, and run it only when it is the one that was
-# put there. Where it does not run another is looked for. Returns the plan.
-take_bundled_uv <- function(plan, call) {
+# Copies the bundle's uv, unless that was done before, and runs it only if it has the SHA-256 that
+# the manifest names. If it does not run here, another uv is looked for. Returns the plan.
+copy_bundled_uv <- function(plan, call) {
   bundle <- plan$bundle
   if (is.null(bundle$uv)) {
     return(plan)

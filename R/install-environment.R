@@ -1,15 +1,15 @@
-# Making an environment, in a folder of its own: a Python, the packages of the lock, a trial, and
-# the marker at the end.
+# Making an environment, in a folder of its own: a Python, the packages of the lock files, a trial,
+# and the manifest at the end.
 
 install_environment <- function(plan, call) {
   started <- Sys.time()
   write_log(c("", paste("##", format(started), "gym", utils::packageVersion("gym"), plan$how)))
   folder <- make_folder(call)
-  whole <- FALSE
-  on.exit(leave_folder(folder, whole))
-  plan <- take_bundled_uv(plan, call)
+  complete <- FALSE
+  on.exit(end_folder(folder, complete))
+  plan <- copy_bundled_uv(plan, call)
   cli::cli_inform(c(i = "Installing {describe_plan(plan)}: {describe_download(plan)}."))
-  uv <- if (plan$how == "download") bring_uv(call) else if (plan$how == "uv") plan$tool
+  uv <- if (plan$how == "download") install_uv(call) else if (plan$how == "uv") plan$tool
   make_environment(folder, uv, plan, call)
   install_packages(folder, uv, plan, call)
   python <- environment_python(folder)
@@ -17,8 +17,8 @@ install_environment <- function(plan, call) {
   if (failed(trial)) {
     abort_tool("The packages are installed, but the server cannot be run with them", trial, call)
   }
-  write_marker(folder, plan$extras, call)
-  whole <- TRUE
+  write_manifest(folder, plan$extras, call)
+  complete <- TRUE
   remove_other_folders(keep = folder)
   seconds <- as.numeric(difftime(Sys.time(), started, units = "secs"))
   cli::cli_inform(c(v = "Installed in {ceiling(seconds)} s, in {.path {folder}}."))
@@ -31,38 +31,38 @@ make_environment <- function(folder, uv, plan, call) {
   }
   if (is.null(plan$base_python)) {
     output <- run_tool(
-      uv, c("venv", "--managed-python", "--python", managed_python_version, venv_of(folder)),
+      uv, c("venv", "--managed-python", "--python", managed_python_version, venv_folder(folder)),
       env = c(managed_python_place(), bundled_python_place(plan$bundle))
     )
     if (!failed(output)) {
       return(invisible())
     }
     plan$base_python <- other_than_managed(plan, output, call)
-    unlink(venv_of(folder), recursive = TRUE)
+    unlink(venv_folder(folder), recursive = TRUE)
   }
-  # Its version, and not only that of a command that may stand for several.
+  # The path of a Python, as a command such as python3 may stand for several versions.
   make_venv(
     uv, c("venv", "--no-managed-python", "--no-python-downloads", "--python", plan$base_python),
     plan$base_python, folder, call
   )
 }
 
-venv_of <- function(folder) file.path(folder, "venv")
+venv_folder <- function(folder) file.path(folder, "venv")
 
 make_venv <- function(tool, arguments, python, folder, call) {
-  output <- run_tool(tool, c(arguments, venv_of(folder)))
+  output <- run_tool(tool, c(arguments, venv_folder(folder)))
   if (failed(output)) {
     abort_tool(paste("No environment could be made with", python), output, call)
   }
 }
 
-# Many networks refuse the place where uv gets its Pythons.
+# Another Python than the one that uv installs: many networks block the place where uv gets its own.
 other_than_managed <- function(plan, output, call) {
   versions <- plan$bundle$python %||% lock_pythons
   python <- find_base_python(with_venv = FALSE, versions = versions)
   if (is.null(python)) {
     abort_tool(
-      paste0("uv could not bring a Python, and there is no Python ",
+      paste0("uv could not install a Python, and there is no Python ",
              paste(range(versions), collapse = " to "), " on this machine"),
       output, call,
       more = c(
@@ -72,20 +72,21 @@ other_than_managed <- function(plan, output, call) {
     )
   }
   cli::cli_inform(c(
-    i = "uv could not bring a Python of its own; {.path {python}} serves as well.",
-    " " = "Why is in {.path {install_log()}}."
+    i = "uv could not install a Python of its own; {.path {python}} serves as well.",
+    " " = "The reason is in {.path {install_log()}}."
   ))
   python
 }
 
-# Beside the environments, so that it goes when they go, and on Windows does not roam.
+# uv's Pythons lie beside the environments, so that they are removed together, and on Windows not in
+# a roaming profile.
 managed_python_place <- function() {
   place <- Sys.getenv("UV_PYTHON_INSTALL_DIR")
-  c(UV_PYTHON_INSTALL_DIR = if (nzchar(place)) place else managed_python_folder(), only_there)
+  c(UV_PYTHON_INSTALL_DIR = if (nzchar(place)) place else managed_python_folder(), not_registered)
 }
 
-# No command on the PATH, no entry in the registry.
-only_there <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0")
+# uv puts no command on the PATH and makes no entry in the registry.
+not_registered <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0")
 
 bundled_python_place <- function(bundle) {
   if (!is.null(bundle)) {
@@ -115,8 +116,8 @@ install_packages <- function(folder, uv, plan, call) {
   }
 }
 
-# Import the server as it will be run, and look for what the extras bring. An exit status of 0
-# alone says little: that of an empty file is 0, too.
+# Imports the server as it will be run, and looks for the extras' modules. The exit status alone
+# does not suffice: a Python that is an empty file has the exit status 0, too.
 try_environment <- function(python, extras) {
   modules <- c(
     box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"

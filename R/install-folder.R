@@ -1,17 +1,17 @@
-# Where the server's Python environments lie. Each installation makes a folder of its own, and
-# nothing that was installed is changed afterwards: a server that another session runs loses
-# nothing, and an interrupted installation leaves what was there before.
+# Where the server's Python environments lie. Each installation makes a folder of its own, and no
+# environment is changed after its installation: servers of other sessions keep running, and an
+# interrupted installation leaves the environment that was there before.
 #
 #   <cache>/gym/<lock's hash>-<number>/venv         the environment
-#                                     /installed    the marker, written last: what is in it
-#                                     /used-by/PID  the R sessions that use it or are making it
+#                                     /installed    the manifest, written last: what is in it
+#                                     /used-by/PID  a file for each R session that uses or makes it
 
 install_root <- function() cache_of("gym")
 
 cache_of <- function(package) absolute_path(tools::R_user_dir(package, "cache"))
 
-# Tools run elsewhere and take "~" literally. normalizePath() would say another path once it
-# exists, where a folder above is a link.
+# Tools are run in another working directory and do not expand "~". normalizePath() would return
+# another path after the folder was made, if a folder above it is a link.
 absolute_path <- function(path) {
   path <- path.expand(path)
   if (is_windows()) {
@@ -25,11 +25,11 @@ install_folders <- function() {
   folders[order(folder_number(folders), decreasing = TRUE)]
 }
 
-# Of what could be renamed, but not deleted yet.
-given_up_end <- "-old"
+# Marks folders that could be renamed, but not deleted yet.
+renamed_suffix <- "-old"
 
-given_up_folders <- function() {
-  pattern <- paste0("^[0-9a-f]{12}-[0-9]+", given_up_end, "$")
+renamed_folders <- function() {
+  pattern <- paste0("^[0-9a-f]{12}-[0-9]+", renamed_suffix, "$")
   list.files(install_root(), pattern, full.names = TRUE)
 }
 
@@ -40,7 +40,7 @@ next_folder <- function() {
   file.path(install_root(), paste0(lock_hash(), "-", number))
 }
 
-# A folder that no other session takes, should it make one at the same time.
+# Makes a folder that no other session uses, should it make one at the same time.
 make_folder <- function(call) {
   repeat {
     folder <- next_folder()
@@ -65,10 +65,11 @@ abort_folder <- function(folder, call) {
   )
 }
 
-# At the end: what is not whole goes, and the mark that this session made.
-leave_folder <- function(folder, whole) {
+# At the end of an installation: removes the file that names this session as the folder's user, and
+# the folder itself if it is incomplete.
+end_folder <- function(folder, complete) {
   unlink(file.path(folder, "used-by", as.character(Sys.getpid())))
-  if (!whole) {
+  if (!complete) {
     remove_folder(folder)
   }
 }
@@ -79,41 +80,41 @@ environment_python <- function(folder) {
 
 #' Find the installed environment
 #'
-#' An environment is whole when its marker is there, which is written last, and holds what the
-#' marker names: a Python or package that somebody deleted is noticed.
+#' An environment is complete when its manifest is there, which is written last, and when it has the
+#' Python and the packages that the manifest names, as some may have been deleted.
 #' @return `NULL`, or a list: `python`, the path of its Python; `folder`, its folder; `extras`,
 #'   the extras that it holds.
 #' @noRd
 installed_server <- function() {
   hash <- lock_hash()
   for (folder in install_folders()) {
-    marker <- if (startsWith(basename(folder), hash)) read_marker(folder)
-    if (!is.null(marker) && environment_is_whole(folder, marker)) {
+    manifest <- if (startsWith(basename(folder), hash)) read_manifest(folder)
+    if (!is.null(manifest) && environment_is_complete(folder, manifest)) {
       return(list(
-        python = environment_python(folder), folder = folder, extras = marker$extras
+        python = environment_python(folder), folder = folder, extras = manifest$extras
       ))
     }
   }
   NULL
 }
 
-environment_is_whole <- function(folder, marker) {
+environment_is_complete <- function(folder, manifest) {
   file.exists(environment_python(folder)) &&
-    all(marker$packages %in% list.files(file.path(folder, marker$site)))
+    all(manifest$packages %in% list.files(file.path(folder, manifest$site)))
 }
 
-# The extras that were installed last, also for an earlier lock.
+# The extras that were installed last, also by an earlier version of the package.
 earlier_extras <- function() {
   for (folder in install_folders()) {
-    marker <- read_marker(folder)
-    if (!is.null(marker)) {
-      return(intersect(marker$extras, server_extras))
+    manifest <- read_manifest(folder)
+    if (!is.null(manifest)) {
+      return(intersect(manifest$extras, server_extras))
     }
   }
   character()
 }
 
-read_marker <- function(folder) {
+read_manifest <- function(folder) {
   path <- file.path(folder, "installed")
   if (!file.exists(path)) {
     return(NULL)
@@ -126,7 +127,7 @@ read_marker <- function(folder) {
   list(extras = words("Extras"), site = fields[["Site"]], packages = words("Packages"))
 }
 
-write_marker <- function(folder, extras, call) {
+write_manifest <- function(folder, extras, call) {
   site <- if (is_windows()) {
     file.path("venv", "Lib", "site-packages")
   } else {
@@ -142,14 +143,14 @@ write_marker <- function(folder, extras, call) {
     Packages = paste(packages, collapse = " "),
     End = "yes"
   )
-  # Whole at once, or not at all.
+  # Renamed when it is complete, so that no other session reads a part of it.
   path <- file.path(folder, "installed")
   part <- paste0(path, "-")
   try(suppressWarnings({
     writeLines(paste0(names(fields), ": ", fields), part)
     file.rename(part, path)
   }), silent = TRUE)
-  if (is.null(read_marker(folder))) {
+  if (is.null(read_manifest(folder))) {
     abort_install(
       c(paste0("The file ", path, " cannot be written."),
         i = "Is the disk full? `gym_server_install()` begins anew."),
@@ -158,13 +159,13 @@ write_marker <- function(folder, extras, call) {
   }
 }
 
-# Note that this session uses a folder.
+# Writes a file by which other sessions know that this one uses a folder.
 use_folder <- function(folder) {
-  marks <- file.path(folder, "used-by")
-  dir.create(marks, showWarnings = FALSE)
-  # Another user's environment needs no mark, and a full disk has worse troubles.
+  users <- file.path(folder, "used-by")
+  dir.create(users, showWarnings = FALSE)
+  # It is not needed where it cannot be written: in another user's environment, on a full disk.
   try(suppressWarnings(
-    writeLines(Sys.info()[["nodename"]], file.path(marks, as.character(Sys.getpid())))
+    writeLines(Sys.info()[["nodename"]], file.path(users, as.character(Sys.getpid())))
   ), silent = TRUE)
 }
 
@@ -181,11 +182,11 @@ is_installed_python <- function(python) {
 
 folder_of <- function(python) dirname(dirname(dirname(python)))
 
-# Remove all folders but one, as far as no session uses them: the rest is for the next time.
+# Removes all folders but one and those that a session uses, which a later installation removes.
 remove_other_folders <- function(keep) {
-  unlink(given_up_folders(), recursive = TRUE, force = TRUE)
+  unlink(renamed_folders(), recursive = TRUE, force = TRUE)
   for (folder in setdiff(install_folders(), keep)) {
-    # From here on nobody takes it for an environment.
+    # Without its manifest no session starts a server from it.
     unlink(file.path(folder, "installed"))
     if (!is_used(folder)) {
       remove_folder(folder)
@@ -196,30 +197,31 @@ remove_other_folders <- function(keep) {
 remove_folder <- function(folder) {
   if (is_windows()) {
     # Fails while a file in it is in use; deleting would leave half of it.
-    given_up <- paste0(folder, given_up_end)
-    unlink(given_up, recursive = TRUE, force = TRUE)
-    if (!suppressWarnings(file.rename(folder, given_up))) {
+    renamed <- paste0(folder, renamed_suffix)
+    unlink(renamed, recursive = TRUE, force = TRUE)
+    if (!suppressWarnings(file.rename(folder, renamed))) {
       return(invisible())
     }
-    folder <- given_up
+    folder <- renamed
   }
   unlink(folder, recursive = TRUE, force = TRUE)
 }
 
 is_used <- function(folder) {
-  marks <- list.files(file.path(folder, "used-by"), full.names = TRUE)
-  any(vapply(marks, mark_holds, NA))
+  files <- list.files(file.path(folder, "used-by"), full.names = TRUE)
+  any(vapply(files, names_live_session, NA))
 }
 
-mark_holds <- function(mark) {
-  node <- tryCatch(readLines(mark, n = 1L), error = function(cnd) "", warning = function(cnd) "")
+# Whether a file in the folder used-by is that of a session that still uses the environment.
+names_live_session <- function(file) {
+  node <- tryCatch(readLines(file, n = 1L), error = function(cnd) "", warning = function(cnd) "")
   if (!identical(node, Sys.info()[["nodename"]])) {
-    # Of another machine nothing is known: a home on a network.
-    return(difftime(Sys.time(), file.mtime(mark), units = "days") < 30)
+    # Another machine, with the same home on a network, cannot be asked.
+    return(difftime(Sys.time(), file.mtime(file), units = "days") < 30)
   }
-  pid <- as.integer(basename(mark))
+  pid <- as.integer(basename(file))
   if (pid == Sys.getpid()) {
-    return(this_session_uses(dirname(dirname(mark))))
+    return(this_session_uses(dirname(dirname(file))))
   }
   process_runs(pid)
 }
@@ -233,7 +235,7 @@ this_session_uses <- function(folder) {
 
 process_runs <- function(pid) {
   if (is_windows()) {
-    # There a signal 0 would end it; renaming its folder tells whether it is in use.
+    # On Windows signal 0 would kill it. There a folder in use cannot be renamed, which is enough.
     return(FALSE)
   }
   tools::pskill(pid, 0L)

@@ -1,4 +1,4 @@
-# What an installation would do.
+# Planning an installation: with which tool, for which Python, how many megabytes.
 
 #' Plan an installation
 #'
@@ -23,11 +23,12 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
   )
 }
 
-# About, for Linux with an Intel processor, of the releases named in R/install-uv.R.
+# Approximate sizes on Linux with an Intel processor: of the Python that uv installs, and of the uv
+# that R/install-uv.R names.
 managed_python_megabytes <- c(download = 35, disk = 110)
 uv_megabytes <- c(download = 20, disk = 40)
 
-# pip itself, and the modules that it compiles.
+# pip itself, and the bytecode that it compiles.
 pip_megabytes <- c(download = 0, disk = 50)
 
 managed_python_version <- "3.12"
@@ -39,8 +40,8 @@ has_managed_python <- function() {
   length(list.files(managed_python_folder(), start)) > 0L
 }
 
-# A Python on this machine that an environment can be made from, NULL when there is none. With
-# uv it need not have venv and pip, which Debian leaves out.
+# Finds a Python on this machine that an environment can be made from; NULL when there is none. If
+# uv makes the environment, the Python needs no venv and pip, which Debian packages separately.
 find_base_python <- function(with_venv, versions = lock_pythons) {
   Find(function(python) {
     about <- probe_python(python)
@@ -48,8 +49,8 @@ find_base_python <- function(with_venv, versions = lock_pythons) {
   }, Filter(Negate(is_installed_python), python_candidates()))
 }
 
-# What a Python is: its version, whether the lock files are for it, and whether it can make
-# environments; NULL for what does not run.
+# Asks a Python for its version, whether the lock files are for it, and whether it can make
+# environments. Returns NULL for a Python that does not run.
 probe_python <- function(python) {
   output <- ask_program(
     python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
@@ -68,7 +69,7 @@ probe_python <- function(python) {
 
 lock_pythons <- c("3.10", "3.11", "3.12", "3.13")
 
-# One that is too old for -I is too old for the server.
+# What probe_python() runs. It is run with -I, which every Python that the server can use knows.
 probe <- paste(
   "import platform, sys",
   "try:",

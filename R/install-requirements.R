@@ -1,5 +1,6 @@
-# What is installed: the lock files that travel with the server, see tools/lock. base.txt holds
-# what the server itself needs, EXTRA.txt what an extra adds.
+# What is installed: the lock files of the server's Python packages, which are part of this package
+# and written by tools/lock. base.txt lists what the server itself needs, EXTRA.txt what an extra
+# adds.
 
 server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video")
 
@@ -11,7 +12,7 @@ lock_files <- function(extras) {
   vapply(c("base", extras), lock_file, "", USE.NAMES = FALSE)
 }
 
-# The same for the same lock, however git or a zip program wrote the ends of its lines.
+# Identifies the lock files. The ends of lines do not count, which git and zip programs may change.
 lock_hash <- function() {
   lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
   substr(hex(openssl::sha256(charToRaw(paste(lines, collapse = "\n")))), 1L, 12L)
@@ -26,7 +27,7 @@ lock_entry <- function(part, key) {
   substring(lines[startsWith(lines, start)][1L], nchar(start) + 1L)
 }
 
-# About how much the packages are, in MB: what is downloaded, and what it takes on the disk.
+# The approximate size of the packages in MB: of the download, and on the disk.
 lock_megabytes <- function(extras) {
   size <- function(key) {
     texts <- vapply(c("base", extras), lock_entry, "", key = key)
@@ -35,7 +36,7 @@ lock_megabytes <- function(extras) {
   c(download = size("download"), disk = size("disk"))
 }
 
-# This system as the lock files and bundles name it.
+# The name of this system in lock files and bundles.
 system_name <- function() {
   info <- Sys.info()
   machine <- tolower(info[["machine"]])

@@ -1,15 +1,16 @@
-# Running uv and pip: what they say goes into a log, and what went wrong is put into words that
-# tell what to do.
+# Running uv and pip: their output goes into a log, and a failure becomes an error that says what to
+# do.
 
 abort_install <- function(message, ..., call = rlang::caller_env()) {
   gym_abort(message, class = "gym_error_install", ..., call = call)
 }
 
-# Nothing of another Python's, and not the libraries that R put in front.
+# The environment variables of a tool: without other Pythons' settings, and without the folders of
+# libraries that R puts in front.
 tool_environment <- function(more = character()) {
   own <- c(
     PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "",
-    # Where the user's own settings have pip install elsewhere.
+    # The user's settings may have pip install elsewhere.
     PIP_USER = "", PIP_TARGET = "", PIP_PREFIX = "", PIP_REQUIRE_VIRTUALENV = "",
     PIP_DISABLE_PIP_VERSION_CHECK = "1", PIP_NO_INPUT = "1", PIP_PROGRESS_BAR = "off",
     UV_NO_PROGRESS = "1", NO_COLOR = "1",
@@ -27,11 +28,11 @@ install_log <- function() file.path(install_root(), "install.log")
 #' @noRd
 run_tool <- function(command, arguments, env = character()) {
   write_log(paste(c(">", command, arguments), collapse = " "))
-  process <- with_own_mark(tryCatch(
+  process <- with_own_tree_id(tryCatch(
     processx::process$new(
       command, arguments,
       stdout = "|", stderr = "2>&1", env = tool_environment(env),
-      # Not the session's: settings of a project there are not meant.
+      # Not the session's working directory, where a project may have settings for uv and pip.
       wd = install_root(), cleanup_tree = TRUE, windows_hide_window = TRUE
     ),
     error = function(cnd) conditionMessage(cnd)
@@ -43,7 +44,7 @@ run_tool <- function(command, arguments, env = character()) {
   # Also when the user interrupts.
   on.exit(if (process$is_alive()) process$kill_tree())
   output <- character()
-  # Tells whoever waits that something is going on.
+  # Shows that something is going on.
   spinner <- if (cli::is_dynamic_tty()) cli::make_spinner()
   on.exit(if (!is.null(spinner)) spinner$finish(), add = TRUE)
   repeat {
@@ -68,20 +69,20 @@ ask_program <- function(command, arguments, timeout = 30, env = NULL) {
 
 failed <- function(output) !identical(attr(output, "status"), 0L)
 
-# On a full disk the installation's own failure tells more than the log's.
+# Errors are ignored: on a full disk the error of the installation itself says more.
 write_log <- function(lines) {
   try(suppressWarnings(cat(paste0(lines, "\n"), file = install_log(), append = TRUE, sep = "")),
       silent = TRUE)
 }
 
 abort_tool <- function(what, output, call, more = NULL) {
-  words <- telling_lines(output)
+  lines <- error_lines(output)
   abort_install(
     c(
       paste0(what, "."),
-      x = if (length(words)) paste(words, collapse = "\n"),
-      bullets(c(install_advice(output), more)),
-      i = paste0("All that was said is in ", install_log(), "."),
+      x = if (length(lines)) paste(lines, collapse = "\n"),
+      rlang::set_names(c(install_advice(output), more), "i"),
+      i = paste0("The full output is in ", install_log(), "."),
       i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
     ),
     output = as.character(output),
@@ -90,7 +91,7 @@ abort_tool <- function(what, output, call, more = NULL) {
 }
 
 # The lines that name an error and what follows them; the last lines where there is none.
-telling_lines <- function(output, n = 6L) {
+error_lines <- function(output, n = 6L) {
   lines <- trimws(output[nzchar(trimws(output))])
   begins <- grep("^error\\b|connection broken by", lines, ignore.case = TRUE)
   if (length(begins)) {
@@ -99,9 +100,8 @@ telling_lines <- function(output, n = 6L) {
   utils::tail(lines, n)
 }
 
-bullets <- function(texts) stats::setNames(texts, rep("i", length(texts)))
-
-# What to do about a failure, by the words of uv, pip and the system. The first that fits.
+# What to do about a failure, which is known by the messages of uv, pip and the system. The first
+# entry of `failures` that fits counts.
 install_advice <- function(output) {
   text <- paste(output, collapse = "\n")
   for (kind in failures) {

@@ -1,13 +1,13 @@
-# Finding uv, <https://docs.astral.sh/uv/>, and bringing it where there is none.
+# Finding uv, <https://docs.astral.sh/uv/>, and downloading it where there is none.
 
 uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 
-# --managed-python came not long before.
+# The oldest version that has --managed-python and was tried.
 least_uv <- "0.7.0"
 
 #' Find uv
-#' @param within Seconds in which all must have been asked, each in its share of them; `NULL`
-#'   gives each the time that a program may take on a busy machine.
+#' @param within Seconds in which all candidates must have answered, each in its share of them;
+#'   `NULL` gives each the time that a program may take on a busy machine.
 #' @return The path of the first that runs and is new enough; `NULL` when there is none.
 #' @noRd
 find_uv <- function(call = rlang::caller_env(), within = NULL) {
@@ -34,12 +34,12 @@ uv_candidates <- function() {
   reticulate <- Sys.getenv("RETICULATE_UV")
   home <- if (is_windows()) Sys.getenv("USERPROFILE") else path.expand("~")
   places <- c(
-    # reticulate takes "managed" for its own.
+    # For reticulate "managed" stands for its own uv.
     if (reticulate != "managed") path.expand(reticulate),
     unname(Sys.which("uv")),
     file.path(home, ".local", "bin", uv_name()),
     file.path(cache_of("reticulate"), "uv", "bin", uv_name()),
-    brought_uv()
+    pinned_uv()
   )
   unique(places[file.exists(places) & !dir.exists(places)])
 }
@@ -50,7 +50,7 @@ uv_works <- function(uv, timeout = 30) {
   startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
-# The release that is brought where there is none, and the SHA-256 of its archives, as published
+# The release that is downloaded where there is no uv, and the SHA-256 of its archives, as published
 # with it and kept by the makers of uv: github.com/astral-sh/setup-uv, in the folder
 # src/download/checksum the file known-checksums.json.
 uv_release <- list(
@@ -89,14 +89,13 @@ uv_target <- function() {
 
 has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 
-# Where the pinned uv is put.
-brought_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
+# Where the downloaded uv is put.
+pinned_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Download the pinned uv, unless that was done before and it still runs. Nothing of the archive
-# is unpacked before its checksum is known to be right. UV_DOWNLOAD_URL is what uv's own
-# installer takes.
-bring_uv <- function(call) {
-  uv <- brought_uv()
+# Downloads uv, unless that was done before and it still runs. The archive is unpacked only when its
+# checksum is right. UV_DOWNLOAD_URL is a variable of uv's own installer.
+install_uv <- function(call) {
+  uv <- pinned_uv()
   if (file.exists(uv) && uv_works(uv)) {
     return(uv)
   }
@@ -130,7 +129,7 @@ download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
   handle <- curl::new_handle(
     failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
-    # Bytes in a second, and for how many seconds: one that stands still would never end.
+    # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
     low_speed_limit = 100, low_speed_time = 60,
     noprogress = FALSE, progressfunction = function(down, up) {
       touch_install_lock()
@@ -142,7 +141,7 @@ download_uv <- function(url, archive, call) {
     curl::handle_setopt(handle, cainfo = certificates)
   }
   tryCatch(
-    # Unlike curl_download() it leaves the handle's progress alone.
+    # Unlike curl_download() it does not replace the handle's progress function.
     curl::curl_fetch_disk(url, archive, handle = handle),
     error = function(cnd) {
       write_log(conditionMessage(cnd))
@@ -157,7 +156,7 @@ download_uv <- function(url, archive, call) {
   )
 }
 
-# Opened as "rb", as R would unpack it otherwise and tell the hash of what is in it.
+# The file is opened as "rb": otherwise R would decompress it, and hash its content.
 file_sha256 <- function(path) {
   bytes <- file(path, "rb")
   on.exit(close(bytes))

@@ -6,7 +6,7 @@
 #'
 #' [uv](https://docs.astral.sh/uv/) does the work where it is found: the program that the
 #' environment variable `GYM_UV` or `RETICULATE_UV` names, one on the `PATH`, in `~/.local/bin`
-#' or the one that reticulate brought. It also brings a Python of its own; where the network
+#' or the one that reticulate installed. It also installs a Python of its own; where the network
 #' does not let that through, a Python 3.10 to 3.13 on the machine is taken. Without uv such a
 #' Python's `venv` and pip do it, and without both uv is downloaded first, a release that this
 #' package names, checked by its hash.
@@ -27,7 +27,7 @@
 #' @param ... Must be empty.
 #' @param offline A folder that [gym_server_bundle()] filled on another machine, a string: the
 #'   network is not used. `NULL`, the default, installs from the network.
-#' @param ask Whether to ask first, telling what, how many megabytes and where; by default
+#' @param ask Whether to ask first, saying what, how many megabytes and where; by default
 #'   `TRUE` in an interactive session. In a script the call is consent.
 #' @return The path of the environment's Python, a string, invisibly; `NULL`, invisibly, when
 #'   the answer was no.
@@ -41,13 +41,13 @@
 gym_server_install <- function(extras = character(), ..., offline = NULL,
                                ask = rlang::is_interactive()) {
   check_extras(extras)
-  check_no_dots(...)
+  check_dots_empty(...)
   check_string(offline, allow_null = TRUE)
   check_flag(ask)
   call <- rlang::current_env()
   check_named_python(call)
-  wanted <- wanted_extras(extras)
-  # A bundle that does not fit is said to be one also where it is not needed.
+  wanted <- server_extras[server_extras %in% c(extras, earlier_extras())]
+  # A bundle that does not fit is an error also when it is not needed.
   plan <- if (!is.null(offline)) bundle_plan(offline, wanted, call)
   there <- installed_server()
   if (has_all(there, wanted)) {
@@ -62,7 +62,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
-  python <- telling_of_interrupts(with_install_lock({
+  python <- with_interrupt_message(with_install_lock({
     there <- installed_server()
     if (has_all(there, wanted)) {
       cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
@@ -71,28 +71,14 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
       install_environment(plan, call)
     }
   }))
-  tell_what_comes_first(python)
+  inform_of_precedence(python)
   invisible(python)
 }
 
-check_no_dots <- function(..., call = rlang::caller_env()) {
-  if (...length()) {
-    gym_abort(
-      "`...` must be empty: `offline` and `ask` need their names.",
-      class = "gym_error_argument",
-      call = call
-    )
-  }
-}
-
-telling_of_interrupts <- function(code) {
+with_interrupt_message <- function(code) {
   withCallingHandlers(code, interrupt = function(cnd) {
-    cli::cli_inform(c("!" = "Interrupted: what was begun is taken away again."))
+    cli::cli_inform(c("!" = "Interrupted: what was begun is removed again."))
   })
-}
-
-wanted_extras <- function(extras) {
-  server_extras[server_extras %in% c(extras, earlier_extras())]
 }
 
 # Whether an environment has the extras, and its server can really be imported.
@@ -107,7 +93,7 @@ confirm_install <- function(plan, call = rlang::caller_env()) {
     sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
     paste0("Where: ", install_root())
   )
-  # No by default: an empty line of a pasted script must not bring megabytes.
+  # No by default: an empty line of a pasted script must not start a download.
   ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = FALSE, call = call)
 }
 
@@ -122,7 +108,7 @@ describe_plan <- function(plan) {
   python <- if (!is.null(plan$base_python)) {
     paste(" for", plan$base_python)
   } else if (plan$how != "python") {
-    paste(" and bringing Python", managed_python_version)
+    paste(" and installing Python", managed_python_version)
   }
   paste0(
     describe_packages(plan$extras), ", ",
@@ -141,8 +127,8 @@ describe_download <- function(plan) {
   sprintf("about %.0f MB to download", plan$megabytes[["download"]])
 }
 
-# GYM_PYTHON comes before what is installed: with one that cannot run the server, the best
-# installation would be of no use.
+# The Python that GYM_PYTHON names is used before an installed one: if it cannot run the server, an
+# installation would not help.
 check_named_python <- function(call) {
   named <- Sys.getenv("GYM_PYTHON")
   if (!nzchar(named)) {
@@ -164,8 +150,8 @@ check_named_python <- function(call) {
   )
 }
 
-# What would keep this session from using what was installed.
-tell_what_comes_first <- function(python) {
+# Says what keeps this session from using what was installed.
+inform_of_precedence <- function(python) {
   named <- Sys.getenv("GYM_PYTHON")
   if (nzchar(named) && !identical(path.expand(named), python)) {
     cli::cli_inform(c(

@@ -27,7 +27,7 @@ with_vector_env <- function(env, episodes, client, use, frames = FALSE, make = m
   finished <- FALSE
   # When playing was interrupted because the server hangs, closing must not wait for it again.
   on.exit(
-    if (finished) close_or_warn(env) else close_without_waiting(env$client, env$instance_id)
+    if (finished) close_or_warn(env) else close_unused(env$client, env$instance_id)
   )
   value <- use(vector_env_of(env, batch_size, call, frames))
   finished <- TRUE

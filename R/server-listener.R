@@ -1,13 +1,13 @@
-# Who listens at an address: nobody, a Gym server, or another program.
+# What listens at an address: nothing, a Gym server, or another program.
 
-#' Ask an address who listens there
+#' Find out what listens at an address
 #'
-#' By a route that every Gym server has, the classic one too.
+#' Asks for a route that every Gym server has, a classic one too.
 #' @param timeout How long the answer may take, in seconds. A server that takes connections
 #'   but does not answer in time listens nevertheless.
-#' @param token For a server that is known to be ours; a stranger is shown none.
+#' @param token The token of a server that is known to be ours; any other program is sent none.
 #' @return A list of `listens`, `is_gym` and `asks_token` (it wants another token, or one; all
-#'   three are logical), `status` (of the answer), `name` (what the program calls
+#'   three are logical), `status` (of the answer), `name` (by which the program identifies
 #'   itself, a string or `NULL`), `instances` (how many a Gym server has) and `problem` (why
 #'   there is no answer, a string or `NULL`).
 #' @noRd
@@ -35,8 +35,8 @@ probe_server <- function(base, timeout, token = NULL) {
   )
 }
 
-#' Say who has the port that a server was to take
-#' @return A sentence, `NULL` when nobody seems to.
+#' Say what has the port that a server was to take
+#' @return A sentence, `NULL` when nothing seems to listen there.
 #' @noRd
 port_holder <- function(base) {
   holder <- probe_server(base, timeout = 2)

@@ -1,48 +1,48 @@
-# The server as a process of this session's: its start, its first words, its end.
+# The server as a process of this session's: its start, its first lines of output, its end.
 
-# As `-m gym_server`, but without the working directory among the places of modules,
-# where a file named random.py would take the place of Python's own.
+# Runs the server as `-m gym_server` does, but without the working directory in Python's search
+# path, where a file named random.py would replace Python's own module.
 run_server <- paste0(
   "import sys; sys.path[:] = [place for place in sys.path if place]; ",
   "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
 )
 
-# Start the server with one Python. Returns what is known of the running server,
-# or a string that says why this Python cannot run it.
+# Starts the server with one Python. Returns a description of the running server, or a string that
+# says why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- tempfile("gym-server-", fileext = ".log")
   use_python(python)
-  process <- with_own_mark(tryCatch(
+  process <- with_own_tree_id(tryCatch(
     processx::process$new(
       python, arguments,
       stdin = "|", stdout = "|", stderr = log,
       env = server_environment(),
-      # The closing of its standard input ends the server, which also lets it
-      # close its environments and cannot be done by a forked child.
+      # processx would kill the server, and a forked child would do so, too. Instead the session
+      # closes the server's standard input, which has the server close its environments and end.
       cleanup = FALSE, windows_hide_window = TRUE
     ),
     error = function(cnd) NULL
   ))
   if (is.null(process)) {
-    return(not_run_words(python))
+    return(not_started_reason(python))
   }
   url <- await_start(process, log, timeout, call)
   if (!is.null(url)) {
     return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
   }
-  words <- log_tail(log)
-  own <- grep(server_words, words, value = TRUE)
+  lines <- log_tail(log)
+  own <- grep(server_line_start, lines, value = TRUE)
   if (length(own)) {
     in_r <- sub("--port 0 takes", "`gym_server_start()` without a port takes", own, fixed = TRUE)
     abort_server_start(
       "The server ended before it took connections.", in_r, call, port_hint(own[[1L]])
     )
   }
-  refusal_words(words)
+  refusal_reason(lines)
 }
 
-# Why nothing at all came of a Python. A bare name is looked for on the PATH.
-not_run_words <- function(python) {
+# Why a Python could not be started at all. A bare name is looked for on the PATH.
+not_started_reason <- function(python) {
   if (basename(python) != python && !file.exists(python)) {
     "there is no such file"
   } else {
@@ -51,7 +51,7 @@ not_run_words <- function(python) {
 }
 
 # Why a Python cannot run the server, from the lines that it wrote.
-refusal_words <- function(lines) {
+refusal_reason <- function(lines) {
   lines <- lines[nzchar(lines)]
   if (!length(lines)) {
     return("it ended without a word")
@@ -59,13 +59,13 @@ refusal_words <- function(lines) {
   sub("^gym_server cannot run on this Python [(].*[)]: ", "", utils::tail(lines, 1L))
 }
 
-# How the server itself begins when it cannot start as it was asked to; whatever else
-# is said comes from a Python that cannot run it, or from what only looks like one.
-server_words <- "^(gym_server:|gym-http-server: error)"
+# How a line of the server itself begins when it cannot start as it was asked to. Other lines come
+# from a Python that cannot run it, or from a program that only has the name of one.
+server_line_start <- "^(gym_server:|gym-http-server: error)"
 
-# Who has the port that the server could not have, when that was why it ended.
-port_hint <- function(words) {
-  parts <- regmatches(words, regexec("port ([0-9]+) on ([^ ]+) cannot be used", words))[[1L]]
+# What has the port that the server wanted, when the server ended for that reason.
+port_hint <- function(line) {
+  parts <- regmatches(line, regexec("port ([0-9]+) on ([^ ]+) cannot be used", line))[[1L]]
   if (length(parts)) {
     host <- sub("^0[.]0[.]0[.]0$", "127.0.0.1", parts[[3L]])
     port_holder(paste0("http://", if (grepl(":", host)) paste0("[", host, "]") else host, ":",
@@ -85,8 +85,8 @@ server_environment <- function() {
   )
 }
 
-# What LD_LIBRARY_PATH was before R's start put its own folders in front, where Python
-# would find the libraries of another Python.
+# LD_LIBRARY_PATH as it was before R put its own folders in front, in which Python would find the
+# libraries of another Python.
 own_library_path <- function() {
   path <- Sys.getenv("LD_LIBRARY_PATH")
   script <- file.path(R.home("etc"), "ldpaths")
@@ -97,15 +97,15 @@ own_library_path <- function() {
     "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
     env = c("current", LD_LIBRARY_PATH = "")
   )$stdout
-  # More than once where R has started R.
+  # They stand there more than once where R was started by R.
   while (nzchar(added) && startsWith(path, added)) {
     path <- sub("^:", "", substring(path, nchar(added) + 1L))
   }
   c(LD_LIBRARY_PATH = path)
 }
 
-# Wait for the line by which the server says that it takes connections. Returns
-# its address, NULL when the process ended first.
+# Waits for the line by which the server reports that it takes connections. Returns its address,
+# NULL when the process ended first.
 await_start <- function(process, log, timeout, call) {
   deadline <- Sys.time() + timeout
   repeat {
@@ -121,7 +121,7 @@ await_start <- function(process, log, timeout, call) {
     lines <- process$read_output_lines()
     address <- grep("^Server starting at: ", lines, value = TRUE)
     if (length(address)) {
-      # A server that listens on all addresses is reached by this machine's own.
+      # A server that listens on all addresses is reached by the loopback address.
       address <- sub("//0.0.0.0:", "//127.0.0.1:", address[1L], fixed = TRUE)
       return(sub("^Server starting at: ", "", address))
     }
@@ -148,16 +148,16 @@ abort_server_start <- function(message, log_lines, call, hint = NULL) {
   )
 }
 
-stop_server <- function(server, patience = 15) {
+stop_server <- function(server, timeout = 15) {
   process <- server$process
-  unregister_created_on(server$url)
+  forget_instances_of(server$url)
   if (!process$is_alive()) {
     return(invisible())
   }
   close_server_input(server)
   await_end(process, 1)
   terminate_server(server)
-  await_end(process, patience)
+  await_end(process, timeout)
   if (process$is_alive()) {
     process$kill()
   }
@@ -165,12 +165,12 @@ stop_server <- function(server, patience = 15) {
 
 close_server_input <- function(server) {
   input <- server$process$get_input_connection()
-  # A stop that was interrupted has closed it.
+  # It is closed already when an earlier stop was interrupted.
   tryCatch(close(input), error = function(cnd) NULL)
 }
 
-# A forked child that still lives holds the server's standard input open, too; one that was
-# stopped hears of nothing until it goes on.
+# Asks the server to end by a signal, as its standard input stays open while a forked child of this
+# session lives. A server that was stopped by SIGSTOP receives SIGTERM when it continues.
 terminate_server <- function(server) {
   if (server$process$is_alive() && !is_windows()) {
     server$process$signal(tools::SIGTERM)

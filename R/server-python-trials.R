@@ -1,8 +1,8 @@
-# Whether Pythons can run the server, found out without starting it.
+# Whether Pythons can run the server, which is found out without starting it.
 
 #' Try Pythons, all at once
 #'
-#' Each imports all of the server and says its version.
+#' Each imports all of the server and prints its version.
 #' @param pythons Paths of Pythons, a character vector.
 #' @param timeout How long all of them may take together, in seconds.
 #' @return A data frame with one row for each: `python`, `version` (a string or `NA`), `runs`
@@ -21,14 +21,14 @@ try_pythons <- function(pythons, timeout = 6) {
   )
 }
 
-say_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); "
+print_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); "
 
-# Returns the running process and its files, NULL for what cannot be run.
+# Returns the running process and its output files, NULL when it could not be started.
 begin_trial <- function(python) {
   output <- tempfile("gym-python-", fileext = c(".out", ".err"))
-  process <- with_own_mark(tryCatch(
+  process <- with_own_tree_id(tryCatch(
     processx::process$new(
-      python, c("-c", paste0(say_version, run_server), "--version"),
+      python, c("-c", paste0(print_version, run_server), "--version"),
       stdout = output[[1L]], stderr = output[[2L]], env = server_environment(),
       cleanup_tree = TRUE, windows_hide_window = TRUE
     ),
@@ -42,18 +42,18 @@ end_trial <- function(python, trial, deadline) {
     list(version = version, runs = runs, reason = reason)
   }
   if (is.null(trial)) {
-    return(outcome(reason = not_run_words(python)))
+    return(outcome(reason = not_started_reason(python)))
   }
   on.exit(unlink(trial$output))
   await_end(trial$process, as.numeric(deadline - Sys.time(), units = "secs"))
-  said <- lapply(trial$output, log_tail)
-  version <- grep("^[0-9.]+$", said[[1L]], value = TRUE)[1L]
+  lines <- lapply(trial$output, log_tail)
+  version <- grep("^[0-9.]+$", lines[[1L]], value = TRUE)[1L]
   if (trial$process$is_alive()) {
     trial$process$kill_tree()
     outcome(version, NA, "it did not answer in time")
   } else if (identical(trial$process$get_exit_status(), 0L)) {
     outcome(version, TRUE)
   } else {
-    outcome(version, FALSE, refusal_words(said[[2L]]))
+    outcome(version, FALSE, refusal_reason(lines[[2L]]))
   }
 }

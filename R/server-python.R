@@ -1,4 +1,4 @@
-# Which Python runs the server: where it is looked for, and what to say when there is none.
+# Which Python runs the server: where it is looked for, and the error when there is none.
 
 #' Say that no Python can run the server
 #' @param refusals Why each Python that was tried cannot, strings named by its path.
@@ -6,15 +6,19 @@
 abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
   named <- named_python(python)
   gym_abort(
-    if (is.null(named)) no_python_words(refusals) else named_python_words(named, refusals, python),
+    if (is.null(named)) {
+      no_python_message(refusals)
+    } else {
+      named_python_message(named, refusals, python)
+    },
     class = "gym_error_server_start",
     refusals = refusals,
     call = call
   )
 }
 
-# Read by people who need not know what Python is; the rest is in gym_sitrep().
-no_python_words <- function(refusals) {
+# The message for users who need not know what Python is; details are in gym_sitrep().
+no_python_message <- function(refusals) {
   own <- refusals[names(refusals) %in% installed_server()$python]
   if (length(own)) {
     return(c(
@@ -32,8 +36,8 @@ no_python_words <- function(refusals) {
   )
 }
 
-# Read by people who chose a Python.
-named_python_words <- function(named, refusals, python) {
+# The message for users who chose a Python.
+named_python_message <- function(named, refusals, python) {
   by <- if (is.null(python)) "GYM_PYTHON" else "`python`"
   unset <- if (is.null(python)) " (`Sys.unsetenv(\"GYM_PYTHON\")`)"
   c(
@@ -52,7 +56,7 @@ named_python_words <- function(named, refusals, python) {
 
 quote_for_terminal <- function(path) shQuote(path, if (is_windows()) "cmd" else "sh")
 
-# The Python that somebody chose, NULL when nobody did.
+# The Python that the user chose, NULL when there was no choice.
 named_python <- function(python) {
   named <- python %||% Sys.getenv("GYM_PYTHON")
   if (nzchar(named)) path.expand(named)
@@ -68,7 +72,7 @@ python_candidates <- function(python = NULL) {
   folder <- if (is_windows()) c("Scripts", ".") else "bin"
   places <- file.path(rep(active[nzchar(active)], each = length(folder)), folder)
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
-  # Windows' WindowsApps holds a stand-in that opens the Store.
+  # In the folder WindowsApps lies a program named python that opens the Store.
   path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
   if (lacks_developer_tools()) {
     path <- setdiff(path, "/usr/bin")
@@ -84,7 +88,7 @@ pythons_in <- function(places) {
   found[file.access(found, 1L) == 0L]
 }
 
-# On macOS /usr/bin/python3 is then a stand-in that opens a dialog.
+# Without the developer tools /usr/bin/python3 of macOS only opens a dialog.
 lacks_developer_tools <- function() {
   Sys.info()[["sysname"]] == "Darwin" &&
     !identical(run_quietly("/usr/bin/xcode-select", "-p", timeout = 5)$status, 0L)

@@ -1,5 +1,4 @@
-# What gym_sitrep() finds, topic by topic. Each function returns rows as finding() makes
-# them.
+# What gym_sitrep() finds, topic by topic. Each function returns rows as finding() makes them.
 
 sitrep_versions <- function() {
   packages <- c("httr", "curl", "jsonlite", "processx")
@@ -12,7 +11,7 @@ sitrep_versions <- function() {
   )
 }
 
-# What only some functions need.
+# Packages that only some functions need.
 suggested_packages <- c(
   ggplot2 = "autoplot()", magick = "animate()", png = "frames of rollouts",
   sigmoid = "activations such as ReLU", bit64 = "integers beyond 2^53"
@@ -31,7 +30,7 @@ sitrep_suggested <- function(packages = suggested_packages) {
   )
 }
 
-# The report is for other people's eyes.
+# Secrets are left out, as the report is meant to be shown to others.
 sitrep_variables <- function(variables) {
   texts <- if (length(variables)) {
     values <- ifelse(names(variables) == token_variable, "<token>", without_password(variables))
@@ -40,7 +39,7 @@ sitrep_variables <- function(variables) {
   finding("R", "variables", texts %||% "none of the package's is set")
 }
 
-# `needed`: whether the session cannot do without.
+# `needed`: whether nothing else can run the server, so that a missing environment is wrong.
 sitrep_environment <- function(needed) {
   server <- installed_server()
   folders <- install_folders()
@@ -64,7 +63,7 @@ sitrep_environment <- function(needed) {
 
 folder_megabytes <- function(folder) {
   files <- list.files(folder, all.files = TRUE, full.names = TRUE, recursive = TRUE)
-  # lib64 is a link to lib, and Python itself may be one to another.
+  # lib64 is a link to lib, and Python itself may be a link to another.
   files <- files[!grepl("/lib64/", files, fixed = TRUE) & Sys.readlink(files) %in% c("", NA)]
   round(sum(file.size(files), na.rm = TRUE) / 1e6)
 }
@@ -125,7 +124,7 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
   ))
 }
 
-# The servers that this session started, without those that were stopped in order.
+# The servers that this session started, without those that it stopped.
 sitrep_own_servers <- function() {
   servers <- the_session$servers
   servers <- servers[!duplicated(vapply(servers, function(server) server$pid, 0L))]
@@ -161,16 +160,16 @@ sitrep_named_server <- function(url) {
   sitrep_server(url, what, if (is.null(place)) unset else start_call(place))
 }
 
-# One server, asked what it is.
-sitrep_server <- function(url, what, mend) {
+# Asks one server what it is.
+sitrep_server <- function(url, what, fix) {
   token <- known_token(url)
   probe <- probe_server(url, timeout = 2, token)
   if (!probe$listens) {
-    return(finding("servers", what, "does not answer", "wrong", mend))
+    return(finding("servers", what, "does not answer", "wrong", fix))
   }
   if (!is.null(probe$problem)) {
     return(finding("servers", what, "takes connections but gave no answer in 2 seconds", "wrong",
-                   mend))
+                   fix))
   }
   if (isTRUE(probe$status %in% proxy_statuses)) {
     return(finding("servers", what, paste0(

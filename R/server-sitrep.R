@@ -3,7 +3,7 @@
 #' Looks at everything that the package needs to play: R and packages, the installed Python
 #' environment, the Pythons that would be tried, servers, and the environment variables that
 #' the package reads. Prints it on one screen, marks what is wrong and names the call that
-#' mends it. It changes nothing and asks nothing, and takes a few seconds at most. For a bug
+#' fixes it. It changes nothing and asks nothing, and takes a few seconds at most. For a bug
 #' report it can stand in an R Markdown document.
 #'
 #' @return Invisibly, what was found: a data frame of class `gym_sitrep` with one row for
@@ -13,7 +13,7 @@
 #'     \item{what}{What was looked at, a string.}
 #'     \item{finding}{What was found, a string.}
 #'     \item{state}{`"ok"`; `"note"` for what may well be so; `"wrong"`.}
-#'     \item{mend}{The call that helps, a string, or `NA`.}
+#'     \item{fix}{The call that helps, a string, or `NA`.}
 #'   }
 #'   The token and passwords in addresses are left out.
 #' @seealso [gym_server_install()], [gym_server_log()]
@@ -45,12 +45,11 @@ sitrep_findings <- function() {
   )
 }
 
-finding <- function(topic, what, finding, state = "ok", mend = NA_character_) {
-  data.frame(topic, what, finding, state, mend)
+finding <- function(topic, what, finding, state = "ok", fix = NA_character_) {
+  data.frame(topic, what, finding, state, fix)
 }
 
-# Whoever asks how things stand has trouble already: what goes wrong in finding out is a
-# finding.
+# Who calls gym_sitrep() has a problem already: an error in finding something out becomes a finding.
 attempt_rows <- function(topic, what, rows) {
   tryCatch(rows, error = function(cnd) {
     finding(topic, what, paste("could not be found out:", conditionMessage(cnd)), "note")
@@ -77,8 +76,8 @@ print.gym_sitrep <- function(x, ...) {
 }
 
 sitrep_lines <- function(rows) {
-  mend <- ifelse(is.na(rows$mend), "", paste0(" ", cli::symbol$arrow_right, " ", rows$mend))
-  text <- home_as_tilde(shown_text(paste0(rows$what, ": ", rows$finding, mend)))
+  fix <- ifelse(is.na(rows$fix), "", paste0(" ", cli::symbol$arrow_right, " ", rows$fix))
+  text <- home_as_tilde(shown_text(paste0(rows$what, ": ", rows$finding, fix)))
   paste(vapply(rows$state, sitrep_mark, ""), gsub("[[:space:]]*\n[[:space:]]*", " ", text))
 }
 

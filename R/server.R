@@ -1,7 +1,7 @@
 # Local servers: started by this session, ended with it. The server ends when its
 # standard input closes, which happens however the R session ends.
 
-# In a forked child the parent's server is as good as its own.
+# A forked child uses its parent's server, of whose process it cannot ask whether it runs.
 is_running <- function(base) {
   server <- the_session$servers[[base]]
   !is.null(server) && (Sys.getpid() != the_session$pid || server$process$is_alive())
@@ -16,13 +16,13 @@ is_running <- function(base) {
 #' Python is looked for in `python`; in the environment variable `GYM_PYTHON`; in
 #' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); where
 #' [gym_server_install()] has put it; on the `PATH`.
-#' The first that can run the server is taken. Where `python` or `GYM_PYTHON`
-#' names one, no other is tried. [gym_sitrep()] shows what comes of it.
+#' The first that can run the server is used. Where `python` or `GYM_PYTHON`
+#' names one, no other is tried. [gym_sitrep()] shows the result.
 #'
 #' @section Where there is no Python:
-#' Without a Python that can run the server an interactive session offers once to
-#' install one, by [gym_server_install()], and goes on with what was asked for. A
-#' script stops and says so, or, with the environment variable `GYM_INSTALL=1`,
+#' Without a Python that can run the server an interactive session asks once whether to
+#' install one, by [gym_server_install()], and then continues with the call. A
+#' script stops with an error, or, with the environment variable `GYM_INSTALL=1`,
 #' installs it without asking. Where `python` or `GYM_PYTHON` names a Python nothing
 #' is installed.
 #' @param port The port to listen on, a whole number; `NULL`, the default, takes
@@ -36,15 +36,15 @@ is_running <- function(base) {
 #'   `max_processes` (of their own that environments have, 128), `max_memory_mb` (of all
 #'   environments, estimated before they are made, 4,096), `max_watchers` (100),
 #'   `max_body_mb` (of a request, 16), `max_call_seconds` (that a call may take before its
-#'   environment is given up, 300, 0 for ever) and
-#'   `idle_minutes` (until an environment that nobody uses or watches is closed, 1,440,
+#'   environment is evicted, 300, 0 for no limit) and
+#'   `idle_minutes` (until an environment that nobody uses or watches is evicted, 1,440,
 #'   0 for never). `token_file = "token"` names a file with a token of 16
 #'   characters or more, which every call must then carry; the client that is returned does.
 #'   What else a server for a group takes (`isolate`, `max_worker_mb`, `allow_host`, `allow_path`,
-#'   `no_auth`, `no_shutdown`) is told by `vignette("server", package = "gym")`.
+#'   `no_auth`, `no_shutdown`) is described in `vignette("server", package = "gym")`.
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @return A client for the server, as [create_GymClient()] makes it.
-#' @section Errors: `gym_error_server_start`, with the server's own words: no
+#' @section Errors: `gym_error_server_start`, with the server's own message: no
 #'   Python can run it, the port is taken, it did not start in time; `gym_error_install`
 #'   when a Python environment was to be installed first, and could not be;
 #'   `gym_error_argument`.
@@ -62,7 +62,8 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
 }
 
 #' Start a server with the first Python that can run it
-#' @param install May a Python environment be installed, or offered, when no Python can?
+#' @param install Whether a Python environment may be installed, after a question or as
+#'   `GYM_INSTALL` says, when no Python can run the server.
 #' @return A client for the server.
 #' @noRd
 start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60,
@@ -75,8 +76,8 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     server_options(options, call)
   )
   refusals <- character()
-  # With the first that can; NULL when none can.
-  launch_first <- function(pythons) {
+  # Launches the server with the first Python that can run it. Returns NULL when none can.
+  launch_with_first <- function(pythons) {
     for (candidate in pythons) {
       server <- launch_server(candidate, arguments, timeout, call)
       if (is.list(server)) {
@@ -86,16 +87,17 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
       refusals[[candidate]] <<- server
     }
   }
-  launch_first(python_candidates(python)) %||%
-    (if (install && is.null(named_python(python))) launch_first(prompt_for_python())) %||%
+  launch_with_first(python_candidates(python)) %||%
+    (if (install && is.null(named_python(python))) launch_with_first(prompt_for_python())) %||%
     abort_no_python(python, refusals, call)
 }
 
 register_server <- function(server) {
   server$extra_hint <- function(extra) installed_extra_hint(extra, server$python)
   the_session$servers[[server$url]] <- server
-  # R ends what is youngest first. An end that is registered after the process finds the process
-  # there still; kept, as it must not come before the session's.
+  # At the session's end R runs the youngest finalizer first. One that is registered now, after the
+  # process was started, runs before the one of processx: the process can still be asked to end.
+  # The list keeps the object from being collected as garbage, which would run its finalizer early.
   ending <- new.env(parent = emptyenv())
   reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
   the_session$endings <- c(the_session$endings, ending)
@@ -115,8 +117,8 @@ installed_extra_hint <- function(extra, python) {
   paste0("`gym_server_install(extras = \"", extra, "\")` installs it; ", anew)
 }
 
-# Extra options as the command line takes them: log_level = "info" becomes
-# --log-level info, TRUE a flag, a vector one option for each element.
+# Options in the form of a command line: log_level = "info" becomes --log-level info, TRUE becomes a
+# flag, a vector one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
   check_dots_named(options, "log_level = \"info\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
@@ -132,7 +134,7 @@ server_options <- function(options, call = rlang::caller_env()) {
   ), use.names = FALSE)
 }
 
-# 1e5 is 100000 on a command line.
+# Writes numbers without an exponent: 1e5 is 100000 on a command line.
 option_text <- function(values) {
   if (is.numeric(values)) {
     values <- vapply(values, format, "", scientific = FALSE, digits = 15L, trim = TRUE)
@@ -145,7 +147,7 @@ option_text <- function(values) {
 #' The server finishes the calls under way and closes its environments; one that
 #' does not end within 15 seconds is killed.
 #'
-#' @param server The client that [gym_server_start()] returned; `NULL`, the
+#' @param client The client that [gym_server_start()] returned; `NULL`, the
 #'   default, stands for the session's own server, that of [gym_client()].
 #' @return Nothing, invisibly. Stopping a server twice does no harm.
 #' @section Errors: `gym_error_argument` for a server that this session did not
@@ -154,8 +156,8 @@ option_text <- function(values) {
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start()
 #' gym_server_stop(server)
-gym_server_stop <- function(server = NULL) {
-  stop_server(session_server(server))
+gym_server_stop <- function(client = NULL) {
+  stop_server(session_server(client))
   invisible()
 }
 
@@ -166,15 +168,15 @@ gym_server_stop <- function(server = NULL) {
 #'
 #' @inheritParams gym_server_stop
 #' @return A character vector, one element a line; `character(0)` when the server
-#'   had nothing to say.
+#'   wrote nothing.
 #' @inheritSection gym_server_stop Errors
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start(log_level = "info")
 #' gym_server_log(server)
 #' gym_server_stop(server)
-gym_server_log <- function(server = NULL) {
-  log_tail(session_server(server)$log, n = Inf)
+gym_server_log <- function(client = NULL) {
+  log_tail(session_server(client)$log, n = Inf)
 }
 
 session_server <- function(client, call = rlang::caller_env()) {
@@ -184,7 +186,7 @@ session_server <- function(client, call = rlang::caller_env()) {
       "This session has started no server.", class = "gym_error_argument", call = call
     )
   }
-  check_client(client, arg = "server", call = call)
+  check_client(client, call = call)
   the_session$servers[[client$remote_base]] %||% gym_abort(
     c(
       paste0("The server at ", client$remote_base, " was not started by this session."),
@@ -195,22 +197,24 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-# At the end of the session, with a limit for all of it. Servers end by themselves when their
-# standard input closes. One that takes longer, with a video perhaps, is left to it.
+# Ends the session's servers and closes its instances on others, in a limited time:
+#
+# 1. The standard input of each server is closed, on which servers close their environments and end.
+# 2. Instances on other servers are closed, within half of the time.
+# 3. Servers that still run at half of the time are asked again, by a signal.
+# 4. A server that takes longer than the whole time, perhaps to finish a video, is left to itself.
 end_session <- function(session) {
   if (isTRUE(session$ended)) {
     return()
   }
   session$ended <- TRUE
   deadline <- proc.time()[["elapsed"]] + closing_time
-  servers <- if (Sys.getpid() == session$pid) running_servers(session)
+  servers <- if (Sys.getpid() == session$pid) {
+    Filter(function(server) server$process$is_alive(), session$servers)
+  }
   lapply(servers, close_server_input)
   close_session_instances(closing_time / 2)
   stop_session_servers(servers, deadline)
-}
-
-running_servers <- function(session) {
-  Filter(function(server) server$process$is_alive(), session$servers)
 }
 
 stop_session_servers <- function(servers, deadline) {

@@ -1,11 +1,11 @@
-# Spaces whose values are numbers in an array: Box, MultiDiscrete, MultiBinary. In
-# R a vector, or an array where there is more than one dimension. Discrete shares
-# the numbers' part.
+# Spaces whose values are arrays of numbers: Box, MultiDiscrete, MultiBinary. Their values are
+# vectors in R, or arrays where there is more than one dimension. Discrete uses the functions for
+# single numbers, too.
 
 #' @exportS3Method
 init_space.gym_space_box <- function(space) {
   space$shape <- shape_from_json(space$shape)
-  # Classic servers tell none, and their numbers are those of JSON.
+  # Classic servers send no dtype, and their numbers are those of JSON, doubles.
   space$dtype <- space$dtype %||% "float64"
   space$low <- bound_from_json(space$low)
   space$high <- bound_from_json(space$high)
@@ -41,7 +41,7 @@ shape_from_json <- function(json) {
   as.integer(shape)
 }
 
-# Infinite bounds travel as +-1e100, which classic clients expect.
+# Infinite bounds are sent as +-1e100, which classic clients expect.
 bound_from_json <- function(bound) {
   bound <- as.numeric(numbers_from_json(bound))
   bound[bound == 1e100] <- Inf
@@ -70,7 +70,7 @@ space_text.gym_space_multibinary <- function(space) {
   paste("MultiBinary", shape_text(space$shape))
 }
 
-# The least and the greatest value of each element, row by row.
+# The lower and the upper bound of each element, row by row.
 space_bounds <- function(space) UseMethod("space_bounds")
 
 #' @exportS3Method
@@ -96,8 +96,7 @@ decode_value.gym_space_array <- function(space, json) {
   shape_values(values, space$shape)
 }
 
-# Numbers, nested however they are, as a vector of the type that stands for the
-# dtype in R.
+# Returns nested numbers as one vector, of the R type that stands for the dtype.
 decode_numbers <- function(dtype, json) {
   switch(dtype,
     float16 = ,
@@ -138,8 +137,9 @@ wanted_shape <- function(shape) {
   }
 }
 
-# A vector without dim is one-dimensional; where the space is one, a scalar or a column,
-# which is one number for each sub-environment.
+# The shape of an R value. A vector without dim is one-dimensional, with two exceptions: a number is
+# a scalar where the space's shape is that of a scalar; and where a batch has one number for each
+# sub-environment, a vector is a column of it.
 value_shape <- function(value, space) {
   if (!is.null(dim(value))) {
     dim(value)
@@ -152,8 +152,9 @@ value_shape <- function(value, space) {
   }
 }
 
-# The first number that cannot be one of the space's, NULL if all can. NaN is a
-# number; whether it is allowed is a matter of the bounds.
+# Finds the first number that is not of the space's kind: a missing one, or one with a fraction
+# where they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds
+# refuse.
 wrong_number <- function(space, flat) {
   if (anyNA(flat)) {
     missing <- is.na(flat) & !is.nan(flat)
@@ -179,12 +180,12 @@ out_of_bounds <- function(space, flat) {
   }
 }
 
-# Indices from 0 of an element of an array, given its number from 1, row by row.
+# Turns the number of an element, counted from 1 and row by row, into its indices, counted from 0.
 unravel <- function(at, shape) {
   if (length(shape) == 0L) integer() else rev(arrayInd(at, rev(shape))) - 1L
 }
 
-# What a double becomes in a smaller dtype.
+# Rounds doubles as a conversion to a smaller dtype does.
 round_to_dtype <- function(x, dtype) {
   switch(dtype,
     float32 = readBin(writeBin(as.double(x), raw(), size = 4L), "double", length(x), size = 4L),
@@ -224,7 +225,7 @@ draw_numbers <- function(dtype, low, high) {
 }
 
 draw_whole <- function(low, high) {
-  # The nearest doubles inside of what bit64 can hold.
+  # The outermost doubles that bit64 can hold.
   low <- pmax(low, -2^63 + 1024)
   high <- pmin(high, 2^63 - 1024)
   width <- high - low
@@ -241,7 +242,7 @@ draw_between <- function(low, high) {
   above <- is.finite(high)
   both <- below & above
   share <- stats::runif(sum(both))
-  # Two products, as high - low may be beyond the largest number.
+  # Two products, as high - low may overflow.
   values[both] <- low[both] * (1 - share) + high[both] * share
   values[below & !above] <- low[below & !above] + stats::rexp(sum(below & !above))
   values[above & !below] <- high[above & !below] - stats::rexp(sum(above & !below))

@@ -1,204 +1,234 @@
-# Spaces whose values hold any number of elements of another space: Sequence and
-# Graph. Elements that are numbers are stacked as those of sub-environments are, others are a list.
+# Batches, the spaces of several values of a space: one for each sub-environment of a vector
+# environment, or for each element of a Sequence or Graph. Numbers are stacked into one array, with
+# the sub-environments along its first dimension; Tuple and Dict are stacked part by part; texts are
+# a character vector; values without a fixed form are a list.
 
-is_stackable <- function(space) {
-  inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")
-}
-
-decode_stack <- function(space, json) {
-  if (is_stackable(space)) {
-    shape <- c(length(json), space$shape)
-    shape_values(check_numbers(decode_numbers(space$dtype, json), space$dtype, shape), shape)
-  } else {
-    lapply(json, decode_value, space = space)
-  }
-}
-
-check_stack <- function(space, value, path, call, bounds) {
-  if (is_stackable(space)) {
-    check_value(batch_space(space, stack_length(value)), value, path, call, bounds)
-  } else {
-    check_elements(space, value, path, call, bounds)
-  }
-}
-
-check_elements <- function(space, value, path, call, bounds) {
-  if (!is.list(value)) {
-    abort_space(space, value, "Several values of this space are a list", call, path)
-  }
-  for (i in seq_along(value)) {
-    check_value(space, value[[i]], path_index(path, i - 1L), call, bounds)
-  }
-}
-
-stack_length <- function(value) {
-  axes <- dim(value)
-  if (is.null(axes)) length(value) else axes[[1L]]
-}
-
-write_stack <- function(space, value) {
-  if (is_stackable(space)) {
-    write_value(batch_space(space, stack_length(value)), value)
-  } else {
-    write_elements(space, value)
-  }
-}
-
-write_elements <- function(space, value) {
-  json_array(vapply(unname(value), write_value, "", space = space))
-}
-
-sample_stack <- function(space, n) {
-  values <- lapply(seq_len(n), function(i) space_sample(space))
-  if (is_stackable(space)) stack_values(space, values) else values
-}
-
-stack_values <- function(space, values) {
-  flat <- lapply(values, row_major)
-  wide <- vapply(flat, inherits, NA, "integer64")
-  numbers <- if (any(wide)) {
-    whole_from_digits(unlist(lapply(flat, whole_text)))
-  } else if (length(flat)) {
-    unlist(flat)
-  } else {
-    decode_numbers(space$dtype, list())
-  }
-  shape_values(numbers, c(length(values), space$shape))
-}
-
-# Sequence --------------------------------------------------------------------------
+#' Make the space of several values of a space
+#'
+#' As Gymnasium's `batch_space()`, but a MultiDiscrete remains a MultiDiscrete and a MultiBinary a
+#' MultiBinary, with one dimension more. The bounds are those of one value, which R recycles in
+#' row-major order; [spread_bounds()] repeats them for each value.
+#' @param n How many values.
+#' @noRd
+batch_space <- function(space, n) UseMethod("batch_space")
 
 #' @exportS3Method
-init_space.gym_space_sequence <- function(space) {
-  space$space <- new_space(space$space)
-  space$stack <- isTRUE(space$stack)
-  space
-}
-
-#' @exportS3Method
-space_text.gym_space_sequence <- function(space) {
-  paste0("Sequence of ", space_text(space$space), if (space$stack) ", stacked")
-}
-
-#' @exportS3Method
-decode_value.gym_space_sequence <- function(space, json) {
-  check_list(json, length(json), "Sequence")
-  if (space$stack) {
-    decode_stack(space$space, json)
-  } else {
-    lapply(json, decode_value, space = space$space)
-  }
-}
-
-#' @exportS3Method
-check_value.gym_space_sequence <- function(space, value, path, call, bounds = FALSE) {
-  check <- if (space$stack) check_stack else check_elements
-  check(space$space, value, path, call, bounds)
-}
-
-#' @exportS3Method
-write_value.gym_space_sequence <- function(space, value) {
-  if (space$stack) write_stack(space$space, value) else write_elements(space$space, value)
-}
-
-#' @exportS3Method
-space_sample.gym_space_sequence <- function(space) {
-  n <- 1L + stats::rgeom(1L, 0.25)
-  if (space$stack) {
-    sample_stack(space$space, n)
-  } else {
-    lapply(seq_len(n), function(i) space_sample(space$space))
-  }
-}
-
-# Graph -----------------------------------------------------------------------------
-
-#' @exportS3Method
-init_space.gym_space_graph <- function(space) {
-  space$node_space <- new_space(space$node_space)
-  if (!is.null(space$edge_space)) {
-    space$edge_space <- new_space(space$edge_space)
-  }
-  space
-}
-
-#' @exportS3Method
-space_text.gym_space_graph <- function(space) {
-  edges <- if (!is.null(space$edge_space)) paste(", edges", space_text(space$edge_space))
-  paste0("Graph of nodes ", space_text(space$node_space), edges)
-}
-
-#' @exportS3Method
-decode_value.gym_space_graph <- function(space, json) {
-  check_list(json, length(json), "Graph")
-  list(
-    nodes = decode_stack(space$node_space, json$nodes),
-    edges = if (!is.null(json$edges)) decode_stack(space$edge_space, json$edges),
-    edge_links = if (!is.null(json$edge_links)) decode_links(json$edge_links)
+batch_space.default <- function(space, n) {
+  structure(
+    list(name = "Tuple", spaces = rep(list(space), n)),
+    class = c("gym_space_tuple", "gym_space")
   )
 }
 
-decode_links <- function(json) matrix(whole_from_json(json), ncol = 2L, byrow = TRUE)
+#' @exportS3Method
+batch_space.gym_space_array <- function(space, n) {
+  space$column <- identical(space$shape, 1L)
+  space$shape <- c(as.integer(n), space$shape)
+  space
+}
 
 #' @exportS3Method
-check_value.gym_space_graph <- function(space, value, path, call, bounds = FALSE) {
-  parts <- c("nodes", "edges", "edge_links")
-  if (!is.list(value) || is.null(value$nodes) || !all(names(value) %in% parts)) {
-    problem <- "A value of Graph is a list of nodes, edges and edge_links"
-    abort_space(space, value, problem, call, path)
-  }
-  check_stack(space$node_space, value$nodes, path_key(path, "nodes"), call, bounds)
-  if (is.null(value$edges) != is.null(value$edge_links) ||
-        is.null(space$edge_space) && !is.null(value$edges)) {
-    problem <- "Edges need edge_links, edge_links need edges, and both a space that has edges"
-    abort_space(space, value, problem, call, path)
-  }
-  if (!is.null(value$edges)) {
-    check_stack(space$edge_space, value$edges, path_key(path, "edges"), call, bounds)
-    check_links(space, value, path, call)
-  }
-}
-
-check_links <- function(space, value, path, call) {
-  links <- stacked_links(stack_length(value$edges), stack_length(value$nodes))
-  check_value(links, value$edge_links, path_key(path, "edge_links"), call, bounds = TRUE)
-}
-
-# The space of edge_links: two nodes an edge.
-stacked_links <- function(edges, nodes) {
-  batch_space(
-    structure(
-      list(name = "Box", dtype = "int64", shape = 2L, low = c(0, 0), high = rep(nodes - 1, 2L)),
-      class = c("gym_space_box", "gym_space_array", "gym_space")
+batch_space.gym_space_discrete <- function(space, n) {
+  structure(
+    list(
+      name = "MultiDiscrete", shape = as.integer(n), dtype = space$dtype, nvec = space$n,
+      start = space$start
     ),
-    edges
+    class = c("gym_space_discretes", "gym_space_multidiscrete", "gym_space_array", "gym_space")
   )
 }
 
 #' @exportS3Method
-write_value.gym_space_graph <- function(space, value) {
-  with_edges <- !is.null(value$edges)
-  n <- if (with_edges) stack_length(value$edges) else 0L
-  json_object(c(
-    nodes = write_stack(space$node_space, value$nodes),
-    edges = if (with_edges) write_stack(space$edge_space, value$edges) else "null",
-    edge_links = if (with_edges) {
-      write_value(stacked_links(n, 1), value$edge_links)
-    } else {
-      "null"
-    }
-  ))
+batch_space.gym_space_text <- function(space, n) {
+  texts <- batch_space.default(space, n)
+  class(texts) <- c("gym_space_texts", class(texts))
+  texts
 }
 
 #' @exportS3Method
-space_sample.gym_space_graph <- function(space) {
-  nodes <- sample.int(10L, 1L)
-  edges <- if (is.null(space$edge_space)) 0L else sample.int(nodes * (nodes - 1L) + 1L, 1L) - 1L
-  list(
-    nodes = sample_stack(space$node_space, nodes),
-    edges = if (edges > 0L) sample_stack(space$edge_space, edges),
-    edge_links = if (edges > 0L) {
-      matrix(sample.int(nodes, 2L * edges, replace = TRUE) - 1L, ncol = 2L)
+batch_space.gym_space_tuple <- function(space, n) {
+  space$spaces <- lapply(space$spaces, batch_space, n = n)
+  space
+}
+
+#' @exportS3Method
+batch_space.gym_space_dict <- batch_space.gym_space_tuple
+
+#' Give a batch a bound for each of its numbers
+#' @noRd
+spread_bounds <- function(space) UseMethod("spread_bounds")
+
+#' @exportS3Method
+spread_bounds.default <- function(space) space
+
+#' @exportS3Method
+spread_bounds.gym_space_array <- function(space) {
+  space$column <- NULL
+  bounds <- intersect(c("low", "high", "nvec", "start"), names(space))
+  space[bounds] <- lapply(space[bounds], rep, length.out = prod(space$shape))
+  space
+}
+
+#' @exportS3Method
+spread_bounds.gym_space_tuple <- function(space) {
+  space$spaces <- lapply(space$spaces, spread_bounds)
+  space
+}
+
+#' @exportS3Method
+spread_bounds.gym_space_dict <- spread_bounds.gym_space_tuple
+
+# Several Discrete --------------------------------------------------------------------
+
+#' @exportS3Method
+check_value.gym_space_discretes <- function(space, value, path, call, bounds = FALSE) {
+  if (is.logical(value)) {
+    # As for a single Discrete: `observation[, 3] > 0` is a vector of actions.
+    storage.mode(value) <- "integer"
+  }
+  quick <- !bounds && length(value) == space$shape && is.null(dim(value)) && all_small(value)
+  if (!quick) {
+    check_value.gym_space_array(space, value, path, call, bounds)
+  }
+}
+
+# Whether all are whole numbers that fit R's integers, none of them missing.
+all_small <- function(x) {
+  if (is.integer(x)) {
+    !is.object(x) && !anyNA(x)
+  } else {
+    is.double(x) && !is.object(x) && within_integer(x) && all(as.integer(x) == x)
+  }
+}
+
+within_integer <- function(x) {
+  isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
+}
+
+# Numbers that fit R's integers are written as int32: writing int64 takes ten times as long.
+#' @exportS3Method
+to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") {
+  unsigned <- space$dtype == "uint64"
+  if (unsigned || inherits(value, "integer64") || !within_integer(value)) {
+    space$dtype <- if (unsigned) "uint64" else "int64"
+    return(to_tensors.default(space, value, name, call, path))
+  }
+  bytes <- writeBin(as.integer(value), raw(), endian = "little")
+  stats::setNames(list(list(dtype = "I32", shape = space$shape, bytes = bytes)), name)
+}
+
+# Several texts -----------------------------------------------------------------------
+
+#' @exportS3Method
+decode_value.gym_space_texts <- function(space, json) {
+  check_list(json, length(space$spaces), "Text in all sub-environments")
+  vapply(json, check_text, "", USE.NAMES = FALSE)
+}
+
+#' @exportS3Method
+check_value.gym_space_texts <- function(space, value, path, call, bounds = FALSE) {
+  value <- if (is.character(value) && is.null(dim(value))) as.list(value) else value
+  check_value.gym_space_tuple(space, value, path, call, bounds)
+}
+
+#' @exportS3Method
+space_sample.gym_space_texts <- function(space) {
+  as.character(unlist(space_sample.gym_space_tuple(space)))
+}
+
+#' @exportS3Method
+from_tensors.gym_space_texts <- function(space, name, answer) {
+  vapply(part_names(space, name), function(part) check_text(answer$texts[[part]]), "",
+         USE.NAMES = FALSE)
+}
+
+#' @exportS3Method
+to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
+  stats::setNames(as.list(enc2utf8(as.character(value))), part_names(space, name))
+}
+
+# Sub-environments -------------------------------------------------------------------------------
+
+#' Check a value for each sub-environment
+#'
+#' All are checked at once, as nearly always they all fit. If they do not they are checked one by
+#' one, so that the error names the sub-environment and shows its value.
+#' @param space The space of one sub-environment, `batch` that of all `n`.
+#' @param sub_envs Their numbers; `NULL` for 1 to `n`.
+#' @noRd
+check_sub_envs <- function(space, batch, values, n, call, sub_envs = NULL) {
+  if (fits_space(batch, values)) {
+    return(invisible())
+  }
+  given <- sub_envs_given(space, values)
+  if (!is.na(given) && given != n) {
+    problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
+    abort_space(batch, values, problem, call)
+  }
+  if (!is.na(given)) {
+    for (i in seq_len(n)) {
+      sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
+      check_sub_env(space, sub_env_value(space, values, i), sub_env, call)
+    }
+  }
+  check_value(batch, values, "", call)
+}
+
+check_sub_env <- function(space, value, sub_env, call) {
+  tryCatch(
+    check_value(space, value, "", call),
+    gym_error_space = function(cnd) {
+      cnd$message <- paste0("Sub-environment ", sub_env, ": ", cnd$message)
+      cnd$sub_env <- sub_env
+      rlang::cnd_signal(cnd)
     }
   )
+}
+
+#' Count the sub-environments in what was given for all of them
+#' @return A number; `NA` for anything that does not have the form of several values of the space.
+#' @noRd
+sub_envs_given <- function(space, values) UseMethod("sub_envs_given")
+
+#' @exportS3Method
+sub_envs_given.default <- function(space, values) {
+  if (is.list(values)) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+sub_envs_given.gym_space_text <- function(space, values) {
+  if (is.character(values) || is.list(values)) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+sub_envs_given.gym_space_discrete <- function(space, values) {
+  if (is.atomic(values) && is.null(dim(values))) length(values) else NA_integer_
+}
+
+#' @exportS3Method
+sub_envs_given.gym_space_array <- function(space, values) {
+  shape <- if (is.atomic(values)) value_shape(values, batch_space(space, 1L))
+  if (identical(shape[-1L], space$shape)) shape[[1L]] else NA_integer_
+}
+
+#' @exportS3Method
+sub_envs_given.gym_space_tuple <- function(space, values) {
+  keys <- names(space$spaces) %||% seq_along(space$spaces)
+  if (!is.list(values) || length(values) != length(keys)) {
+    return(NA_integer_)
+  }
+  if (is.character(keys)) {
+    values <- values[match(keys, enc2utf8(as.character(names(values))))]
+  }
+  counts <- unique(unlist(Map(sub_envs_given, unname(space$spaces), unname(values))))
+  if (length(counts) == 1L) counts else NA_integer_
+}
+
+#' @exportS3Method
+sub_envs_given.gym_space_dict <- sub_envs_given.gym_space_tuple
+
+# JSON has the values one sub-environment after the other, whatever the space.
+write_sub_envs <- function(space, values, n) {
+  sub_envs <- lapply(seq_len(n), function(sub_env) sub_env_value(space, values, sub_env))
+  json_array(vapply(sub_envs, write_value, "", space = space))
 }

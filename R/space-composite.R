@@ -1,5 +1,5 @@
-# Spaces made of other spaces, each value of which has a fixed form: Tuple, Dict,
-# and OneOf, which is one of several.
+# Spaces that are made of other spaces: Tuple and Dict, whose values have a value of each, and
+# OneOf, whose values have a value of one of them.
 
 #' @exportS3Method
 init_space.gym_space_tuple <- function(space) {

@@ -1,4 +1,4 @@
-# Discrete: one whole number of n that follow each other.
+# Discrete: one of n consecutive whole numbers.
 
 #' @exportS3Method
 init_space.gym_space_discrete <- function(space) {
@@ -32,7 +32,7 @@ decode_value.gym_space_discrete <- function(space, json) {
 #' @exportS3Method
 check_value.gym_space_discrete <- function(space, value, path, call, bounds = FALSE) {
   if (is.logical(value)) {
-    # As R counts, and Python.
+    # TRUE is 1 in R, as True is in Python.
     value <- as.integer(value)
   }
   if (!is_whole(space, value)) {
@@ -43,7 +43,7 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
   }
 }
 
-# The first question is what nearly every step asks, and quick.
+# Called in nearly every step: the plain case, the last one, is quick.
 is_whole <- function(space, value) {
   if (length(value) != 1L || !is.numeric(value)) {
     FALSE

@@ -1,19 +1,19 @@
-# Values of several sub-environments: numbers in an array with the sub-environment as its first
-# dimension (a vector for single numbers), texts in a character vector, Tuple and Dict part by part,
-# other values in a list.
+# Values of several sub-environments, put together and taken apart. Numbers are in an array with the
+# sub-environments along its first dimension (in a vector, for single numbers), texts in a character
+# vector, the values of Tuple and Dict in a list of such parts, other values in a list.
 
 has_parts <- function(space) {
   inherits(space, "gym_space_tuple") || inherits(space, "gym_space_dict")
 }
 
-# For each part of a Tuple or Dict the same.
+# Calls a function for each part of a Tuple or Dict.
 map_parts <- function(space, part, ...) {
   parts <- Map(part, unname(space$spaces), ...)
   names(parts) <- names(space$spaces)
   parts
 }
 
-#' Put single values, one for each sub-environment, together
+#' Put the single values of sub-environments together
 #' @param values A list of values of the space.
 #' @noRd
 sub_envs_from <- function(space, values) {
@@ -68,7 +68,7 @@ rows_of <- function(x, i) {
   }
 }
 
-# A policy may name the parts of a Dict in any order.
+# The parts in the order of the space: a policy may name those of a Dict in any order.
 in_order <- function(space, parts) {
   keys <- names(space$spaces)
   if (is.null(keys) || is.null(names(parts))) parts else parts[match(keys, enc2utf8(names(parts)))]
@@ -86,7 +86,7 @@ bind_sub_envs <- function(space, each) {
   } else if (!is_stackable(space)) {
     do.call(c, each)
   } else if (any(vapply(each, inherits, NA, "integer64"))) {
-    # Beside those that arrived as integer or double, as they fitted.
+    # Other values may be integer or double, as integer64 stands for the numbers beyond 2^53 only.
     digits <- unlist(lapply(each, function(sub_envs) whole_text(row_major(sub_envs))))
     n <- length(digits) / prod(space$shape)
     shape_values(whole_from_digits(digits), c(n, space$shape))

@@ -1,5 +1,5 @@
-# Values of spaces as tensors. Large ones travel so: JSON takes longer to parse
-# the more numbers there are, raw bytes hardly.
+# Values of spaces as tensors. Large values are sent as tensors: the time to parse JSON grows with
+# the number of numbers, that to read raw bytes hardly.
 
 # Milliseconds for a whole step, JSON beside tensors, by the numbers in the
 # observation (R 4.2, waitress, two noisy cores; medians of 300, of 30 from 5,000 on):
@@ -16,7 +16,7 @@
 # 200, 3.9 beside 2.3 with 1,000.
 tensors_pay_from <- 200
 
-# Do all values of the space have a place for each of their numbers?
+# Whether tensors can hold the values: all values of the space must have the same shape.
 has_tensors <- function(space) UseMethod("has_tensors")
 
 #' @exportS3Method
@@ -49,7 +49,7 @@ count_numbers <- function(space) {
   }
 }
 
-# The names of parts are JSON pointers below the name of the whole.
+# The names of the tensors of parts: JSON pointers below the name of the whole.
 part_names <- function(space, name) {
   keys <- names(space$spaces) %||% (seq_along(space$spaces) - 1L)
   keys <- gsub("/", "~1", gsub("~", "~0", keys, fixed = TRUE), fixed = TRUE)
@@ -106,7 +106,7 @@ to_tensors.default <- function(space, value, name, call, path = "") {
   stats::setNames(list(tensor), name)
 }
 
-# Whatever its dtype, Discrete takes the widest.
+# A Discrete is sent as 64 bits, whatever its dtype.
 #' @exportS3Method
 to_tensors.gym_space_discrete <- function(space, value, name, call, path = "") {
   space$shape <- integer()
@@ -137,8 +137,7 @@ tensor_dtypes <- c(
   uint8 = "U8", uint16 = "U16", uint32 = "U32", uint64 = "U64"
 )
 
-# Bytes cannot say what they could not hold: a number that wraps around or
-# overflows must not leave.
+# Refuses a number that the dtype cannot hold: in bytes it would silently wrap around or overflow.
 check_dtype <- function(space, flat, value, call, path = "") {
   numbers <- as_double(flat)
   lost <- if (space$dtype %in% names(dtype_ranges)) {

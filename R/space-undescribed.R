@@ -1,6 +1,6 @@
-# Spaces of which a server with the classic protocol tells no more than the name.
+# Spaces of which a server with the classic protocol sends no more than the name.
 
-# The classic protocol describes these two.
+# Makes a space from the classic protocol's description, which is complete for these two kinds.
 new_classic_space <- function(description) {
   if (isTRUE(description$name %in% c("Discrete", "Box"))) {
     return(new_space(description))

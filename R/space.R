@@ -1,6 +1,6 @@
-# Spaces as R objects: what the server says of a space, with one small method
-# per kind for reading, checking, writing and drawing its values. The kinds are
-# in the files space-*.R; here is what they share.
+# Spaces as R objects: the server's description of a space, with one small method for each kind of
+# space that reads, checks, writes or draws values. The kinds are in the files space-*.R; what they
+# have in common is here.
 
 #' Make a space from the server's description
 #' @noRd
@@ -27,7 +27,7 @@ init_space.default <- function(space) {
 
 # In words ------------------------------------------------------------------------
 
-# A space in words, without the brackets around the outermost.
+# A space in words, without the brackets in which format() puts the outermost space.
 space_text <- function(space) UseMethod("space_text")
 
 #' @export
@@ -47,30 +47,23 @@ print.gym_space <- function(x, ...) {
 
 # Values --------------------------------------------------------------------------
 
-#' Turn a value from the wire into an R value
-#' @param json What [from_json()] made of it.
+#' Turn a value of an answer into an R value
+#' @param json The value as [from_json()] returns it.
 #' @noRd
 decode_value <- function(space, json) UseMethod("decode_value")
 
 #' Check a value's type and shape, down to its parts
 #'
-#' Whether what is sent lies inside the bounds is for the server to say, which
+#' Whether a value that is sent lies inside the bounds is checked by the server, which
 #' has the numbers in the space's own dtype.
 #' @param path Where the value lies in the whole, such as `$position[2]`.
-#' @param bounds Check against the bounds, too?
+#' @param bounds Whether to check against the bounds, too.
 #' @noRd
 check_value <- function(space, value, path, call, bounds = FALSE) UseMethod("check_value")
 
 #' Write a value that was checked as JSON
 #' @noRd
 write_value <- function(space, value) UseMethod("write_value")
-
-#' Write an R value as JSON for a space
-#' @noRd
-encode_value <- function(space, value, call) {
-  check_value(space, value, "", call)
-  write_value(space, value)
-}
 
 #' Draw a value of a space, or ask whether a value belongs to it
 #'
@@ -116,7 +109,7 @@ encode_value <- function(space, value, call) {
 #' as `$position[2]`: the element `position`, and in it the number with index 2.
 #' Indices count from 0, as on the server and in Python, so that the same place
 #' has the same name everywhere: in R it is `value$position[3]`. Only the words
-#' "Sub-environment 3" before a message count from 1, as the argument `sub_envs` of [env_step()].
+#' "Sub-environment 3" before a message count from 1, as the argument `which` of [env_step()].
 #'
 #' The distributions are Gymnasium's: uniform between two bounds, exponential
 #' from a single one, normal without any; the length of a sequence is geometric.

@@ -26,7 +26,7 @@ check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE,
   invisible(x)
 }
 
-# What set.seed() takes: any whole number that R's integers can hold.
+# A seed may be what set.seed() takes: any whole number that R's integers can hold.
 check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   check_count(x, min = -.Machine$integer.max, allow_null = TRUE, arg = arg, call = call)
 }
@@ -63,7 +63,7 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   check_unique_names(x, arg, call)
 }
 
-# In JSON the last of them would win, and the others be gone without a word.
+# In JSON the last of them would win silently.
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {
@@ -98,7 +98,7 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
   }
 }
 
-#' Make sure that a package is there which not everybody needs
+#' Check that a suggested package is installed
 #' @noRd
 check_suggested <- function(package, purpose, call = rlang::caller_env()) {
   if (!requireNamespace(package, quietly = TRUE)) {
@@ -123,7 +123,7 @@ abort_argument <- function(x, must, arg, call) {
 is_number <- function(x) is.numeric(x) && length(x) == 1L && is.null(dim(x)) && !is.na(x)
 
 range_text <- function(min, max) {
-  # The largest integer that R can hold limits a count without anybody meaning it.
+  # The largest integer of R's is a limit of the type, not one to be mentioned.
   bounded <- max != .Machine$integer.max && max < Inf
   above <- min > -.Machine$integer.max
   if (above && bounded) {

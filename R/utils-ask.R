@@ -1,4 +1,4 @@
-# Questions to whoever sits at the session.
+# Questions to the user of an interactive session.
 
 #' Ask a question that is answered by yes or no
 #'
@@ -10,11 +10,11 @@
 #' @noRd
 ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   if (is.function(getOption("askYesNo"))) {
-    # R and RStudio on Windows ask by a dialog, which no pasted line can answer.
+    # R and RStudio on Windows open a dialog, which a pasted script cannot answer by accident.
     return(isTRUE(utils::askYesNo(question, default = default)))
   }
   choices <- if (default) "(Yes/no)" else "(yes/No)"
-  # R cuts a long prompt off.
+  # R truncates a long prompt: only the last line is the prompt.
   lines <- strsplit(question, "\n", fixed = TRUE)[[1L]]
   writeLines(utils::head(lines, -1L))
   prompt <- paste0(utils::tail(lines, 1L), " ", choices, " ")
@@ -36,5 +36,5 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   choice == 1L
 }
 
-# On a line of its own so that tests can answer.
+# A function of its own so that tests can replace it.
 read_answer_line <- function(prompt) readline(prompt)

@@ -1,14 +1,14 @@
-# Where people look at something: RStudio's viewer, a browser, or what they chose.
+# Opening an address in RStudio's viewer, in a browser, or by the option `gym.viewer`.
 
-#' Open an address where people look
+#' Open an address for the user
 #'
 #' By `getOption("gym.viewer")`: a function of an address opens it, also in a script, and `FALSE`
 #' opens nothing. Without the option an interactive session opens it in RStudio's viewer,
 #' else in the browser.
 #' @param address A URL, or the path of a file.
-#' @param viewer What the option says, already checked.
-#' @return Whether something was to open it and did not fail, logical: a machine may have no
-#'   browser, and some fail without a word. What the option's own function raises is raised.
+#' @param viewer The option's value, already checked.
+#' @return Whether something opened it without an error, logical: a machine may have no browser,
+#'   and some browsers fail silently. An error of the option's own function is raised.
 #' @noRd
 open_address <- function(address, viewer = check_viewer()) {
   if (isFALSE(viewer)) {
@@ -33,7 +33,7 @@ open_address <- function(address, viewer = check_viewer()) {
   )
 }
 
-# What the option says: a function of the address, FALSE for nothing at all, NULL.
+# Returns the option's value: a function of the address, FALSE for opening nothing, or NULL.
 check_viewer <- function(call = rlang::caller_env()) {
   viewer <- getOption("gym.viewer")
   if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {

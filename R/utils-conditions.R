@@ -2,7 +2,7 @@
 
 gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), parent = NULL) {
   rlang::abort(
-    # A server's words are among them.
+    # The message may contain text from a server.
     shown_text(message),
     class = c(class, "gym_error"),
     ...,
@@ -12,7 +12,7 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   )
 }
 
-# `path` is the place of the value in the whole, "" for the whole.
+# `path` says where in the whole value the wrong one lies; it is "" for the whole.
 abort_space <- function(space, value, problem, call, path = "") {
   place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")
   gym_abort(

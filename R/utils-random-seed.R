@@ -1,4 +1,4 @@
-# R's generator: what draws from it, and what leaves it as it was.
+# R's random generator: code that draws from it, and code that leaves it as it was.
 
 #' Run code under a seed of its own
 #'
@@ -36,8 +36,8 @@ restore_random_state <- function(state) {
   }
 }
 
-# Seeds for environments, which take whole numbers from 0. All of a block are
-# drawn at once: the first k of them do not depend on how many there are.
+# Seeds for environments, which take whole numbers from 0. All are drawn at once: the first k of
+# them do not depend on how many there are.
 draw_environment_seeds <- function(n) {
   sample.int(.Machine$integer.max, n, replace = TRUE)
 }

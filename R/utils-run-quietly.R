@@ -1,13 +1,13 @@
-# Programs that are run from R.
+# Programs that are run from R, and their ends.
 
-#' Start a process with a mark of its own
+#' Start a process with a tree id of its own
 #'
-#' processx draws the mark by which it finds a process's children from R's generator, and adds the
-#' second: where the generator is put back, or the user sets a seed, processes would share it, and
-#' the end of one would end the others. The generator is afterwards as it was.
+#' processx finds a process's children by a tree id, which it draws from R's generator and the
+#' current second. Where the generator is restored, or the user sets a seed, several processes would
+#' have the same id, and killing one would kill the others. The generator is afterwards as it was.
 #' @param code Starts a process.
 #' @noRd
-with_own_mark <- function(code) {
+with_own_tree_id <- function(code) {
   load_processx()
   keep_random_state({
     set.seed(NULL)
@@ -15,9 +15,9 @@ with_own_mark <- function(code) {
   })
 }
 
-# Processx and the package parallel both want the signal of ended children. When it is loaded,
-# processx reads from this variable whether to hand the signal on; without it parallel waits at
-# the session's end for forked children that ended long ago.
+# processx and the package parallel both handle SIGCHLD, the signal of ended children. When it is
+# loaded processx reads from this variable whether to pass the signal on. If it does not, parallel
+# waits at the session's end for forked children that ended long ago.
 load_processx <- function() {
   variable <- "PROCESSX_NOTIFY_OLD_SIGCHLD"
   if (!isNamespaceLoaded("processx") && !nzchar(Sys.getenv(variable))) {
@@ -29,8 +29,8 @@ load_processx <- function() {
 
 #' Wait for a process to end
 #'
-#' By asking it again and again: the `wait()` of processx takes the signal of ended children from
-#' the package parallel, see [load_processx()].
+#' Polls the process, as the `wait()` of processx takes SIGCHLD from the package parallel, see
+#' [load_processx()].
 #' @param seconds How long at most.
 #' @noRd
 await_end <- function(process, seconds) {
@@ -44,13 +44,13 @@ await_end <- function(process, seconds) {
 #'
 #' R's generator stays as it was.
 #' @param arguments A character vector.
-#' @param timeout After how many seconds it is ended.
+#' @param timeout After how many seconds it is killed.
 #' @return A list: `status`, `NA` for what could not be run or did not end in time, and `stdout`,
 #'   a string, then empty.
 #' @noRd
 run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
   silent <- list(status = NA_integer_, stdout = "")
-  run <- with_own_mark(tryCatch(
+  run <- with_own_tree_id(tryCatch(
     processx::run(
       command, arguments,
       timeout = timeout, env = env, error_on_status = FALSE, cleanup_tree = TRUE,

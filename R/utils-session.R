@@ -3,14 +3,16 @@
 #   pid             the process that loaded the package: a forked child has another one
 #   servers         the servers that this session started, by their addresses
 #   client          the client of the session's own server; named_client that of GYM_SERVER_URL
-#   created         the instances that this session has created on servers, see http-instances.R
-#   numbers, keys   the idempotency keys, see http-connection.R
-#   hidden          texts that no error may show
-#   ...             what was declined, what is installed at the moment, what was registered
+#   instances       the instances that this session has created on servers, see http-instances.R
+#   keys            the idempotency keys of this process, see http-connection.R
+#   hidden          tokens, which no error may show
+#
+# and, where they apply, what was declined, whether this session holds the install lock, and the
+# function by which an upper floor asks, see prompted_server_starts().
 #
 # Being an environment it is never identical to a copy that was read from a file or sent to
 # another process, which is how a client notices that it has been moved.
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
 the_session$client <- NULL
-the_session$created <- new.env(parent = emptyenv())
+the_session$instances <- new.env(parent = emptyenv())

@@ -1,22 +1,22 @@
-# Text from elsewhere, as it may stand in a terminal.
+# Text from a server, made safe for a terminal.
 
-# Long enough for an error with what led to it.
+# Enough for an error message with a traceback.
 longest_shown <- 4000L
 
-# C0 but for tab and newline, DEL, C1, and what turns the direction of the text around it.
+# C0 except tab and newline, DEL, C1, and characters that change the direction of text.
 unseen <- paste0(
   "(*UTF)[\\x{01}-\\x{08}\\x{0b}-\\x{1f}\\x{7f}-\\x{9f}\\x{061c}\\x{200e}\\x{200f}",
   "\\x{2028}-\\x{202e}\\x{2066}-\\x{2069}\\x{feff}]"
 )
 
-#' Take out of a text what a terminal would obey
+#' Remove from a text what a terminal would obey
 #'
-#' Escape sequences, control characters, marks of direction; what is too long is cut.
+#' These are escape sequences, control characters and marks of direction. A long text is cut.
 #' @param x A character vector; names stay.
 #' @param most How many characters of each element.
 #' @noRd
 shown_text <- function(x, most = longest_shown) {
-  # Most texts are plain, and short.
+  # Quick for plain and short texts, as most are.
   if (!length(x) || all(grepl("^[ -~]*$", x, useBytes = TRUE) & nchar(x, "bytes") <= most)) {
     return(x)
   }
@@ -28,7 +28,7 @@ shown_text <- function(x, most = longest_shown) {
   x
 }
 
-# Where it stands within a line.
+# The same for a text that is shown within a line.
 shown_line <- function(x, most = 200L) {
   if (!is.null(x)) gsub("[\t\n]+", " ", shown_text(x, most))
 }

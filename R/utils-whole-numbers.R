@@ -1,5 +1,5 @@
 # Whole numbers of up to 64 bits in R: integer where they all fit, double up to
-# 2^53, beyond it bit64's integer64. Never a rounded number, so what none of them
+# 2^53, beyond it bit64's integer64. No number is ever rounded: one that none of these
 # can hold is an error.
 
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -8,7 +8,7 @@ are_whole <- function(x, min, max) {
   is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
 }
 
-# From decimal digits.
+# Returns whole numbers from their decimal digits.
 whole_from_digits <- function(digits) {
   numbers <- as.numeric(digits)
   if (all(abs(numbers) < 2^53 | digits %in% c("9007199254740992", "-9007199254740992"))) {
@@ -54,7 +54,7 @@ abort_whole <- function(digits) {
   gym_abort(paste("The integer", digits, reason), class = "gym_error_space", call = NULL)
 }
 
-# Decimal digits of whole numbers, whatever holds them; text passes.
+# The decimal digits of whole numbers of any type; text is returned as it is.
 whole_text <- function(x) {
   if (is.character(x)) {
     x
@@ -72,7 +72,7 @@ as_double <- function(x) {
 
 # As two halves of 32 bits ---------------------------------------------------------
 
-# The halves are R integers that hold the bits of int32, so that NA is -2^31.
+# Reads 64-bit integers as two halves, R integers with the bits of an int32: NA is -2^31.
 whole_from_halves <- function(bytes, n, signed) {
   halves <- readBin(bytes, "integer", 2L * n, size = 4L, endian = "little")
   lower <- halves[2L * seq_len(n) - 1L]
@@ -97,7 +97,7 @@ whole_from_halves <- function(bytes, n, signed) {
   structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
 }
 
-# Are the numbers those that fit an R integer?
+# Whether all of the numbers fit R's integers.
 halves_are_narrow <- function(lower, upper, signed) {
   !anyNA(lower) && !anyNA(upper) && all(upper == (lower < 0L) * -1L) &&
     (signed || all(upper == 0L))
@@ -115,7 +115,7 @@ unsigned_half <- function(half) {
   half + (half < 0) * 2^32
 }
 
-# Division by 10^9, by hand: no number of R's has these digits.
+# The digits of a number that no type of R's can hold, by a division by 10^9 of its halves.
 digits_of_halves <- function(upper, lower, signed) {
   if (signed) {
     return("-9223372036854775808")

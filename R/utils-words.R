@@ -1,4 +1,4 @@
-# Words for messages and for what is printed.
+# Numbers and names as text, for messages and printing.
 
 environment_label <- function(env) env$spec$id %||% "the environment"
 
@@ -8,7 +8,7 @@ count_of <- function(n, noun) {
 
 number_text <- function(x) format(x, digits = 4L, big.mark = ",")
 
-# One by one, as together they would get as many decimals as the longest needs.
+# Each by itself: together they would all get as many decimals as the longest needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
 
 percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
@@ -23,7 +23,7 @@ seconds_text <- function(seconds) {
   }
 }
 
-# The one of `choices` that somebody who wrote `name` seems to have meant; character(0) for none.
+# The one of `choices` that `name` seems to be a misspelling of; character(0) for none.
 nearest_name <- function(name, choices) {
   plain <- function(x) gsub("[._]", "", tolower(x))
   ordered <- function(x) {
@@ -32,7 +32,7 @@ nearest_name <- function(name, choices) {
   distance <- function(form) utils::adist(form(plain(name)), form(plain(choices)))[1L, ]
   begins <- nchar(name) > 3L & startsWith(plain(choices), plain(name))
   close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins
-  # Of equally near ones that with the same letters.
+  # Of equally near names the one with the same letters is better.
   best <- order(distance(identity), distance(ordered))
   utils::head(choices[best[close[best]]], 1L)
 }

@@ -39,7 +39,7 @@ check_package <- function(folder) {
     cat("\n", output, "\n", sep = "")
     writeLines(utils::tail(readLines(output), 60))
   }
-  if (nrow(bad) > 0) cat("\nTo mend:", paste(bad$Status, bad$Check), sep = "\n  ")
+  if (nrow(bad) > 0) cat("\nTo fix:", paste(bad$Status, bad$Check), sep = "\n  ")
   cat("\nR CMD check: ", sub("Status: ", "", utils::tail(readLines(log), 1)), "\n", sep = "")
   status == 0 && nrow(bad) == 0
 }

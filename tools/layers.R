@@ -3,7 +3,8 @@
 # one line for each use of a higher floor, and then fails.
 #
 # What a function uses is what codetools::findGlobals() finds in it, functions that are passed by
-# name included. An S3 method may live above its generic: dispatch is no use.
+# name included. An S3 method may live above its generic: dispatch is no use. Calls inside of the
+# strings of cli are not seen.
 
 # The one list of the floors, from the top.
 floors <- list(

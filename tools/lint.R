@@ -1,4 +1,4 @@
-# Lints every R file of the repository by .lintr; fails when there is something to mend.
+# Lints every R file of the repository by .lintr; fails when there is something to fix.
 folders <- Filter(dir.exists, c("R", "tests", "inst/examples", "tools", "vignettes"))
 count <- 0
 for (folder in folders) {

@@ -54,7 +54,7 @@ fake_installation <- function(number = 1L, extras = character(), hash = lock_has
   }
   python <- environment_python(folder)
   fake_program(python)
-  write_marker(folder, extras, call = NULL)
+  write_manifest(folder, extras, call = NULL)
   folder
 }
 

@@ -73,3 +73,9 @@ all_kinds <- function(space) {
   parts <- Filter(function(part) !is.null(part), unname(parts))
   unique(c(space$name, unlist(lapply(parts, all_kinds))))
 }
+
+# The JSON text of a value, as a request has it.
+encode_value <- function(space, value, call) {
+  check_value(space, value, "", call)
+  write_value(space, value)
+}

@@ -21,7 +21,7 @@ test_that("what is no client is refused", {
   expect_error(env_list_all("http://127.0.0.1:5000"), "client", class = "gym_error_argument")
 })
 
-test_that("with no server there the error names the address and the mend", {
+test_that("with no server there the error names the address and the hint", {
   port <- free_port()
   client <- create_GymClient(paste0("http://127.0.0.1:", port))
   error <- expect_error(env_list_all(client), class = "gym_error_connection")
@@ -50,7 +50,7 @@ test_that("an answer that does not come within the timeout is an error", {
   expect_error(env_step(hasty, patient$instance_id, 1), "[Tt]ime", class = "gym_error_connection")
 })
 
-test_that("whatever way a server is dead, that is told within the timeout, with what helps", {
+test_that("whatever way a server is dead, the error comes within the timeout, with what helps", {
   skip_unless_all()
   for (how in c("silent", "half", "full", "cut")) {
     client <- create_GymClient(local_stalling(how), timeout = 1)
@@ -58,8 +58,8 @@ test_that("whatever way a server is dead, that is told within the timeout, with 
       # Where it is not noticed this test hangs for a minute.
       taken <- system.time(error <- expect_error(call(client), class = "gym_error_connection"))
       expect_lt(taken[["elapsed"]], 20)
-      mend <- switch(how, full = , cut = "gym_server_start", "timeout")
-      expect_match(conditionMessage(error), mend, info = how)
+      hint <- switch(how, full = , cut = "gym_server_start", "timeout")
+      expect_match(conditionMessage(error), hint, info = how)
     }
   }
 })
@@ -309,7 +309,7 @@ test_that("what is no answer of a Gym server is an error with a class", {
   expect_error(read(520, "\"oops\""), class = "gym_error_http_520")
 })
 
-test_that("another kind of server is told from a Gym server", {
+test_that("another kind of server is distinguished from a Gym server", {
   python <- working_python()
   folder <- withr::local_tempdir()
   dir.create(file.path(folder, "v1", "envs"), recursive = TRUE)
@@ -326,7 +326,7 @@ test_that("another kind of server is told from a Gym server", {
   expect_error(env_create(client, "CartPole-v1"), class = "gym_error_http_501")
 })
 
-test_that("a large body arrives, one that is too large is told", {
+test_that("a large body arrives, one that is too large is an error", {
   env <- local_env()
   # CartPole looks at two of its options and lets the others be.
   expect_length(env$reset(options = list(x = as.numeric(1:1e5))), 4)
@@ -377,7 +377,7 @@ test_that("calls leave R's generator alone", {
   expect_identical(.Random.seed, before)
 })
 
-test_that("what httr's set_config() says holds for clients, too, and their own goes before", {
+test_that("the settings of httr's set_config() hold for clients, too, and their own take precedence", {
   withr::local_options(httr_config = httr::config(cainfo = "group.pem", proxy = "a.example.org"))
   expect_identical(create_GymClient("http://a")$config$options$cainfo, "group.pem")
   own <- create_GymClient("http://a", config = httr::config(cainfo = "own.pem"))

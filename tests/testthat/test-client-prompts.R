@@ -34,7 +34,7 @@ test_that("an interactive session without a Python installs when asked, and goes
   expect_identical(calls$ask, TRUE)
 })
 
-test_that("whoever declines gets the error and is not asked again", {
+test_that("after a no comes the error, and no further question", {
   calls <- local_bare_session(list(NULL))
   for (call in list(gym_client, function() gym_make("CartPole-v1"), search_random,
                     gym_server_start)) {
@@ -45,7 +45,7 @@ test_that("whoever declines gets the error and is not asked again", {
   expect_identical(calls$ask, TRUE)
 })
 
-test_that("a script is asked nothing and told the line that helps", {
+test_that("a script is not asked, and the error names the call that helps", {
   calls <- local_bare_session(list(), interactive = FALSE)
   error <- expect_error(gym_client(), class = "gym_error_server_start")
   expect_match(conditionMessage(error), "gym::gym_server_install()", fixed = TRUE)
@@ -115,7 +115,7 @@ local_answers <- function(answers, frame = parent.frame()) {
   asked
 }
 
-test_that("where nobody listens the first call asks for a server, and the script goes on", {
+test_that("where nothing listens the first call asks for a server, and the script goes on", {
   skip_if_no_server()
   for (host in c("127.0.0.1", "localhost")) {
     base <- paste0("http://", host, ":", free_port())
@@ -134,7 +134,7 @@ test_that("where nobody listens the first call asks for a server, and the script
   }
 })
 
-test_that("whoever declines a server is not asked again for that address", {
+test_that("after a no there is no further question for that address", {
   base <- paste0("http://127.0.0.1:", free_port())
   asked <- local_answers(list(FALSE, FALSE))
   first_call <- function(base) {
@@ -148,7 +148,7 @@ test_that("whoever declines a server is not asked again for that address", {
   expect_length(asked$questions, 2)
 })
 
-test_that("nobody is asked in a script, elsewhere, or where somebody listens", {
+test_that("there is no question in a script, elsewhere, or where something listens", {
   asked <- local_answers(list())
   expect_unasked <- function(base, ...) {
     client <- create_GymClient(base, timeout = 1, ...)

@@ -156,7 +156,7 @@ test_that("tensors of a vector environment have a row for each", {
   expect_wrong(step(terminated = flags(logical(4), 4L)), "terminated")
 })
 
-test_that("what is told of an environment has its types", {
+test_that("the fields of an environment's description have their types", {
   about <- function(...) {
     server <- local_bad_environment(...)
     env_action_space_info(server, "0a1b2c3d")

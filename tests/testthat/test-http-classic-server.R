@@ -28,7 +28,7 @@ test_that("the classic calls work with a server that has no others", {
   expect_invisible(shutdown_server(client))
 })
 
-test_that("an episode there ends as Gym told it", {
+test_that("an episode there ends as Gym reports it", {
   client <- local_classic_client()
   env <- gym_make("CartPole-v1", client = client)
   env$reset()
@@ -53,7 +53,7 @@ test_that("an episode there ends as Gym told it", {
   pendulum$close()
 })
 
-test_that("a space of which that server tells only the name passes values as they are", {
+test_that("a space of which that server sends only the name passes values as they are", {
   env <- gym_make("Blackjack-v1", client = local_classic_client())
   expect_length(env$reset(), 3)
   expect_output(print(env), "Tuple (not described)", fixed = TRUE)

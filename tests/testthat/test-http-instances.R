@@ -14,7 +14,7 @@ expect_quick_end <- function(run, begun) {
   expect_lt(as.numeric(Sys.time(), units = "secs") - begun, 20)
 }
 
-test_that("what a session made on another's server is closed with it, classic ids too", {
+test_that("what a session created on another's server is closed with it, classic ids too", {
   server <- local_server()
   kept <- env_create(server, "CartPole-v1")
   run <- run_session(
@@ -30,7 +30,7 @@ test_that("what a session made on another's server is closed with it, classic id
   expect_named(env_list_all(server), kept)
 })
 
-test_that("a session ends at once whatever has become of the servers where it made something", {
+test_that("a session ends at once whatever has become of the servers where it created something", {
   skip_on_os("windows")
   server <- local_server()
   pid <- the_session$servers[[server$remote_base]]$pid
@@ -50,13 +50,13 @@ test_that("a session ends at once whatever has become of the servers where it ma
   }
 })
 
-test_that("a session ends at once with a server behind a broken line, and its own stopped", {
+test_that("a session ends at once with a server behind a broken connection, and its own stopped", {
   skip_on_os("windows")
   full <- create_GymClient(local_stalling("full"))
   run <- run_session(
     full,
-    "gym:::register_created('there', server, 'abcdef01')",
-    "gym:::register_created('unanswered', server, body = charToRaw('{}'))",
+    "gym:::remember_instance('there', server, 'abcdef01')",
+    "gym:::remember_instance('unanswered', server, body = charToRaw('{}'))",
     "own <- gym_server_start()",
     "pid <- gym:::the_session$servers[[1]]$pid",
     "tools::pskill(pid, tools::SIGSTOP)",
@@ -71,7 +71,7 @@ test_that("a session ends at once with a server behind a broken line, and its ow
   expect_false(pid_runs(words[[2]]))
 })
 
-test_that("a forked child closes what it made, and nothing of its parent's", {
+test_that("a forked child closes what it created, and nothing of its parent's", {
   skip_on_os("windows")
   server <- local_server()
   ours <- env_create(server, "CartPole-v1")
@@ -112,11 +112,11 @@ test_that("an environment that was closed is not closed again", {
   rm(env)
   gc()
   expect_length(client_state(server)$to_close, 0)
-  expect_false(created_name(server, id) %in% ls(the_session$created))
+  expect_false(instance_place(server, id) %in% ls(the_session$instances))
   gone <- gym_make("CartPole-v1", client = server)
   post_once(server, paste0("/v1/envs/", gone$instance_id, "/close/"))
   expect_error(gone$close(), NA)
-  expect_false(created_name(server, gone$instance_id) %in% ls(the_session$created))
+  expect_false(instance_place(server, gone$instance_id) %in% ls(the_session$instances))
 })
 
 test_that("an interrupted gym_make() leaves nothing, whenever the interrupt comes", {
@@ -131,11 +131,11 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
     "  system(paste('(sleep 0.5; kill -INT', Sys.getpid(), ') &'))",
     "  gym_make('odd_environments:SlowToMake-v0', client = server)",
     "}, interrupt = function(cnd) 'interrupted')",
-    "cat(said, length(ls(gym:::the_session$created)), '')",
+    "cat(said, length(ls(gym:::the_session$instances)), '')",
     # It is not made yet when it is first asked for.
     "for (i in 1:20) {",
     "  Sys.sleep(2)",
-    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$created)))",
+    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$instances)))",
     "  if (!any(left)) break",
     "}",
     "cat(left)"
@@ -154,8 +154,8 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
 })
 
 test_that("what was refused or never sent is not remembered", {
-  created <- function() length(ls(the_session$created))
-  before <- created()
+  made <- function() length(ls(the_session$instances))
+  before <- made()
   expect_error(env_create(test_client(), "Nothing-v0"), class = "gym_error_http_400")
   nobody <- create_GymClient(paste0("http://127.0.0.1:", free_port()))
   error <- expect_error(env_create(nobody, "CartPole-v1"), class = "gym_error_connection")
@@ -167,7 +167,7 @@ test_that("a server that was stopped has nothing left to close", {
   server <- local_server()
   env_create(server, "CartPole-v1")
   gym_server_stop(server)
-  expect_false(any(startsWith(ls(the_session$created), server$remote_base)))
+  expect_false(any(startsWith(ls(the_session$instances), server$remote_base)))
 })
 
 test_that("an error in a search closes its environment without waiting for a server that hangs", {
@@ -185,7 +185,7 @@ test_that("an error in a search closes its environment without waiting for a ser
   )
   expect_lt(taken[["elapsed"]], 20)
   tools::pskill(pid, tools::SIGCONT)
-  close_session <- function() close_within(ls(the_session$created), closing_time)
+  close_session <- function() close_together(ls(the_session$instances), closing_time)
   close_session()
   expect_length(open_after_a_while(server), 0)
 })

@@ -2,7 +2,7 @@ fake_bundle <- function(..., frame = parent.frame()) {
   dir <- withr::local_tempdir(.local_envir = frame)
   fields <- utils::modifyList(list(
     System = bundle_system(), Lock = lock_hash(), Extras = "box2d", Python = "3.12",
-    Brings = "packages", UvHash = "none"
+    Contains = "packages", UvHash = "none"
   ), list(...))
   write.dcf(fields, file.path(dir, "bundle.dcf"))
   dir
@@ -17,7 +17,7 @@ test_that("a bundle installs without a network", {
     expect_identical(gym_server_bundle(dir, "box2d"), normalizePath(dir)), "The bundle is ready"
   ))
   expect_true(all(list.files(dir) %in% c("bundle.dcf", "wheels", "lock", "uv", "python")))
-  # Anybody else's folder stays as it is.
+  # Any other folder stays as it is.
   writeLines("", file.path(dir, "thesis.txt"))
   expect_error(gym_server_bundle(dir), "empty folder", class = "gym_error_argument")
 
@@ -68,13 +68,13 @@ test_that("an earlier bundle stays until it is clear how a new one can be made",
 
 bundle_with_uv <- function(..., hash = NULL, frame = parent.frame()) {
   uv <- fake_program(withr::local_tempfile(), ...)
-  dir <- fake_bundle(Brings = "uv and Python", UvHash = hash %||% file_sha256(uv), frame = frame)
+  dir <- fake_bundle(Contains = "uv and Python", UvHash = hash %||% file_sha256(uv), frame = frame)
   dir.create(file.path(dir, "uv"))
   file.copy(uv, file.path(dir, "uv", "uv"))
   dir
 }
 
-test_that("nothing of a bundle is copied before somebody says yes", {
+test_that("nothing of a bundle is copied before the answer is yes", {
   skip_on_os("windows")
   local_cache()
   asked <- character()
@@ -107,11 +107,11 @@ test_that("where a bundle's uv does not run another is taken", {
   uv <- local_failing_uv("error: Failed to fetch")
   dir.create(install_root(), recursive = TRUE)
   works <- bundle_plan(bundle_with_uv("echo 'uv 0.99.0'"), "box2d", NULL)
-  expect_identical(take_bundled_uv(works, NULL), works)
+  expect_identical(copy_bundled_uv(works, NULL), works)
   expect_true(uv_works(works$tool))
   broken <- bundle_plan(bundle_with_uv("exit 1"), "box2d", NULL)
   expect_identical(broken$tool, bundled_uv())
-  expect_identical(take_bundled_uv(broken, NULL)$tool, uv)
+  expect_identical(copy_bundled_uv(broken, NULL)$tool, uv)
 })
 
 test_that("a bundle for something else says so", {
@@ -123,8 +123,8 @@ test_that("a bundle for something else says so", {
   refused(System = "windows-riscv", words = "another system, windows-riscv")
   refused(Lock = "0123456789ab", words = "another version of this package")
   refused(Extras = "atari", words = "lacks \"box2d\"")
-  refused(Python = "3.7", words = "for Python 3.7 and brings none")
-  expect_error(gym_server_install(offline = withr::local_tempdir()), "no whole bundle",
+  refused(Python = "3.7", words = "for Python 3.7 and contains none")
+  expect_error(gym_server_install(offline = withr::local_tempdir()), "no complete bundle",
                class = "gym_error_install")
   expect_false(dir.exists(file.path(install_root(), "installing")))
 })

@@ -27,7 +27,7 @@ test_that("a session waits for another one, with a message", {
   expect_true(found)
 })
 
-test_that("a session that was killed keeps nobody waiting", {
+test_that("a session that was killed keeps no other waiting", {
   skip_on_cran()
   skip_on_os("windows")
   local_cache()
@@ -39,7 +39,7 @@ test_that("a session that was killed keeps nobody waiting", {
   expect_identical(with_install_lock(7), 7)
 })
 
-test_that("the lock of another machine's session is stale when nobody touches it", {
+test_that("the lock of another machine's session is stale when it is not touched", {
   local_cache()
   dir.create(install_lock(), recursive = TRUE)
   writeLines(c("another-machine", "1"), install_lock_owner())

@@ -1,37 +1,37 @@
 test_that("a failure says what to do", {
-  said <- function(...) paste(install_advice(c(...)), collapse = " ")
+  advice <- function(...) paste(install_advice(c(...)), collapse = " ")
   # The words are those of uv 0.13.9 and pip 23.2.1.
-  expect_match(said(
+  expect_match(advice(
     "error: Failed to install: numpy-2.5.5-cp312-cp312-manylinux_2_28_x86_64.whl (numpy==2.5.5)",
     "cause: failed to copy file: No space left on device (os error 28)"
   ), "disk is full")
-  expect_match(said(
+  expect_match(advice(
     "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device"
   ), "disk is full")
-  expect_match(said(
+  expect_match(advice(
     "error: Failed to fetch: `https://index.example/simple/blinker/`",
     "cause: client error (Connect)", "cause: invalid peer certificate: UnknownIssuer"
   ), "SSL_CERT_FILE")
-  expect_match(said(
+  expect_match(advice(
     "WARNING: Retrying after connection broken by 'SSLError(SSLCertVerificationError(1, ...))'",
     "ERROR: Could not find a version that satisfies the requirement blinker==1.9.0"
   ), "PIP_CERT")
-  expect_match(said(
+  expect_match(advice(
     "cause: tunnel error: failed to create underlying connection", "cause: tcp connect error"
   ), "HTTPS_PROXY")
-  expect_match(said(
+  expect_match(advice(
     "cause: dns error", "cause: failed to lookup address information: Name or service not known"
   ), "gym_server_bundle")
-  expect_match(said(
+  expect_match(advice(
     "ERROR: Could not find a version that satisfies blinker==1.9.0 (from versions: none)"
   ), "network")
-  expect_match(said(
+  expect_match(advice(
     "ERROR: Could not find a version that satisfies numpy==2.5.5 (from versions: 1.0, 2.2.6)"
   ), "Python 3.10 to 3.13")
-  expect_match(said(
+  expect_match(advice(
     "error: Hash mismatch for `blinker==1.9.0`", "Expected:", "  sha256:0", "Computed:"
   ), "refused")
-  expect_match(said(
+  expect_match(advice(
     "ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE."
   ), "refused")
   expect_identical(install_advice("something else"), character())
@@ -39,8 +39,8 @@ test_that("a failure says what to do", {
 
 test_that("an error shows the lines that name it", {
   lines <- c("Resolved 14 packages", "error: Failed to fetch", "cause: dns error", "")
-  expect_identical(telling_lines(lines), c("error: Failed to fetch", "cause: dns error"))
-  expect_identical(telling_lines(c(letters, "")), tail(letters, 6L))
+  expect_identical(error_lines(lines), c("error: Failed to fetch", "cause: dns error"))
+  expect_identical(error_lines(c(letters, "")), tail(letters, 6L))
 })
 
 test_that("a tool gets nothing of another Python's, and its words go into the log", {

@@ -17,7 +17,7 @@ local_release <- function(uv, frame = parent.frame()) {
   archive
 }
 
-test_that("uv is looked for in the order that the help page tells", {
+test_that("uv is looked for in the order of the help page", {
   skip_on_os("windows")
   local_cache()
   folder <- withr::local_tempdir()
@@ -25,13 +25,13 @@ test_that("uv is looked for in the order that the help page tells", {
   path <- fake_uv(file.path(folder, "path"))
   home <- fake_uv(file.path(folder, "home", ".local", "bin"))
   own <- fake_uv(file.path(tools::R_user_dir("reticulate", "cache"), "uv", "bin"))
-  brought <- fake_uv(dirname(brought_uv()))
+  pinned <- fake_uv(dirname(pinned_uv()))
   withr::local_envvar(
     GYM_UV = NA, RETICULATE_UV = reticulate, HOME = file.path(folder, "home"),
     PATH = paste(dirname(path), "/usr/bin", "/bin", sep = ":")
   )
   expect_identical(uv_candidates()[1:2], c(reticulate, path))
-  expect_identical(tail(uv_candidates(), 2L), c(own, brought))
+  expect_identical(tail(uv_candidates(), 2L), c(own, pinned))
   expect_identical(find_uv(), reticulate)
   # One that is too old, or not uv at all, is passed over.
   fake_uv(dirname(reticulate), "0.6.17")
@@ -60,7 +60,7 @@ test_that("one that hangs is passed over, and all are asked within the limit", {
   expect_equal(limits[3:4], c(30, 30))
 })
 
-test_that("a uv that does not answer is told of by gym_sitrep() soon", {
+test_that("gym_sitrep() soon reports a uv that does not answer", {
   skip_on_os("windows")
   local_cache()
   folder <- withr::local_tempdir()
@@ -100,45 +100,45 @@ test_that("the pinned uv has a checksum for each system, and this system a name"
     expect_true(uv_target() %in% names(uv_release$checksums))
   }
   local_binding("system_name", function() "sunos-sparc")
-  expect_error(bring_uv(NULL), "Install Python", class = "gym_error_install")
+  expect_error(install_uv(NULL), "Install Python", class = "gym_error_install")
 })
 
-test_that("uv is brought, and run only when its checksum is right", {
+test_that("uv is downloaded, and run only when its checksum is right", {
   skip_on_os("windows")
   local_cache()
   folder <- withr::local_tempdir()
   uv <- fake_uv(folder)
   archive <- local_release(uv)
-  expect_message(brought <- bring_uv(NULL), "Downloading uv")
-  expect_identical(brought, brought_uv())
-  expect_true(uv_works(brought))
-  expect_identical(list.files(dirname(brought)), "uv")
-  expect_silent(bring_uv(NULL))
-  # What does not run any more is brought anew.
-  writeLines(character(), brought)
-  expect_message(bring_uv(NULL), "Downloading uv")
-  expect_true(uv_works(brought))
+  expect_message(pinned <- install_uv(NULL), "Downloading uv")
+  expect_identical(pinned, pinned_uv())
+  expect_true(uv_works(pinned))
+  expect_identical(list.files(dirname(pinned)), "uv")
+  expect_silent(install_uv(NULL))
+  # What does not run any more is downloaded anew.
+  writeLines(character(), pinned)
+  expect_message(install_uv(NULL), "Downloading uv")
+  expect_true(uv_works(pinned))
 
-  unlink(dirname(brought), recursive = TRUE)
+  unlink(dirname(pinned), recursive = TRUE)
   ran <- file.path(folder, "ran")
   writeLines(c("#!/bin/sh", paste0("touch '", ran, "'"), "echo 'uv 0.9.0'"), uv)
   right <- asNamespace("gym")$uv_release
   local_release(uv)
   # The archive is another than the one whose checksum is known.
   local_binding("uv_release", right)
-  expect_error(suppressMessages(bring_uv(NULL)), "SHA-256", class = "gym_error_install")
+  expect_error(suppressMessages(install_uv(NULL)), "SHA-256", class = "gym_error_install")
   expect_false(file.exists(ran))
-  expect_identical(list.files(dirname(brought)), character())
+  expect_identical(list.files(dirname(pinned)), character())
   # A second try, with the right one.
   withr::local_envvar(UV_DOWNLOAD_URL = paste0("file://", dirname(archive)))
-  expect_identical(suppressMessages(bring_uv(NULL)), brought)
+  expect_identical(suppressMessages(install_uv(NULL)), pinned)
 })
 
-test_that("a download that fails says what else there is", {
+test_that("a download that fails says what else can be done", {
   local_cache()
   dir.create(install_root(), recursive = TRUE)
   withr::local_envvar(UV_DOWNLOAD_URL = "http://127.0.0.1:9")
-  error <- expect_error(suppressMessages(bring_uv(NULL)), class = "gym_error_install")
+  error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
   expect_match(conditionMessage(error), "HTTPS_PROXY", fixed = TRUE)
   expect_match(conditionMessage(error), "by hand", fixed = TRUE)
 })
@@ -147,6 +147,6 @@ test_that("an archive without a uv that runs is refused", {
   skip_on_os("windows")
   local_cache()
   local_release(withr::local_tempfile(lines = "not a program"))
-  expect_error(suppressMessages(bring_uv(NULL)), "cannot be run", class = "gym_error_install")
-  expect_false(file.exists(brought_uv()))
+  expect_error(suppressMessages(install_uv(NULL)), "cannot be run", class = "gym_error_install")
+  expect_false(file.exists(pinned_uv()))
 })

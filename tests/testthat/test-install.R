@@ -1,7 +1,7 @@
 # What the package's own tests cannot do without the network is in one test, so that packages are
 # downloaded once.
 
-test_that("an installation runs the server, takes extras and mends itself", {
+test_that("an installation runs the server, takes extras and repairs itself", {
   local_cache()
   skip_if_no_uv()
   skip_if_no_packages()
@@ -18,7 +18,7 @@ test_that("an installation runs the server, takes extras and mends itself", {
   expect_match(conditionMessage(error), "gym_server_install(extras = \"box2d\")", fixed = TRUE)
   expect_match(error$hint, "gym_server_stop()", fixed = TRUE)
 
-  # Its server goes on, and is told of.
+  # Its server goes on, and the message mentions it.
   suppressMessages(expect_message(
     second <- gym_server_install("box2d"), "still runs from what was installed before"
   ))
@@ -38,7 +38,7 @@ test_that("an installation runs the server, takes extras and mends itself", {
   expect_length(install_folders(), 1L)
 
   # A file inside a package, which only the trial notices.
-  site <- file.path(installed_server()$folder, read_marker(installed_server()$folder)$site)
+  site <- file.path(installed_server()$folder, read_manifest(installed_server()$folder)$site)
   unlink(file.path(site, "flask", "app.py"))
   expect_false(is.null(installed_server()))
   fourth <- suppressMessages(gym_server_install())
@@ -70,7 +70,7 @@ test_that("a Python that only ends in order cannot run the server", {
   expect_false(has_all(installed_server(), character()))
 })
 
-test_that("who says no gets nothing, and who says yes is asked once", {
+test_that("after a no nothing is installed, and a yes is asked for once", {
   local_cache()
   local_failing_uv("error: Failed to fetch")
   asked <- character()

@@ -103,7 +103,7 @@ test_that("the unit's options are the server's", {
   for (option in options) expect_match(help, option, fixed = TRUE)
 })
 
-test_that("a proxy whose server is gone is told from one that is no Gym server", {
+test_that("a proxy whose server is gone is distinguished from one that is no Gym server", {
   skip_if_no_nginx()
   server <- local_locked_server(allow_host = "gym.example.org")
   proxy <- local_proxy(server)

@@ -13,7 +13,7 @@ local_stranger <- function(name, frame = parent.frame()) {
   as.integer(port)
 }
 
-test_that("a server's place is told from other addresses", {
+test_that("a server's place is distinguished from other addresses", {
   expect_identical(local_place("http://127.0.0.1:5000"), list(host = "127.0.0.1", port = 5000L))
   expect_identical(local_place("http://localhost:5001"), list(host = "127.0.0.1", port = 5001L))
   expect_identical(local_place("http://127.1.2.3:80"), list(host = "127.1.2.3", port = 80L))
@@ -63,14 +63,14 @@ test_that("asking who listens leaves R's generator alone", {
   expect_identical(.Random.seed, before)
 })
 
-test_that("AirPlay at the port is told by its name, with the mend", {
+test_that("AirPlay at the port is recognised by its name, with the hint", {
   client <- create_GymClient(paste0("http://127.0.0.1:", local_stranger("AirTunes/695.5.1")))
   error <- expect_error(env_create(client, "CartPole-v0"), class = "gym_error_http_403")
   expect_match(conditionMessage(error), "AirPlay", fixed = TRUE)
   expect_match(conditionMessage(error), "gym_server_start()", fixed = TRUE)
 })
 
-test_that("another program at the port is told by its name", {
+test_that("another program at the port is named", {
   port <- local_stranger("Fish/1.0")
   base <- paste0("http://127.0.0.1:", port)
   error <- expect_error(env_list_all(create_GymClient(base)), class = "gym_error_http_403")
@@ -83,7 +83,7 @@ test_that("another program at the port is told by its name", {
   expect_match(conditionMessage(error), "Fish/1.0", fixed = TRUE)
 })
 
-test_that("a port that is taken: the error says who has it", {
+test_that("a port that is taken: the error says what has it", {
   server <- local_server()
   base <- server$remote_base
   start <- function(base) gym_server_start(port = local_place(base)$port)

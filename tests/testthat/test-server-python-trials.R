@@ -1,4 +1,4 @@
-test_that("each Python is tried, and what it lacks is told", {
+test_that("each Python is tried, and what it lacks is reported", {
   skip_on_os("windows")
   working <- working_python()
   folder <- withr::local_tempdir()

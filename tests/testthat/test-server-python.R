@@ -1,4 +1,4 @@
-test_that("Python is looked for in the order that the help page tells", {
+test_that("Python is looked for in the order of the help page", {
   folder <- withr::local_tempdir()
   commands <- file.path(folder, c("venv/bin/python3", "path/python3", "WindowsApps/python3"))
   for (command in commands) {

@@ -24,7 +24,7 @@ test_that("where all is well the report says so on one screen", {
   report()
   seen <- sitrep()
   expect_s3_class(seen$found, "gym_sitrep")
-  expect_named(seen$found, c("topic", "what", "finding", "state", "mend"))
+  expect_named(seen$found, c("topic", "what", "finding", "state", "fix"))
   expect_false(any(seen$found$state == "wrong"))
   expect_lte(length(seen$lines), 25)
   expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
@@ -33,17 +33,17 @@ test_that("where all is well the report says so on one screen", {
   expect_identical(capture.output(print(seen$found)), seen$lines)
 })
 
-test_that("without a Python the report names the call that mends it", {
+test_that("without a Python the report names the call that fixes it", {
   report(runs = FALSE, reason = "No module named 'flask'")
   seen <- sitrep()
   wrong <- seen$found[seen$found$state == "wrong", ]
   expect_identical(wrong$what, "environment")
-  expect_identical(wrong$mend, "gym_server_install()")
+  expect_identical(wrong$fix, "gym_server_install()")
   expect_match(seen$text, "No module named 'flask'", fixed = TRUE)
   expect_match(seen$text, "1 thing is wrong", fixed = TRUE)
 })
 
-test_that("whoever plays on another machine needs no Python", {
+test_that("a session that plays on another machine needs no Python", {
   url <- test_client()$remote_base
   report(runs = FALSE, reason = "No module named 'flask'")
   withr::local_envvar(GYM_SERVER_URL = url)
@@ -58,10 +58,10 @@ test_that("a Python that GYM_PYTHON names and that cannot run the server is wron
   found <- sitrep()$found
   row <- found[startsWith(found$what, "/some/python3"), ]
   expect_identical(row$state, "wrong")
-  expect_identical(row$mend, "Sys.unsetenv(\"GYM_PYTHON\")")
+  expect_identical(row$fix, "Sys.unsetenv(\"GYM_PYTHON\")")
 })
 
-test_that("the installed environment is told: whole, damaged, or of another version", {
+test_that("the installed environment is reported: complete, damaged, or of another version", {
   report()
   folder <- withr::local_tempdir()
   writeBin(raw(3e6), file.path(folder, "x"))
@@ -90,10 +90,10 @@ test_that("an installed Python that cannot run the server is wrong", {
   found <- sitrep()$found
   row <- found[startsWith(found$what, "/some/python3"), ]
   expect_identical(row$state, "wrong")
-  expect_identical(row$mend, "gym_server_install()")
+  expect_identical(row$fix, "gym_server_install()")
 })
 
-test_that("the session's server is told with its environments, also when it died", {
+test_that("the session's server is reported with its environments, also when it died", {
   server <- test_client()
   known <- the_session$servers
   python <- known[[server$remote_base]]$python
@@ -116,7 +116,7 @@ test_that("the session's server is told with its environments, also when it died
   row <- server_row()
   expect_match(row$finding, "ended with status")
   expect_identical(row$state, "wrong")
-  expect_identical(row$mend, "gym_server_log()")
+  expect_identical(row$fix, "gym_server_log()")
 })
 
 test_that("the server that GYM_SERVER_URL names is looked at, its password kept", {
@@ -126,7 +126,7 @@ test_that("the server that GYM_SERVER_URL names is looked at, its password kept"
   found <- sitrep()$found
   row <- found[grepl("(GYM_SERVER_URL)", found$what, fixed = TRUE), ]
   expect_identical(row$state, "wrong")
-  expect_identical(row$mend, paste0("gym_server_start(port = ", port, ")"))
+  expect_identical(row$fix, paste0("gym_server_start(port = ", port, ")"))
   withr::local_envvar(GYM_SERVER_URL = paste0("http://ann:secret@127.0.0.1:", port))
   seen <- sitrep()
   expect_no_match(seen$text, "secret")

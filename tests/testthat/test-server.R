@@ -1,4 +1,4 @@
-test_that("a server starts on a free port, tells its log and stops", {
+test_that("a server starts on a free port, has a log and stops", {
   server <- local_server(log_level = "info")
   env_close(server, env_create(server, "CartPole-v1"))
   expect_match(gym_server_log(server), "CartPole-v1", all = FALSE)
@@ -50,7 +50,7 @@ test_that("a port that is taken is an error with the server's words", {
   expect_type(env_list_all(server), "list")
 })
 
-test_that("a Python that cannot run the server is named, with the mend", {
+test_that("a Python that cannot run the server is named, with the hint", {
   error <- expect_error(
     gym_server_start(python = "/no/such/python"), class = "gym_error_server_start"
   )
@@ -196,7 +196,7 @@ test_that("R that is killed while it starts a server or uses it leaves none behi
     }, NA))
   }
   for (moment in c(0.5, 1, 1.5, 3)) {
-    mark <- new_key()
+    mark <- random_key()
     session <- processx::process$new(
       file.path(R.home("bin"), "Rscript"), script, env = c("current", GYM_MARK = mark)
     )
@@ -226,7 +226,7 @@ test_that("the server does not get the library path that R made for itself", {
   expect_identical(strsplit(path_in_r(""), "\n")[[1]][[1]], "")
 })
 
-test_that("a server that takes too long to start is given up, and the error says how to wait", {
+test_that("a server that takes too long to start is killed, and the error says how to wait", {
   skip_if_no_server()
   expect_error(
     gym_server_start(timeout = 0.01), "within 0.01 seconds.*timeout = ",

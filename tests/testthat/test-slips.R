@@ -1,6 +1,6 @@
 # What somebody is told who slips.
 
-test_that("an action that is none is told which there are", {
+test_that("the error for an action that is none names those that there are", {
   env <- local_env()
   env$reset()
   cnd <- expect_error(env$step(2), "The action 2 is not in Discrete(2)", fixed = TRUE,

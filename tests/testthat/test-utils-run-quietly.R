@@ -1,4 +1,4 @@
-test_that("what a program says is returned, and R's generator stays as it was", {
+test_that("a program's output is returned, and R's generator stays as it was", {
   skip_on_os("windows")
   set.seed(1)
   before <- .Random.seed

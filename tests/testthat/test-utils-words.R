@@ -1,4 +1,4 @@
-test_that("numbers are rounded for people, one by one where they stand apart", {
+test_that("numbers are rounded for printing, one by one where they stand apart", {
   expect_identical(number_text(12345.678), "12,346")
   expect_identical(number_text_each(c(a = 1, b = 0.125)), c("1", "0.125"))
   expect_identical(percent_text(0.331), "33%")

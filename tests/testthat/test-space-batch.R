@@ -96,7 +96,7 @@ refused <- function(space, values, n, ...) {
   error
 }
 
-test_that("a wrong number of sub-environments is told with both numbers", {
+test_that("the error for a wrong number of sub-environments has both numbers", {
   spaces <- sub_envs_of_spaces()
   wrong <- list(
     discrete = 5:7, box = matrix(0, 3, 2), picture = array(0, c(3, 2, 3)), scalar = c(0, 0, 0),
