@@ -61,7 +61,7 @@ def why_unavailable(spec: EnvSpec) -> str | None:
 
 
 def _needs_package(module: str) -> str:
-    return f"it needs the Python package '{module}', which no extra brings"
+    return f"it needs the Python package '{module}', which no extra installs"
 
 
 def _major_version(package: str) -> int:

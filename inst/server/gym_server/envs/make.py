@@ -80,7 +80,7 @@ def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
         if refusal.code == "missing_dependency" and module:
             raise GymServerError(
                 "missing_dependency",
-                f"{spec.id} needs the Python package '{module}', which no extra brings",
+                f"{spec.id} needs the Python package '{module}', which no extra installs",
                 "install it into the server's Python",
             ) from refusal
         raise

@@ -127,7 +127,7 @@ def _why_no_entry_point(request: _Request) -> str | None:
     if request.config.wrappers or request.spec.additional_wrappers:
         return "it takes no wrappers"
     if request.kwargs.get("max_episode_steps", 1) in (-1, None):
-        return "it has no words for no time limit"
+        return "it has no value for no time limit"
     if isinstance(request.config.seed, tuple):
         return "it has one generator for all sub-environments, so it takes one seed"
     return None

@@ -97,7 +97,15 @@ class WorkerProcess:
             raise self._end_after(fault) from None
 
     def report_end(self) -> None:
-        """From now on call ``on_end`` when it ends without being asked to, or if it has already."""
+        """From now on call ``on_end`` when it ends without being asked to, or if it has already.
+
+        It may end while this is called. The lock leaves two orders, and ``on_end`` is called once:
+
+        1. ``_await_end()`` sets ``why`` first and sees an expected end, of which it tells no one;
+           then this finds ``why`` and calls ``on_end``.
+        2. This clears ``_end_expected`` first and finds no ``why``; then ``_await_end()`` calls
+           ``on_end``.
+        """
         with self._lock:
             self._phase = "by itself"
             self._end_expected = False

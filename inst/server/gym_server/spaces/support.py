@@ -62,6 +62,6 @@ def _supported() -> list[str]:
 def _unsupported(space: Space, reason: str, hint: str | None = None) -> GymServerError:
     return GymServerError(
         "unsupported_space",
-        f"This server cannot speak of the space {brief_space(space)}: {reason}",
+        f"This server does not support the space {brief_space(space)}: {reason}",
         hint,
     )
