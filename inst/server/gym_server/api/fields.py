@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from gym_server.envs.wrappers import Wrapper
+from gym_server.envs.config import Wrapper
 from gym_server.errors import invalid_parameter
 from gym_server.protocol.fields import TRUE_OR_FALSE, Kind, boolean, integer, json_object, text
 
