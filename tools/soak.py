@@ -104,7 +104,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "loops": python("guests", "loops", 1 if quick else 4),
         "processes": python("guests", "processes", 1 if quick else 5),
         "keys": python("keys", 4_000 if quick else 40_000),
-        "os-exit": pytest("tests/test_worker_process.py"),
+        "os-exit": pytest("tests/processes/test_worker_process.py"),
         "soak": python("soak", lasting(1800, 60)),
     }
 

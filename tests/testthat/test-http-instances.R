@@ -21,7 +21,8 @@ test_that("what a session created on another's server is closed with it, classic
     server,
     "classic <- env_create(server, 'CartPole-v1')",
     "env <- gym_make('CartPole-v1', client = server)",
-    "three <- gym_make('CartPole-v1', num_envs = 3, client = create_GymClient(server$remote_base))",
+    "again <- create_GymClient(server$remote_base)",
+    "envs <- gym_make('CartPole-v1', num_envs = 3, client = again)",
     "invisible(env$reset())",
     "cat(length(env_list_all(server)))"
   )
@@ -159,7 +160,7 @@ test_that("what was refused or never sent is not remembered", {
   nobody <- create_GymClient(paste0("http://127.0.0.1:", free_port()))
   error <- expect_error(env_create(nobody, "CartPole-v1"), class = "gym_error_connection")
   expect_false(error$reached)
-  expect_identical(made(), before)
+  expect_identical(created(), before)
 })
 
 test_that("a server that was stopped has nothing left to close", {

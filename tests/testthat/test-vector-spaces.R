@@ -40,7 +40,7 @@ make_mirrors <- function(server, ...) {
   )
 }
 
-test_that("values of random spaces come back to Python from their own sub-environments", {
+test_that("values of random spaces reach Python in the sub-environment that they are for", {
   skip_unless_all()
   skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
@@ -107,7 +107,7 @@ test_that("the last observation of a sub-environment is kept for every kind of s
   }
 })
 
-test_that("infos of sub-environments arrive by sub-environment, pictures with the sub-environment first", {
+test_that("infos have an entry for each sub-environment, and pictures one dimension more", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Telling-v0", num_envs = 2, client = server)
   env$reset()
@@ -144,7 +144,7 @@ test_that("numbers of sub-environments keep their types, and what R cannot hold 
   expect_error(make("LargestNatural")$reset(), class = "gym_error_space")
 })
 
-test_that("actions of sub-environments are drawn by the server in the form in which it takes them", {
+test_that("the server draws actions of a vector environment in the form in which it takes them", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -157,7 +157,7 @@ test_that("actions of sub-environments are drawn by the server in the form in wh
   expect_false(env_action_space_contains(server, env$instance_id, drawn))
 })
 
-test_that("a nested action of a sub-environment that does not fit is named with its sub-environment", {
+test_that("an error about a nested action names the sub-environment", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -172,7 +172,7 @@ test_that("a nested action of a sub-environment that does not fit is named with 
                class = "gym_error_space")
 })
 
-test_that("an exception in one sub-environment is reported, and the others' server goes on", {
+test_that("an exception in one sub-environment is an error, and the server goes on", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()

@@ -28,7 +28,7 @@ from wsgiref.util import setup_testing_defaults
 
 import gymnasium
 from gym_server.api.app import create_app
-from gym_server.protocol import wire
+from gym_server.protocol import answers, bodies
 
 _STEPS = 8  # With alternating actions no episode of CartPole ends earlier.
 _EPISODES = 100
@@ -144,8 +144,8 @@ def application(pause: str) -> dict[str, float]:
         "whole": timed(
             lambda action: _post("step/", requests(action)), sleep, lambda: _post("reset/")
         ),
-        "loads": timed(lambda _: wire.loads(body), sleep),
-        "answer": timed(lambda _: wire.answer(answer, None), sleep),
+        "loads": timed(lambda _: bodies.loads(body), sleep),
+        "answer": timed(lambda _: answers.answer(answer, None), sleep),
         "env": timed(_env.step, sleep, _env.reset),
     }
 

@@ -27,8 +27,8 @@ class Bystander:
         """
         self._new = lambda: Client(port, _TIMEOUT_SECONDS, token)
         self._player = self._new()
-        made = self._player.post("/v1/envs/", env_id="CartPole-v1")
-        self._url = f"/v1/envs/{made['instance_id']}"
+        created = self._player.post("/v1/envs/", env_id="CartPole-v1")
+        self._url = f"/v1/envs/{created['instance_id']}"
         self._player.post(f"{self._url}/reset/", seed=1)
         self._seconds: dict[str, list[float]] = {"steps": [], "new connections": []}
         self._failed = 0

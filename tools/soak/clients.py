@@ -3,7 +3,7 @@
     tools/in-env python tools/soak/clients.py [CLIENTS [STEPS]]
 
 All play at the same time on one server; what they saw is compared with the same environments
-made and played in this process, number by number.
+played in this process, number by number.
 """
 
 from __future__ import annotations
@@ -40,39 +40,39 @@ KINDS = [
 def plan(number: int, steps: int, folder: Path) -> dict:
     """Write down what one client plays; two that follow each other play the same, R and Python."""
     kind = KINDS[number // 2 % len(KINDS)]
-    sub_envs = kind.get("num_envs", 1)
+    num_envs = kind.get("num_envs", 1)
     rng = np.random.default_rng(number)
     env = gymnasium.make(kind["env_id"])
     box = isinstance(env.action_space, gymnasium.spaces.Box)
     actions = (
-        rng.uniform(-2, 2, (steps, sub_envs)) if box else rng.integers(0, 2, (steps, sub_envs))
+        rng.uniform(-2, 2, (steps, num_envs)) if box else rng.integers(0, 2, (steps, num_envs))
     )
     # As the server has them, which rounds to the action space's dtype.
     actions = actions.astype(np.float32 if box else np.int64).astype(np.float64)
     env.close()
     actions.tofile(folder / f"{number}.actions")
-    told = {**kind, "num_envs": sub_envs, "box": box, "seed": 1000 + number, "steps": steps}
-    told |= {"actions": str(folder / f"{number}.actions"), "seen": str(folder / f"{number}.seen")}
-    (folder / f"{number}.json").write_text(json.dumps(told))
-    return told
+    task = {**kind, "actions_a_step": num_envs, "box": box, "seed": 1000 + number, "steps": steps}
+    task |= {"actions": str(folder / f"{number}.actions"), "seen": str(folder / f"{number}.seen")}
+    (folder / f"{number}.json").write_text(json.dumps(task))
+    return task
 
 
-def play_here(told: dict) -> np.ndarray:
+def play_here(task: dict) -> np.ndarray:
     """Return what is to be seen, from Gymnasium in this process."""
-    sub_envs, box = told["num_envs"], told["box"]
-    vector = "num_envs" in told
+    num_envs, box = task["actions_a_step"], task["box"]
+    vector = "num_envs" in task
     if vector:
         # As the server chooses: the environment's own class where it has one.
-        own = gymnasium.spec(told["env_id"]).vector_entry_point is not None
+        own = gymnasium.spec(task["env_id"]).vector_entry_point is not None
         mode = "vector_entry_point" if own else "sync"
-        env = gymnasium.make_vec(told["env_id"], num_envs=sub_envs, vectorization_mode=mode)
+        env = gymnasium.make_vec(task["env_id"], num_envs=num_envs, vectorization_mode=mode)
     else:
-        env = gymnasium.make(told["env_id"])
+        env = gymnasium.make(task["env_id"])
     seen = []
-    observation, _ = env.reset(seed=told["seed"])
-    for row in np.fromfile(told["actions"]).reshape(-1, sub_envs):
+    observation, _ = env.reset(seed=task["seed"])
+    for row in np.fromfile(task["actions"]).reshape(-1, num_envs):
         if box:
-            action = row.astype(np.float32).reshape((sub_envs, 1) if vector else (1,))
+            action = row.astype(np.float32).reshape((num_envs, 1) if vector else (1,))
         else:
             action = row.astype(np.int64) if vector else int(row[0])
         observation, reward, terminated, truncated, _ = env.step(action)
@@ -84,29 +84,29 @@ def play_here(told: dict) -> np.ndarray:
     return np.concatenate([np.asarray(part, np.float64).ravel() for part in seen])
 
 
-def play_there(port: int, told: dict) -> None:
+def play_there(port: int, task: dict) -> None:
     """Play over HTTP, as this client would."""
-    sub_envs, box = told["num_envs"], told["box"]
+    num_envs, box = task["actions_a_step"], task["box"]
     client = Client(port)
-    fields = {name: told[name] for name in ("env_id", "num_envs") if name in told}
+    fields = {name: task[name] for name in ("env_id", "num_envs") if name in task}
     url = f"/v1/envs/{client.post('/v1/envs/', **fields)['instance_id']}"
     seen = []
-    if "num_envs" in told:
-        client.post(f"{url}/reset/", seed=told["seed"])
-        for row in np.fromfile(told["actions"]).reshape(-1, sub_envs):
+    if "num_envs" in task:
+        client.post(f"{url}/reset/", seed=task["seed"])
+        for row in np.fromfile(task["actions"]).reshape(-1, num_envs):
             action = [[number] for number in row] if box else [int(number) for number in row]
             answer = client.post_for_tensors(f"{url}/step/", action=action)
             seen += [_numbers(*answer[name]) for name in SEEN]
     else:
-        client.post(f"{url}/reset/", seed=told["seed"])
-        for (number,) in np.fromfile(told["actions"]).reshape(-1, 1):
+        client.post(f"{url}/reset/", seed=task["seed"])
+        for (number,) in np.fromfile(task["actions"]).reshape(-1, 1):
             answer = client.post(f"{url}/step/", action=[number] if box else int(number))
             seen += [answer[name] for name in SEEN]
             if answer["done"]:
                 seen.append(client.post(f"{url}/reset/")["observation"])
     client.post(f"{url}/close/")
     flat = [np.asarray(part, np.float64).ravel() for part in seen]
-    np.concatenate(flat).tofile(told["seen"])
+    np.concatenate(flat).tofile(task["seen"])
 
 
 _DTYPES = {"F32": "<f4", "F64": "<f8", "BOOL": "?", "I64": "<i8"}
@@ -118,11 +118,11 @@ def _numbers(dtype: str, shape: list[int], data: bytes) -> np.ndarray:
 
 def start(number: int, port: int, folder: Path) -> subprocess.Popen:
     """Start one client: every other one is R."""
-    told = folder / f"{number}.json"
+    task = folder / f"{number}.json"
     if number % 2:
-        command = [sys.executable, __file__, "play", str(port), str(told)]
+        command = [sys.executable, __file__, "play", str(port), str(task)]
     else:
-        command = ["Rscript", "--no-init-file", str(HERE / "clients.R"), str(port), str(told)]
+        command = ["Rscript", "--no-init-file", str(HERE / "clients.R"), str(port), str(task)]
     return subprocess.Popen(command)
 
 
@@ -138,10 +138,10 @@ def main(clients: int, steps: int) -> int:
         seconds = time.monotonic() - began
         left = Client(server.port).get("/v1/health/")["instances"]
         server.stop()
-        differing = [told for told in plans if not _is_same(told)]
-    for told in differing:
-        print(f"differs: {told}", flush=True)
-    taken = sum(told["steps"] for told in plans)
+        differing = [task for task in plans if not _is_same(task)]
+    for task in differing:
+        print(f"differs: {task}", flush=True)
+    taken = sum(task["steps"] for task in plans)
     print(
         f"clients: {taken} steps of {clients} clients in {seconds:.0f} s, trajectories that differ "
         f"{len(differing)}, clients that failed {failed}, environments left {left}"
@@ -149,10 +149,10 @@ def main(clients: int, steps: int) -> int:
     return int(bool(differing or failed or left))
 
 
-def _is_same(told: dict) -> bool:
-    if not os.path.exists(told["seen"]):
+def _is_same(task: dict) -> bool:
+    if not os.path.exists(task["seen"]):
         return False
-    return np.array_equal(np.fromfile(told["seen"]), play_here(told), equal_nan=True)
+    return np.array_equal(np.fromfile(task["seen"]), play_here(task), equal_nan=True)
 
 
 if __name__ == "__main__":

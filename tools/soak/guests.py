@@ -36,8 +36,8 @@ class Player:
 
     def __init__(self, port: int) -> None:
         self._client = Client(port)
-        made = self._client.post("/v1/envs/", env_id="CartPole-v1")
-        self._url = f"/v1/envs/{made['instance_id']}"
+        created = self._client.post("/v1/envs/", env_id="CartPole-v1")
+        self._url = f"/v1/envs/{created['instance_id']}"
         self._client.post(f"{self._url}/reset/", seed=1)
 
     def play(self, seconds: float, until=lambda: False) -> list[float]:
@@ -80,10 +80,10 @@ def loops(port: int, granted: list[str]) -> None:
     """Ask for steps without an end."""
     client = Client(port)
     fields = {"env_id": "CartPole-v1", "kwargs": ENDLESS, "wrappers": REPEATS}
-    made = ask(client, granted, "/v1/envs/", **fields)
-    if made is not None:
-        ask(client, granted, f"/v1/envs/{made['instance_id']}/reset/")
-        ask(client, granted, f"/v1/envs/{made['instance_id']}/step/", action=1)
+    created = ask(client, granted, "/v1/envs/", **fields)
+    if created is not None:
+        ask(client, granted, f"/v1/envs/{created['instance_id']}/reset/")
+        ask(client, granted, f"/v1/envs/{created['instance_id']}/step/", action=1)
     # An angle that Acrobot turns back by one round after the other.
     url = f"/v1/envs/{client.post('/v1/envs/', env_id='Acrobot-v1')['instance_id']}"
     if ask(client, granted, f"{url}/reset/", options={"low": 1e17, "high": 1.1e17}):

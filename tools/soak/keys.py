@@ -37,8 +37,8 @@ class Caller(Client):
 def attack(port: int, how: str, keys: int) -> None:
     """Send fresh keys."""
     caller = Caller(port)
-    made = caller.call("/v1/envs/", f"{how}-make", 1, env_id="CartPole-v1")
-    own = f"/v1/envs/{made['instance_id']}"
+    created = caller.call("/v1/envs/", f"{how}-make", 1, env_id="CartPole-v1")
+    own = f"/v1/envs/{created['instance_id']}"
     caller.call(f"{own}/reset/", f"{how}-make", 2)
     for number in range(keys):
         key = f"{how}-{number}"
@@ -47,8 +47,8 @@ def attack(port: int, how: str, keys: int) -> None:
         elif how == "refused":
             caller.call(f"{own}/step/", key, 1, action=9)
         elif how == "closed":
-            made = caller.call("/v1/envs/", key, 1, env_id="CartPole-v1")
-            caller.call(f"/v1/envs/{made['instance_id']}/close/", key, 2)
+            created = caller.call("/v1/envs/", key, 1, env_id="CartPole-v1")
+            caller.call(f"/v1/envs/{created['instance_id']}/close/", key, 2)
         else:
             caller.call(f"{own}/reset/", GUESSED, HUGE + number)
             caller.call(f"{own}/reset/", key, 1)
@@ -74,8 +74,8 @@ def main(keys: int) -> int:
     server = ServerProcess("--log-level", "error")
     victim, other = Caller(server.port), Client(server.port)
     making = {"env_id": "faulty_envs:Counting-v0", "kwargs": {"length": 10**9}}
-    made = victim.call("/v1/envs/", GUESSED, 1, **making)
-    url = f"/v1/envs/{made['instance_id']}"
+    created = victim.call("/v1/envs/", GUESSED, 1, **making)
+    url = f"/v1/envs/{created['instance_id']}"
     victim.call(f"{url}/reset/", GUESSED, 2)
     first = victim.call(f"{url}/step/", GUESSED, 3, action=0)
     play = f"/v1/envs/{other.post('/v1/envs/', env_id='CartPole-v1')['instance_id']}"
@@ -93,7 +93,7 @@ def main(keys: int) -> int:
     answered["after"] = answers(other, play, 3.0)
     after = server.usage()
     repeated = {
-        "creation": victim.call("/v1/envs/", GUESSED, 1, **making) == made,
+        "creation": victim.call("/v1/envs/", GUESSED, 1, **making) == created,
         "step": victim.call(f"{url}/step/", GUESSED, 3, action=0) == first,
         "once": victim.get(f"{url}/")["steps"] == 1,
         "next": (victim.call(f"{url}/step/", GUESSED, 4, action=0) or {}).get("observation") == [2],

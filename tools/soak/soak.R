@@ -3,19 +3,19 @@
 #   Rscript soak.R PORT SEED SECONDS
 
 library(gym)
-told <- as.numeric(commandArgs(TRUE))
-client <- create_GymClient(sprintf("http://127.0.0.1:%.0f", told[[1]]))
-set.seed(told[[2]])
-end <- Sys.time() + told[[3]]
+arguments <- as.numeric(commandArgs(TRUE))
+client <- create_GymClient(sprintf("http://127.0.0.1:%.0f", arguments[[1]]))
+set.seed(arguments[[2]])
+end <- Sys.time() + arguments[[3]]
 options(gym.viewer = FALSE)
 while (Sys.time() < end) {
-  sub_envs <- sample(list(NULL, 16L), 1)[[1]]
-  env <- gym_make("CartPole-v1", num_envs = sub_envs, client = client)
+  num_envs <- sample(list(NULL, 16L), 1)[[1]]
+  env <- gym_make("CartPole-v1", num_envs = num_envs, client = client)
   env$reset(seed = sample(1000, 1))
   for (i in seq_len(sample(200, 1))) {
-    out <- env$step(sample(0:1, max(sub_envs, 1L), replace = TRUE))
-    stopifnot(length(out$reward) == max(sub_envs, 1L))
-    if (is.null(sub_envs) && (out$terminated || out$truncated)) env$reset()
+    out <- env$step(sample(0:1, max(num_envs, 1L), replace = TRUE))
+    stopifnot(length(out$reward) == max(num_envs, 1L))
+    if (is.null(num_envs) && (out$terminated || out$truncated)) env$reset()
     if (Sys.time() > end) break
   }
   if (runif(1) < 0.3) {

@@ -54,11 +54,11 @@ def live(port: int, seed: int, seconds: float) -> None:
 
 def step(client: Client, url: str, kind: dict, rng: random.Random) -> None:
     """Step once, and again reset what has ended."""
-    sub_envs = kind.get("num_envs")
+    num_envs = kind.get("num_envs")
     if "Pendulum" in kind["env_id"]:
-        action: object = [[rng.uniform(-2, 2)] for _ in range(sub_envs)]
+        action: object = [[rng.uniform(-2, 2)] for _ in range(num_envs)]
     else:
-        action = [rng.randrange(2) for _ in range(sub_envs)] if sub_envs else rng.randrange(2)
+        action = [rng.randrange(2) for _ in range(num_envs)] if num_envs else rng.randrange(2)
     if "Raises" in kind["env_id"] and action == 1:
         refused(client, 500, f"{url}/step/", action=1)
     elif client.post(f"{url}/step/", action=action)["done"] is True:

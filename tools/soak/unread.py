@@ -24,7 +24,7 @@ TOKEN = "correct-horse-battery"
 HOST = "HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 # 11 KB each; the observations of so many sub-environments are 256 KB.
 PAGE_FILE = f"GET /v1/envs/00000000/watch/watch.js {HOST}\r\n".encode() * 100
-SUB_ENVS = 16384
+NUM_ENVS = 16384
 RECEIVE_BYTES = 2048
 # Only so many come a second.
 MOST_A_SECOND = 1000
@@ -32,8 +32,10 @@ MOST_A_SECOND = 1000
 
 def observations(port: int) -> bytes:
     """Return requests whose answers are large, and cost the server nearly nothing."""
-    made = Client(port).post("/v1/envs/", env_id="CartPole-v1", num_envs=SUB_ENVS)
-    head = f"POST /v1/envs/{made['instance_id']}/reset/ {HOST}Accept: application/x-safetensors\r\n"
+    created = Client(port).post("/v1/envs/", env_id="CartPole-v1", num_envs=NUM_ENVS)
+    head = (
+        f"POST /v1/envs/{created['instance_id']}/reset/ {HOST}Accept: application/x-safetensors\r\n"
+    )
     return f"{head}Content-Length: 2\r\n\r\n{{}}".encode() * 5
 
 

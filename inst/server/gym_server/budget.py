@@ -1,4 +1,4 @@
-"""Memory that many share: a total, and what each of them holds of it."""
+"""A limit of memory for many users together, and what each of them holds of it."""
 
 from __future__ import annotations
 
@@ -7,51 +7,51 @@ import threading
 
 
 class Budget:
-    """Bytes that all together may hold.
+    """Bytes that all users together may hold.
 
     Attributes:
-        most: how many that are.
+        limit: how many that are.
     """
 
-    def __init__(self, most: float = math.inf) -> None:
-        """Have all of it left."""
-        self.most = most
+    def __init__(self, limit: float = math.inf) -> None:
+        """Start with all of them left."""
+        self.limit = limit
         self._taken = 0.0
-        # A share takes and counts in one go.
+        # Reentrant: a share keeps it while it takes bytes and counts what it holds.
         self._lock = threading.RLock()
 
     @property
     def left(self) -> float:
         """How many bytes are left."""
-        return max(0.0, self.most - self._taken)
+        return max(0.0, self.limit - self._taken)
 
     def take(self, size: float) -> bool:
-        """Take so many bytes of it, if they are left."""
+        """Take bytes, if so many are left; return whether they were."""
         with self._lock:
-            if not math.isfinite(size) or self._taken + size > self.most:
+            if not math.isfinite(size) or self._taken + size > self.limit:
                 return False
             self._taken += size
             return True
 
     def give_back(self, size: float) -> None:
-        """Give back what was taken."""
+        """Give back bytes that were taken."""
         with self._lock:
             self._taken -= size
 
     def share(self) -> Share:
-        """Return the share of one more, which holds nothing yet."""
+        """Return the share of one more user, which holds nothing yet."""
         return Share(self)
 
 
 class Share:
-    """What one of those who share a budget holds."""
+    """What one user of a budget holds."""
 
     def __init__(self, budget: Budget) -> None:
         self._budget = budget
         self._held = 0
 
     def take(self, size: int) -> bool:
-        """Hold so many bytes more; return whether there are as many."""
+        """Hold so many bytes more, if they are left; return whether they were."""
         with self._budget._lock:
             taken = self._budget.take(size)
             if taken:
@@ -59,12 +59,12 @@ class Share:
             return taken
 
     def give_back(self, size: int) -> None:
-        """Hold so many bytes less; what was given back before is not given back again."""
+        """Hold so many bytes less, but not less than none."""
         with self._budget._lock:
             size = min(size, self._held)
             self._held -= size
             self._budget.give_back(size)
 
     def give_all_back(self) -> None:
-        """Hold nothing any more."""
+        """Give back all that it holds."""
         self.give_back(self._held)

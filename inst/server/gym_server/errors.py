@@ -1,4 +1,4 @@
-"""What can go wrong, by code, and the one place where an exception becomes an answer."""
+"""Errors by code, and the one place where an exception becomes an answer."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ _HEADERS = {
     "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
 }
 
-# Beside all of 500 and more, which say that something broke half-way.
+# Errors below 500 that can come after a part of the work was done. An error from 500 on always can.
 _AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory"})
 
-# Where the routes are described for people.  The classic R client shows no message without it.
+# Describes the routes for people.  The classic R client shows no message of an error without it.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
 
 
@@ -58,7 +58,7 @@ class GymServerError(Exception):
         message: one sentence for a person.
         hint: what to do about it, or None.
         extra: the extra of the server that is missing, or None.
-        is_logged: whether another process has logged it already.
+        is_logged: whether the process that raised it has logged it already.
     """
 
     is_logged = False
@@ -79,16 +79,16 @@ class GymServerError(Exception):
 
     @property
     def did_nothing(self) -> bool:
-        """Whether it was raised before anything moved."""
+        """Whether it was raised before anything was changed."""
         return self.status < 500 and self.code not in _AFTER_SOMETHING_WAS_DONE
 
     def again(self) -> GymServerError:
-        """Return a copy: one that is raised over and over keeps where each time."""
+        """Return a copy: each time an error is raised its traceback becomes longer."""
         return GymServerError(self.code, self.message, self.hint, self.extra)
 
     @property
     def headers(self) -> tuple[tuple[str, str], ...]:
-        """What else the answer's head says."""
+        """Further headers of the answer."""
         return _HEADERS.get(self.code, ())
 
 
@@ -98,7 +98,7 @@ def unknown_instance(instance_id: str) -> GymServerError:
 
 
 def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError:
-    """Nobody has used an instance for so long that the server closed it."""
+    """The server has closed an instance that was not used for some time."""
     return GymServerError(
         "instance_idle_closed",
         f"Instance {instance_id} of {env_id} was closed: nobody used it for {minutes:g} minutes",
@@ -110,9 +110,9 @@ def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError
     """A call took longer than the server allows.
 
     Args:
-        what: what took so long, to begin a sentence with.
+        what: the call, as the subject of a sentence.
         seconds: the limit.
-        consequence: what has become of it.
+        consequence: what the server did about it, as the end of the sentence.
     """
     return GymServerError(
         "call_too_long",
@@ -122,12 +122,12 @@ def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError
 
 
 def shutdown_disabled() -> GymServerError:
-    """The operator did not want clients to stop the server."""
+    """The operator does not let clients stop the server."""
     return GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def shutting_down() -> GymServerError:
-    """The server takes nothing more."""
+    """The server is stopping and takes no more calls."""
     return GymServerError("shutting_down", "The server is stopping")
 
 
@@ -139,23 +139,23 @@ def missing_parameter(name: str) -> GymServerError:
 
 
 def invalid_parameter(name: str, value: object, wanted: str) -> GymServerError:
-    """A field holds something that it cannot mean."""
+    """A field holds a value that it may not have."""
     return GymServerError(
         "invalid_parameter", f"The parameter '{name}' must be {wanted}, not {brief(value)}"
     )
 
 
-def wrong_length(name: str, found: int, sub_envs: int, what: str) -> GymServerError:
-    """A list has not one entry for each sub-environment."""
+def wrong_length(name: str, found: int, num_envs: int, what: str) -> GymServerError:
+    """The length of a list is not the number of sub-environments."""
     return GymServerError(
         "invalid_parameter",
-        f"The parameter '{name}' must hold one {what} for each of the {sub_envs} "
+        f"The parameter '{name}' must hold one {what} for each of the {num_envs} "
         f"sub-environments, not {found}",
     )
 
 
 def reset_needed(call: str) -> GymServerError:
-    """A call needs an episode, and none runs."""
+    """A call needs a running episode, and there is none."""
     return GymServerError(
         "reset_needed", f"{call} needs a running episode", "reset the environment first"
     )
@@ -168,7 +168,7 @@ def environment_error(error: BaseException) -> GymServerError:
 
 
 def environment_died(how: str, doing: str, hint: str | None = None) -> GymServerError:
-    """The process of an isolated environment ended by itself."""
+    """The process of an isolated environment ended without being asked to."""
     return GymServerError(
         "environment_died",
         f"The environment's process ended {doing}: {how}",
@@ -186,7 +186,7 @@ def body_too_large() -> GymServerError:
 
 
 def busy_receiving() -> GymServerError:
-    """So many large bodies come at once that there is no room for another."""
+    """So many large bodies are being received that there is no memory for another."""
     return GymServerError(
         "busy_receiving",
         "This server receives as many large requests at this moment as it has room for",

@@ -1,17 +1,18 @@
-"""Plain JSON values out of whatever an environment hands over."""
+"""Turn the values that an environment returns into plain JSON values."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 NONFINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
-# Deeper than any honest info, and shallow enough for the JSON encoder's own recursion;
-# a structure that contains itself ends here.
+# Deeper than any honest info, and shallow enough for the recursion of the JSON encoder. A structure
+# that contains itself is cut off here.
 _DEEPEST = 128
 
 
@@ -61,7 +62,7 @@ def _array(value: np.ndarray, depth: int) -> object:
 
 
 def _items(value: Iterable, depth: int) -> object:
-    # Only what is finite by its kind: an iterator in an info may never end.
+    # Only types that are always finite: an iterator in an info may never end.
     if isinstance(value, (list, tuple, set, frozenset, np.ndarray, range)):
         return [plain(item, depth + 1) for item in value]
     return _repr(value)
@@ -78,12 +79,12 @@ def _repr(value: object) -> str:
         return f"<{type(value).__name__}>"
 
 
-def from_words(value: object):
-    """Return JSON values with the words for non-finite numbers as these numbers."""
+def parse_nonfinite(value: object) -> Any:
+    """Return JSON values, with "NaN", "Infinity" and "-Infinity" as the numbers that they name."""
     if isinstance(value, str):
         return NONFINITE.get(value, value)
     if isinstance(value, list):
-        return [from_words(item) for item in value]
+        return [parse_nonfinite(item) for item in value]
     if isinstance(value, dict):
-        return {key: from_words(item) for key, item in value.items()}
+        return {key: parse_nonfinite(item) for key, item in value.items()}
     return value

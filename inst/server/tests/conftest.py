@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from gym_server.api.app import Config, create_app
+from gym_server.manager.limits import Limits
 
 TESTS = Path(__file__).parent
 SERVER = TESTS.parent
@@ -32,6 +33,31 @@ def app(monitor_dir):
     )
     yield app
     app.close()
+
+
+@pytest.fixture
+def quick():
+    """Return a function that makes an application with limits of its own."""
+    apps = []
+
+    def quick(**limits):
+        apps.append(
+            create_app(
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
+            )
+        )
+        return apps[-1]
+
+    yield quick
+    for app in apps:
+        app.close()
+
+
+def created(client, env_id="faulty_envs:Counting-v0", **fields):
+    """Make an instance and return the URL of its routes."""
+    answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
+    assert answer.status_code == 200, answer.json
+    return f"/v1/envs/{answer.json['instance_id']}"
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 """Processes as Linux lists them."""
 
 import os
+import shutil
+import subprocess
 from pathlib import Path
 
 
@@ -30,3 +32,12 @@ def descendants(pid):
     for parent in found:
         found += [child for child, its_parent in parents.items() if its_parent == parent]
     return found[1:]
+
+
+def r_has_the_package():
+    """Tell whether there is an R with this package in it."""
+    rscript = shutil.which("Rscript")
+    if rscript is None:
+        return False
+    asked = [rscript, "-e", "cat('env_watch' %in% getNamespaceExports('gym'))"]
+    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout == "TRUE"

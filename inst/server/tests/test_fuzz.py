@@ -25,7 +25,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
 from hypothesis import strategies as st  # noqa: E402
 
 from gym_server.errors import GymServerError  # noqa: E402
-from gym_server.protocol import safetensors, wire  # noqa: E402
+from gym_server.protocol import answers, bodies, safetensors  # noqa: E402
 
 SECONDS = float(os.environ.get("GYM_TEST_FUZZ_SECONDS", "0"))
 
@@ -184,7 +184,7 @@ def check_tensors(raw):
     file = body = None
     try:
         file = safetensors.read(raw)
-        body = wire.loads_tensors(raw)
+        body = bodies.loads_tensors(raw)
     except GymServerError as refusal:
         assert refusal.code == "malformed_tensors"
     if body is not None:
@@ -203,15 +203,15 @@ def check_tensors(raw):
 
 def check_json(raw):
     try:
-        body = wire.loads(raw)
+        body = bodies.loads(raw)
     except GymServerError as refusal:
         assert refusal.code in ("malformed_json", "not_an_object")
     else:
         assert isinstance(body, dict)
-        written = wire.dumps(body)
+        written = answers.dumps(body)
         # What is deeper, or not finite, is written in other words.
         if max(raw.count(b"{"), raw.count(b"[")) < 100 and "inf" not in repr(body):
-            assert wire.loads(written) == body
+            assert bodies.loads(written) == body
 
 
 @pytest.mark.slow

@@ -4,43 +4,36 @@ import contextlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import threading
 import time
 
 import pytest
 from conftest import TOKEN
+from running import r_has_the_package
 
 selenium = pytest.importorskip("selenium", reason="selenium is not installed (the extra 'dev')")
 
-from selenium import webdriver  # noqa: E402
-from selenium.webdriver.chrome.service import Service  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
-
-_MINUS, _DASH = "\u2212", "\u2013"
-
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-
-
-def _found(names):
-    return next(filter(None, map(shutil.which, names)), None)
+from watch_page import (  # noqa: E402
+    complaints,
+    drawn,
+    number,
+    pace,
+    picture,
+    pictures,
+    start_chromium,
+    text,
+)
 
 
 @pytest.fixture(scope="module")
 def chromium():
     """Start a browser without a window."""
-    binary, driver = _found(_BROWSERS), shutil.which("chromedriver")
-    if binary is None or driver is None:
+    browser = start_chromium()
+    if browser is None:
         pytest.skip("there is no Chromium with its chromedriver on the PATH")
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = webdriver.Chrome(options=options, service=Service(driver))
-    browser.set_window_size(1100, 700)
     yield browser
     browser.quit()
 
@@ -101,43 +94,6 @@ def look(browser, server):
     return lambda url: browser.get(f"http://127.0.0.1:{server.port}{url}/watch/")
 
 
-def text(browser, name):
-    return browser.find_element(By.ID, name).text
-
-
-def number(browser, name):
-    words = text(browser, name).replace(",", "").replace(_MINUS, "-")
-    return float(words) if words.strip(_DASH) else 0.0
-
-
-def picture(browser):
-    return browser.execute_script("return document.getElementById('picture').toDataURL()")
-
-
-def pictures(browser, seconds=1.5):
-    """Return the different pictures that are shown for a while."""
-    seen, end = set(), time.monotonic() + seconds
-    while time.monotonic() < end:
-        seen.add(picture(browser))
-    return seen
-
-
-def complaints(browser):
-    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
-
-
-def drawn(server, url):
-    """Return how often an environment was drawn; asking for it draws it, too, if it moved."""
-    return server.get(f"{url}/watch/state/")[1]["number"]
-
-
-def pace(server, url, seconds=1):
-    """Return how many steps a second an environment takes; one that is watched takes 50."""
-    began, before = time.monotonic(), server.get(url)[1]["steps"]
-    time.sleep(seconds)
-    return (server.get(url)[1]["steps"] - before) / (time.monotonic() - began)
-
-
 # A search from R -----------------------------------------------------------------------------
 
 _SEARCH = """
@@ -148,18 +104,10 @@ search_random(env, rounds = 500, target = Inf, seed = 1, progress = FALSE)
 """
 
 
-def _r_has_the_package():
-    rscript = shutil.which("Rscript")
-    if rscript is None:
-        return False
-    asked = [rscript, "-e", "cat('env_watch' %in% getNamespaceExports('gym'))"]
-    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout == "TRUE"
-
-
 @pytest.fixture
 def search(server):
     """Search from R, for people to see, in the test's server; return the page's address."""
-    if not _r_has_the_package():
+    if not r_has_the_package():
         pytest.skip("there is no R with this package")
     process = subprocess.Popen(
         ["Rscript", "-e", _SEARCH],

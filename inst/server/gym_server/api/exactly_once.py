@@ -28,6 +28,7 @@ from collections.abc import Callable, Hashable
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from gym_server.errors import GymServerError
+from gym_server.protocol.fields import RequestId
 
 AnswerT = TypeVar("AnswerT")
 
@@ -35,13 +36,6 @@ AnswerT = TypeVar("AnswerT")
 # it may hold was stored anew.
 _LOOK_SECONDS = 30.0
 _LOOK_SHARE = 1 / 8
-
-
-class RequestId(NamedTuple):
-    """What a client calls one of its requests: its own key (1 to 64 characters), a number."""
-
-    key: str
-    number: int
 
 
 class Outcome(NamedTuple):

@@ -1,20 +1,52 @@
-"""What the fields of requests may hold that are about sub-environments."""
+"""What the fields of requests may hold that describe an environment or its sub-environments."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from gym_server.envs.wrappers import Wrapper
 from gym_server.errors import invalid_parameter
-from gym_server.protocol import wire
-from gym_server.protocol.wire import Kind
+from gym_server.protocol.fields import TRUE_OR_FALSE, Kind, boolean, integer, json_object, text
+
+# Whatever can be seen on a line of its own, and does not turn the direction of the others.
+_NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
+_LONGEST_NAME = 100
+
+
+def _name(value: object) -> str:
+    value = text(value)
+    # Half a character is none, and many readers of patterns cannot say so.
+    value.encode()
+    if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
+        raise ValueError
+    return value
+
+
+def _wrappers(value: object) -> tuple[Wrapper, ...]:
+    if not isinstance(value, list):
+        raise ValueError
+    return tuple(map(_wrapper, map(json_object, value)))
+
+
+def _wrapper(item: dict) -> Wrapper:
+    name, kwargs = text(item.get("name")), item.get("kwargs")
+    return Wrapper(name, {} if kwargs is None else json_object(kwargs))
+
+
+def _video_callable(value: object) -> int:
+    """Return 0 for no videos, n for every n-th episode."""
+    if isinstance(value, (bool, str)):
+        return int(boolean(value))
+    return integer(value)
 
 
 def _num_envs(value: object) -> int:
-    number = wire.integer(value)
+    number = integer(value)
     if number < 1:
         raise ValueError
     return number
@@ -32,7 +64,7 @@ def _seed(value: object) -> int | tuple[int | None, ...]:
 
 def _one_seed(value: object) -> int:
     # A classic client may count with what it calls true and false.
-    return int(value) if isinstance(value, bool) else wire.integer(value)
+    return int(value) if isinstance(value, bool) else integer(value)
 
 
 def _mask(value: object) -> np.ndarray:
@@ -53,7 +85,7 @@ def _one_of(names: Mapping[str, Any]) -> Callable[[object], Any]:
     by_letters = {_letters(name): meaning for name, meaning in names.items()}
 
     def parse(value: object) -> Any:
-        meaning = by_letters.get(_letters(wire.text(value)))
+        meaning = by_letters.get(_letters(text(value)))
         if meaning is None:
             raise ValueError
         return meaning
@@ -72,6 +104,33 @@ def _named(names: Mapping[str, Any]) -> Kind:
     return Kind({"type": "string", "enum": list(names)}, wanted, _one_of(names))
 
 
+ANY_ID = Kind(
+    {"type": "string", "examples": ["CartPole-v1", "Pendulum-v1", "MountainCar-v0"]},
+    "a string",
+    lambda value: value,
+)
+NAME = Kind(
+    {"type": "string", "maxLength": _LONGEST_NAME, "pattern": _NAME},
+    f"a text of 1 to {_LONGEST_NAME} printable characters",
+    _name,
+)
+WRAPPERS = Kind(
+    {
+        "type": "array",
+        "items": {
+            "type": "object",
+            "required": ["name"],
+            "properties": {"name": {"type": "string"}, "kwargs": {"type": ["object", "null"]}},
+        },
+    },
+    'a list of objects of a "name" and "kwargs"',
+    _wrappers,
+)
+VIDEO_CALLABLE = Kind(
+    {"anyOf": [*TRUE_OR_FALSE, {"type": "integer", "minimum": 0}]},
+    "true, false or an integer n for every n-th episode",
+    _video_callable,
+)
 NUM_ENVS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _num_envs)
 SEED = Kind(
     {

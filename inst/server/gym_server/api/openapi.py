@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from gym_server import __version__
-from gym_server.api.schemas import ANSWERS
-from gym_server.protocol import wire
+from gym_server.api.routing import Route
+from gym_server.protocol.answers import HTML, JSON
+from gym_server.protocol.fields import REQUEST, Field
 from gym_server.protocol.safetensors import TENSORS
-
-if TYPE_CHECKING:
-    from gym_server.api.routes import Route
-    from gym_server.protocol.wire import Field
 
 _ERROR = {
     "type": "object",
@@ -38,7 +33,7 @@ def document(routes: Iterable[Route]) -> dict:
     routes = list(routes)
     paths: dict[str, dict] = {}
     for route in routes:
-        path = re.sub(r"<(\w+)>", r"{\1}", route.path)
+        path = route.path.replace("<", "{").replace(">", "}")
         paths.setdefault(path, {})[route.method.lower()] = _operation(route)
     _link_created(paths)
     return {
@@ -78,17 +73,17 @@ def _operation(route: Route) -> dict:
             str(route.status): _answer(route),
             "default": {
                 "description": "What went wrong.",
-                "content": {wire.JSON: {"schema": {"$ref": "#/components/schemas/Error"}}},
+                "content": {JSON: {"schema": {"$ref": "#/components/schemas/Error"}}},
             },
         },
     }
     parameters = [
         {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-        for name in re.findall(r"<(\w+)>", route.path)
+        for name in route.variables
     ]
     if route.method == "GET":
         parameters += map(_query, route.fields)
-    elif fields := (*route.fields, wire.REQUEST) if route.once else route.fields:
+    elif fields := (*route.fields, REQUEST) if route.once else route.fields:
         operation["requestBody"] = _request_body(route, fields)
     if parameters:
         operation["parameters"] = parameters
@@ -106,11 +101,11 @@ def _answer(route: Route) -> dict:
                 }
             }
         return answer
-    is_json = route.content_type == wire.JSON
-    schema = ANSWERS.get(route.handler.__name__, {"type": "object"})
+    is_json = route.content_type == JSON
+    schema = route.schema or {"type": "object"}
     content: dict = {route.content_type: {"schema": schema} if is_json else {}}
     if route.html:
-        content[wire.HTML] = {}
+        content[HTML] = {}
     if route.tensors:
         # Raw bytes have no schema.
         content[TENSORS] = {}
@@ -136,7 +131,7 @@ def _request_body(route: Route, fields: Iterable[Field]) -> dict:
     body = {
         "required": required,
         "content": {
-            wire.JSON: {"schema": schema if required else {"anyOf": [schema, _ABSENT_REFERENCE]}}
+            JSON: {"schema": schema if required else {"anyOf": [schema, _ABSENT_REFERENCE]}}
         },
     }
     if route.tensor_body:

@@ -4,134 +4,32 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import gymnasium
 import numpy
 
 from gym_server import __version__
-from gym_server.api import fields, openapi
-from gym_server.api.watch_keys import WatchKeys
-from gym_server.envs.config import Choices
+from gym_server.api import fields, openapi, schemas, watch_routes
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, Table
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
-from gym_server.instances.instance import Instance
-from gym_server.manager.instance_manager import Instances
-from gym_server.manager.limits import Watchers
-from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol import wire
+from gym_server.protocol.answers import HTML, Content
+from gym_server.protocol.bodies import parse_path_value
+from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.safetensors import TENSORS, Tensor
 from gym_server.protocol.safetensors import write as write_tensors
-from gym_server.protocol.wire import Content, Field
 from gym_server.rendering.png import png
 
-
-@dataclass(frozen=True)
-class Services:
-    """What the routes work on.
-
-    Attributes:
-        instances: the environments.
-        monitor_root: where monitors may write.
-        stop: asks the server to stop once the requests under way are answered.
-        watchers: those who wait for a picture.
-        watch_keys: the keys that open watch pages; None where no page asks for one.
-    """
-
-    instances: Instances
-    monitor_root: MonitorRoot
-    stop: Callable[[], None]
-    watchers: Watchers
-    watch_keys: WatchKeys | None = None
+ROUTES = Table()
 
 
-@dataclass(frozen=True)
-class Call:
-    """A request, parsed.
-
-    Attributes:
-        services: what to work on.
-        path: the variable parts of the URL.
-        body: the request's JSON object, or the query of a GET.
-        fields: the values of the fields that the route declares; None for absent ones.
-        tensors: whether the client wants tensors where the route has them.
-        url: the path as it was asked for.
-        accept: what the client says it takes.
-    """
-
-    services: Services
-    path: dict[str, str]
-    body: dict
-    fields: dict
-    tensors: bool = False
-    url: str = ""
-    accept: str = ""
-
-    @property
-    def instance(self) -> Instance:
-        """The instance that the URL names."""
-        return self.services.instances.get(self.path["instance_id"])
-
-
-Handler = Callable[[Call], dict | Content | None]
-
-
-@dataclass(frozen=True)
-class Route:
-    """One route of the protocol.
-
-    Attributes:
-        method: "GET", "POST" or "DELETE".
-        path: Flask's rule, which also matches without its last slash.
-        fields: what the body may hold, or the query of a GET.
-        handler: returns a JSON object, a content of its own, or None for 204.
-        answer: what the answer holds, in words.
-        once: whether the body may also number the request, which is then done once however
-            often it arrives.
-        content_type: what an ordinary answer is.
-        tensors: whether the answer may also be tensors, when the client accepts them.
-        html: whether the answer may also be HTML, when the client asks for that.
-        tensor_body: whether the body may also be tensors.
-    """
-
-    method: str
-    path: str
-    fields: tuple[Field, ...]
-    handler: Handler
-    answer: str = ""
-    once: bool = False
-    content_type: str = wire.JSON
-    tensors: bool = False
-    html: bool = False
-    tensor_body: bool = False
-
-    @property
-    def status(self) -> int:
-        """The status of an ordinary answer."""
-        return 200 if self.answer else 204
-
-
-ROUTES: list[Route] = []
-
-INSTANCE = "/v1/envs/<instance_id>/"
-
-
-def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Handler], Handler]:
-    """Declare a handler as a route; ``how`` are the later attributes of Route."""
-
-    def as_route(handler: Handler) -> Handler:
-        ROUTES.append(Route(method, path, fields, handler, **how))
-        return handler
-
-    return as_route
-
-
-@declare(
+@ROUTES.declare(
     "POST",
     "/v1/envs/",
-    Field("env_id", wire.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field("env_id", fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
     Field(
         "seed",
         fields.SEED,
@@ -140,12 +38,12 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
     ),
     Field(
         "render_mode",
-        wire.TEXT,
+        TEXT,
         "rgb_array (the default where it is supported), or human: the same, but while somebody "
         "watches it moves in real time.",
     ),
-    Field("kwargs", wire.OBJECT, "Handed to the environment."),
-    Field("wrappers", wire.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("kwargs", OBJECT, "Handed to the environment."),
+    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field(
         "num_envs", fields.NUM_ENVS, "How many sub-environments; absent for a single environment."
     ),
@@ -160,41 +58,57 @@ def declare(method: str, path: str, *fields: Field, **how: Any) -> Callable[[Han
         "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
         "NextStep.",
     ),
-    Field("name", wire.NAME, "What its owner calls it; shown wherever it is listed."),
+    Field("name", fields.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
     once=True,
+    schema=schemas.json_object({"instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}),
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    choices = Choices(**fields)
+    choices = EnvConfig(**fields)
     return {"instance_id": call.services.instances.create(choices)}
 
 
-@declare("GET", "/v1/envs/", answer="all_envs: env_id by instance_id")
+@ROUTES.declare(
+    "GET",
+    "/v1/envs/",
+    answer="all_envs: env_id by instance_id",
+    schema=schemas.json_object(
+        {"all_envs": {"type": "object", "additionalProperties": schemas.TEXT}}
+    ),
+)
 def env_list_all(call: Call) -> dict:
     """List the environments."""
     return {"all_envs": call.services.instances.env_ids()}
 
 
-@declare(
+@ROUTES.declare(
     "GET",
     "/v1/instances/",
     answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
     "watched of each, the oldest first",
+    schema=schemas.json_object(
+        {"instances": {"type": "array", "items": schemas.json_object(schemas.LISTED_INSTANCE)}}
+    ),
 )
 def instance_list(call: Call) -> dict:
     """List the environments, with who uses them how much."""
     return {"instances": call.services.instances.list()}
 
 
-@declare("GET", INSTANCE, answer="all about the environment; needs_reset also after done")
+@ROUTES.declare(
+    "GET",
+    INSTANCE,
+    answer="all about the environment; needs_reset also after done",
+    schema=schemas.json_object(schemas.ABOUT_INSTANCE),
+)
 def env_about(call: Call) -> dict:
     """Tell all about an environment."""
     return call.instance.about()
 
 
-@declare(
+@ROUTES.declare(
     "POST",
     INSTANCE + "reset/",
     Field(
@@ -203,11 +117,14 @@ def env_about(call: Call) -> dict:
         "Seeds the environment and its action space; with sub-environments also a list of one for "
         "each.",
     ),
-    Field("options", wire.OBJECT, "The environment's own."),
+    Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
     answer="observation, info; with sub-environments one row a sub-environment",
     once=True,
     tensors=True,
+    schema=schemas.json_object(
+        {"observation": schemas.ANYTHING, "info": {"type": "object"}}, request=schemas.REQUEST
+    ),
 )
 def env_reset(call: Call) -> dict:
     """Start an episode."""
@@ -217,19 +134,19 @@ def env_reset(call: Call) -> dict:
     )
 
 
-@declare(
+@ROUTES.declare(
     "POST",
     INSTANCE + "step/",
     Field(
         "action",
-        wire.ANYTHING,
+        ANYTHING,
         "A member of the action space, a Box's bounds aside; with sub-environments one for each "
         "that steps.",
         required=True,
     ),
     Field(
         "render",
-        wire.BOOLEAN,
+        BOOLEAN,
         "Whether people want to see it: while somebody watches, the step waits until real time "
         "has come so far.",
     ),
@@ -240,6 +157,17 @@ def env_reset(call: Call) -> dict:
     once=True,
     tensors=True,
     tensor_body=True,
+    schema=schemas.json_object(
+        {
+            "observation": schemas.ANYTHING,
+            "reward": schemas.NUMBERS,
+            "done": schemas.FLAGS,
+            "terminated": schemas.FLAGS,
+            "truncated": schemas.FLAGS,
+            "info": {"type": "object"},
+        },
+        request=schemas.REQUEST,
+    ),
 )
 def env_step(call: Call) -> dict:
     """Take one step."""
@@ -249,47 +177,79 @@ def env_step(call: Call) -> dict:
     )
 
 
-@declare("GET", INSTANCE + "action_space/", answer="info: the space")
+@ROUTES.declare(
+    "GET",
+    INSTANCE + "action_space/",
+    answer="info: the space",
+    schema=schemas.SPACE_INFO,
+)
 def env_action_space_info(call: Call) -> dict:
     """Describe the action space."""
     return {"info": call.instance.action_space_info}
 
 
-@declare("GET", INSTANCE + "observation_space/", answer="info: the space")
+@ROUTES.declare(
+    "GET",
+    INSTANCE + "observation_space/",
+    answer="info: the space",
+    schema=schemas.SPACE_INFO,
+)
 def env_observation_space_info(call: Call) -> dict:
     """Describe the observation space."""
     return {"info": call.instance.observation_space_info}
 
 
-@declare("GET", INSTANCE + "action_space/sample/", answer="action")
+@ROUTES.declare(
+    "GET",
+    INSTANCE + "action_space/sample/",
+    answer="action",
+    schema=schemas.json_object({"action": schemas.ANYTHING}),
+)
 def env_action_space_sample(call: Call) -> dict:
     """Draw an action."""
     return {"action": call.instance.sample_action()}
 
 
-@declare("GET", INSTANCE + "action_space/contains/<x>/", answer="member: true or false")
+@ROUTES.declare(
+    "GET",
+    INSTANCE + "action_space/contains/<x>/",
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
 def env_action_space_contains(call: Call) -> dict:
     """Tell whether a value is an action."""
-    value = wire.parse_path_value(call.path["x"])
+    value = parse_path_value(call.path["x"])
     return {"member": call.instance.action_contains({"value": value})}
 
 
-_VALUE = Field("value", wire.ANYTHING, "Is it a member? Without it: is the description right?")
+_VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the description right?")
 
 
-@declare("POST", INSTANCE + "action_space/contains/", _VALUE, answer="member: true or false")
+@ROUTES.declare(
+    "POST",
+    INSTANCE + "action_space/contains/",
+    _VALUE,
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
 def env_action_space_contains_posted(call: Call) -> dict:
     """Tell whether a value is an action, or a description the action space's."""
     return {"member": call.instance.action_contains(call.body)}
 
 
-@declare("POST", INSTANCE + "observation_space/contains/", _VALUE, answer="member: true or false")
+@ROUTES.declare(
+    "POST",
+    INSTANCE + "observation_space/contains/",
+    _VALUE,
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
 def env_observation_space_contains(call: Call) -> dict:
     """Tell whether a value is an observation, or a description the observation space's."""
     return {"member": call.instance.observation_contains(call.body)}
 
 
-@declare(
+@ROUTES.declare(
     "GET",
     INSTANCE + "render/",
     Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
@@ -305,13 +265,13 @@ def env_render(call: Call) -> Content:
     return Content(png(frame), "image/png")
 
 
-@declare(
+@ROUTES.declare(
     "POST",
     INSTANCE + "monitor/start/",
-    Field("directory", wire.TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", wire.BOOLEAN, "Delete what monitors left there that are gone."),
-    Field("resume", wire.BOOLEAN, "Go on counting where an earlier monitor ended."),
-    Field("video_callable", wire.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
+    Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
+    Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
+    Field("video_callable", fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
 )
 def env_monitor_start(call: Call) -> None:
     """Record the episodes that start from now on."""
@@ -325,30 +285,30 @@ def env_monitor_start(call: Call) -> None:
     )
 
 
-@declare("POST", INSTANCE + "monitor/close/")
+@ROUTES.declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
     """Finish the monitor's files; without a monitor there is nothing to do."""
     call.instance.close_monitor()
 
 
-@declare("POST", INSTANCE + "close/", once=True)
+@ROUTES.declare("POST", INSTANCE + "close/", once=True, ends_instance=True)
 def env_close(call: Call) -> None:
     """Close an environment."""
     call.services.instances.close(call.path["instance_id"])
 
 
-@declare("DELETE", INSTANCE, once=True)
+@ROUTES.declare("DELETE", INSTANCE, once=True, ends_instance=True)
 def env_delete(call: Call) -> None:
     """Close an environment, as its route close/ does."""
     env_close(call)
 
 
-@declare(
+@ROUTES.declare(
     "POST",
     "/v1/upload/",
-    Field("training_dir", wire.TEXT, "A monitor's directory.", required=True),
-    Field("api_key", wire.TEXT, "A key to OpenAI Gym.", required=True),
-    Field("algorithm_id", wire.ANYTHING, "Ignored."),
+    Field("training_dir", TEXT, "A monitor's directory.", required=True),
+    Field("api_key", TEXT, "A key to OpenAI Gym.", required=True),
+    Field("algorithm_id", ANYTHING, "Ignored."),
     answer="nothing: 410 always",
 )
 def upload(call: Call) -> None:
@@ -360,33 +320,54 @@ def upload(call: Call) -> None:
     )
 
 
-@declare("POST", "/v1/shutdown/", answer="message", html=True)
+@ROUTES.declare(
+    "POST",
+    "/v1/shutdown/",
+    answer="message",
+    html=True,
+    schema=schemas.json_object({"message": schemas.TEXT}),
+)
 def shutdown(call: Call) -> dict | Content:
     """Answer the requests under way and stop the server."""
     call.services.stop()
     message = "Server shutting down"
-    if wire.HTML in call.accept:
+    if HTML in call.accept:
         # As the classic server answered.
-        return Content(message.encode(), f"{wire.HTML}; charset=utf-8")
+        return Content(message.encode(), f"{HTML}; charset=utf-8")
     return {"message": message}
 
 
-_SEARCH = replace(wire.TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
+_SEARCH = replace(TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
 
 
-@declare(
+@ROUTES.declare(
     "GET",
     "/v1/registry/",
     Field("search", _SEARCH, "A part of the id; when it is part of none, the nearest ids."),
     answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available, "
     "reason (why one is not available)",
+    schema=schemas.json_object(
+        {"environments": {"type": "array", "items": schemas.LISTED_ENVIRONMENT}}
+    ),
 )
 def env_registry(call: Call) -> dict:
     """List what can be created."""
     return {"environments": call.services.instances.registered(call.fields["search"])}
 
 
-@declare("GET", "/v1/health/", answer="status, instances, versions, pid")
+@ROUTES.declare(
+    "GET",
+    "/v1/health/",
+    answer="status, instances, versions, pid",
+    schema=schemas.json_object(
+        {
+            "status": {"const": "ok"},
+            "instances": schemas.COUNT,
+            "versions": {"type": "object", "additionalProperties": schemas.TEXT},
+            "pid": schemas.COUNT,
+        }
+    ),
+)
 def health(call: Call) -> dict:
     """Tell that the server is well, and its versions."""
     return {
@@ -402,7 +383,10 @@ def health(call: Call) -> dict:
     }
 
 
-@declare("GET", "/v1/openapi.json/", answer="this document")
+@ROUTES.declare("GET", "/v1/openapi.json/", answer="this document")
 def openapi_document(call: Call) -> dict:
     """Describe the protocol for machines."""
-    return openapi.document(ROUTES)
+    return openapi.document(call.services.routes)
+
+
+ROUTES.extend(watch_routes.ROUTES)

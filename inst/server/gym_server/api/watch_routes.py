@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from gym_server import viewing
-from gym_server.api import fields
-from gym_server.api.routes import INSTANCE, Call, declare
+from gym_server.api import fields, schemas
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, Callers, Table
 from gym_server.api.watch_keys import KEY_SECONDS
 from gym_server.errors import GymServerError
-from gym_server.protocol.wire import JSON, Content, Field
+from gym_server.protocol.answers import JSON, Content
+from gym_server.protocol.fields import Field
 
 _PAGE = Path(viewing.__file__).parent / "page"
 _WATCH = INSTANCE + "watch/"
@@ -33,18 +35,7 @@ _PAGE_HEADERS = (
 )
 
 
-@declare("GET", _WATCH, answer="a page for a browser", content_type=_HTML)
-def env_watch(call: Call) -> Content:
-    """Show an environment live to people."""
-    try:
-        _ = call.instance
-        status = 200
-    except GymServerError as refusal:
-        # A browser gets the page all the same: it says so in words, and what else there is.
-        if "text/html" not in call.accept:
-            raise
-        status = refusal.status
-    return page(call.url, status)
+ROUTES = Table()
 
 
 def page(url: str, status: int) -> Content:
@@ -61,11 +52,35 @@ def page(url: str, status: int) -> Content:
     )
 
 
-@declare(
+@ROUTES.declare(
+    "GET",
+    _WATCH,
+    answer="a page for a browser",
+    callers=Callers.WATCHERS,
+    content_type=_HTML,
+    refusal_page=page,
+)
+def env_watch(call: Call) -> Content:
+    """Show an environment live to people."""
+    try:
+        _ = call.instance
+        status = 200
+    except GymServerError as refusal:
+        # A browser gets the page all the same: it says so in words, and what else there is.
+        if "text/html" not in call.accept:
+            raise
+        status = refusal.status
+    return page(call.url, status)
+
+
+@ROUTES.declare(
     "POST",
     _WATCH + "key/",
     answer="key: opens the page as watch/?key=KEY, without a token, and seconds: how long after "
     "its last use it does; both null where no page needs one",
+    schema=schemas.json_object(
+        {"key": schemas.or_null(schemas.TEXT), "seconds": schemas.or_null(schemas.COUNT)}
+    ),
 )
 def env_watch_key(call: Call) -> dict:
     """Make a key to an environment's page, for a browser that has no token."""
@@ -76,13 +91,25 @@ def env_watch_key(call: Call) -> dict:
     return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
 
 
-@declare("GET", _WATCH + "watch.css/", answer="how the page looks", content_type=_CSS)
+@ROUTES.declare(
+    "GET",
+    _WATCH + "watch.css/",
+    answer="how the page looks",
+    callers=Callers.EVERYONE,
+    content_type=_CSS,
+)
 def env_watch_style(call: Call) -> Content:
     """Tell the watch page's browser how it looks."""
     return Content(_read("watch.css"), _CSS, headers=_PAGE_HEADERS)
 
 
-@declare("GET", _WATCH + "<script>.js/", answer="what the page does", content_type=_JAVASCRIPT)
+@ROUTES.declare(
+    "GET",
+    _WATCH + "<script>.js/",
+    answer="what the page does",
+    callers=Callers.EVERYONE,
+    content_type=_JAVASCRIPT,
+)
 def env_watch_script(call: Call) -> Content:
     """Tell the watch page's browser what it does."""
     name = call.path["script"]
@@ -91,7 +118,7 @@ def env_watch_script(call: Call) -> Content:
     return Content(_read(f"{name}.js"), _JAVASCRIPT, headers=_PAGE_HEADERS)
 
 
-@declare(
+@ROUTES.declare(
     "GET",
     _WATCH + "state/",
     Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
@@ -100,6 +127,8 @@ def env_watch_script(call: Call) -> Content:
     "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "
     "reward_threshold, fps (null unless it is shown in real time), frame (a PNG in Base64, or "
     "null), and without a frame why_no_picture, hint and observation (names, values, size)",
+    callers=Callers.WATCHERS,
+    schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
 def env_watch_state(call: Call) -> Content:
     """Wait for something new to see; drawing takes place only for those who wait here."""
@@ -110,7 +139,13 @@ def env_watch_state(call: Call) -> Content:
     return Content(body, JSON, headers=(_NOT_KEPT,))
 
 
-@declare("GET", _WATCH + "presence/", answer="watched: true")
+@ROUTES.declare(
+    "GET",
+    _WATCH + "presence/",
+    answer="watched: true",
+    callers=Callers.WATCHERS,
+    schema=schemas.json_object({"watched": schemas.FLAG}),
+)
 def env_watch_presence(call: Call) -> dict:
     """Say that somebody goes on watching, without a picture for now."""
     call.instance.screen.attend()

@@ -94,7 +94,7 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "--max-memory-mb",
         type=_number(1, 2**24),
         default=Limits.max_memory_mb,
-        help="memory that all environments together may be reckoned to take at their most "
+        help="memory that all environments together may be estimated to take at their most "
         "(%(default)s)",
     )
     limits.add_argument(

@@ -1,4 +1,4 @@
-"""Which paths clients may hand to environments and wrappers."""
+"""The paths that clients may hand to environments and wrappers."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from gym_server.envs.config import Choices
+from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief
 
-# Separators of any system, a home directory, a drive, what is hidden or climbs, and what ends
-# a name in C.
+# Separators of any system, a home directory, a drive, a leading dot (a hidden file, a parent
+# directory), and the zero that ends a string in C.
 _PATH_LIKE = re.compile(r"[/\\\0]|^[~.]|^[A-Za-z]:")
 
-# Deeper than anything that a constructor takes, and far from where recursion ends.
+# Deeper than the arguments of any constructor, and far from the limit of recursion.
 _DEEPEST = 32
 
 
 class AllowedPaths:
-    """What clients may name of this machine's files."""
+    """The files of this machine that clients may name."""
 
     def __init__(self, directories: Collection[Path] | None = None) -> None:
         """Set the limits.
 
         Args:
-            directories: paths must lie below one of them; None for any path, where the client
-                is who started the server.
+            directories: paths must lie below one of them; None allows any path, for a server whose
+                only client is the user who started it.
         """
         self._directories = None if directories is None else [d.resolve() for d in directories]
 
-    def check(self, choices: Choices) -> None:
-        """Look through everything that a client hands to constructors.
+    def check(self, config: EnvConfig) -> None:
+        """Refuse a path that is not allowed, in any argument of the environment and its wrappers.
 
         Raises:
             GymServerError: ``invalid_kwargs``.
         """
-        self._check(choices.kwargs or {}, "kwargs")
-        for wrapper in choices.wrappers:
+        self._check(config.kwargs or {}, "kwargs")
+        for wrapper in config.wrappers:
             self._check(wrapper.kwargs, wrapper.name)
 
     def _check(self, kwargs: dict, owner: str) -> None:
@@ -55,14 +55,14 @@ class AllowedPaths:
     def _lies_below(self, text: str, directories: list[Path]) -> bool:
         try:
             path = Path(text)
-            # What another one means depends on who opens it.
+            # What a relative path means depends on the process that opens it.
             return path.is_absolute() and any(d in path.resolve().parents for d in directories)
         except (OSError, RuntimeError, ValueError):
             return False
 
 
 def _texts(value: object, owner: str, depth: int = 0) -> Iterator[str]:
-    """Return all texts in a JSON value, names too."""
+    """Return all texts in a JSON value, also the names of fields."""
     if depth > _DEEPEST:
         raise GymServerError(
             "invalid_kwargs", f"{owner}: there are more than {_DEEPEST} lists in one another"

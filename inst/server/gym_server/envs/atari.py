@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-# Those of Gym 0.21, whose ids classic scripts have. Only ale_py knows them, if it is there.
+# The games of Gym 0.21, whose ids stand in classic scripts. Gymnasium itself does not know them.
 _GAMES = """
     Adventure AirRaid Alien Amidar Assault Asterix Asteroids Atlantis BankHeist BattleZone
     BeamRider Berzerk Bowling Boxing Breakout Carnival Centipede ChopperCommand CrazyClimber
@@ -20,7 +20,7 @@ _CLASSIC = re.compile(r"(\w+?)(-ram)?(?:Deterministic|NoFrameskip)?(?:-v\d+)?", 
 
 
 def classic_game(name: str) -> tuple[str, bool] | None:
-    """Return what a classic id of an Atari game is called today, and whether it shows memory.
+    """Return today's id for a classic id of an Atari game, and whether it observes memory.
 
     Args:
         name: such as ``Breakout-v0`` or ``Pong-ramNoFrameskip-v4``.
@@ -29,5 +29,6 @@ def classic_game(name: str) -> tuple[str, bool] | None:
         Such as ``("ALE/Pong-v5", True)``; None for any other id.
     """
     match = _CLASSIC.fullmatch(name)
-    game = match and _BY_LOWER_CASE.get(match[1].lower())
-    return (f"ALE/{game}-v5", match[2] is not None) if game else None
+    if match is None or (game := _BY_LOWER_CASE.get(match[1].lower())) is None:
+        return None
+    return f"ALE/{game}-v5", match[2] is not None

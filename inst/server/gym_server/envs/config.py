@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from gymnasium.vector import AutoresetMode
 
-from gym_server.envs.wrappers import Wrapper
+
+class Wrapper(NamedTuple):
+    """A wrapper that a client chose."""
+
+    name: str
+    kwargs: dict
 
 
 @dataclass(frozen=True)
-class Choices:
+class EnvConfig:
     """What a client chose at creation.
 
     Attributes:
         env_id: what to create.
-        seed: for the first reset that has none; for a vector environment also one a
-            sub-environment.
+        seed: for the first reset that has none; for a vector environment also a tuple with one
+            for each sub-environment.
         render_mode: see ``make.make_env()``.
         kwargs: handed to the environment.
         wrappers: the first one is innermost.
         num_envs: how many sub-environments; None for a single environment.
-        vectorization_mode: what runs the sub-environments; None leaves it to us.
-        autoreset_mode: what becomes of a sub-environment whose episode ended; None for NEXT_STEP.
-        name: what its owner calls it.
+        vectorization_mode: what runs the sub-environments; None for the fastest that fits.
+        autoreset_mode: when a sub-environment whose episode ended is reset; None for NEXT_STEP.
+        name: the client's own name for the environment.
     """
 
     env_id: object

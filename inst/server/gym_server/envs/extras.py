@@ -1,4 +1,4 @@
-"""What environments need beyond the server's own dependencies: the extras of its package."""
+"""The extras of the server's package: what environments need beyond its own dependencies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from gym_server.errors import GymServerError
 
-# What pyproject.toml says of each extra.
+# As in pyproject.toml.
 REQUIREMENTS = {
     "toy-text": ("gymnasium[toy-text]",),
     "box2d": ("gymnasium[box2d]",),
@@ -19,7 +19,7 @@ REQUIREMENTS = {
     "video": ("moviepy",),
 }
 
-# By the package that an environment comes from: its extra, and the module that the extra brings.
+# By the package that an environment comes from: its extra, and the module that must be installed.
 # Toy text needs nothing beyond the server's own dependencies.
 _PACKAGES = {
     "gymnasium.envs.box2d": ("box2d", "Box2D"),
@@ -29,7 +29,7 @@ _PACKAGES = {
     "ale_py": ("atari", "ale_py"),
 }
 
-# Gymnasium refuses to make it with a later MuJoCo, which computes something else.
+# Gymnasium refuses to make it with a later MuJoCo, whose results differ.
 _BEFORE_MUJOCO_3 = ("Pusher-v4",)
 
 
@@ -46,8 +46,10 @@ def is_available(spec: EnvSpec) -> bool:
 def why_unavailable(spec: EnvSpec) -> str | None:
     """Return why an environment cannot be made here, or None; nothing is imported."""
     if not isinstance(spec.entry_point, str):
-        # Gymnasium's word for an environment that has moved away is a function that raises.
-        moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")
+        # For an environment that has moved to another package Gymnasium registers a function that
+        # raises an error.
+        # The type ignored: Gymnasium's protocol of a creator has no __name__.
+        moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")  # type: ignore[attr-defined]
         return "it is no longer part of Gymnasium" if moved else None
     extra, module = _needs(spec)
     if module and not _is_installed(module):
@@ -59,7 +61,7 @@ def why_unavailable(spec: EnvSpec) -> str | None:
 
 
 def _needs_package(module: str) -> str:
-    return f"it needs the Python package '{module}', which no extra brings"
+    return f"it needs the Python package '{module}', which no extra installs"
 
 
 def _major_version(package: str) -> int:
@@ -67,7 +69,7 @@ def _major_version(package: str) -> int:
 
 
 def missing_extra(what: str, extra: str) -> GymServerError:
-    """Something cannot be had without an extra of the server."""
+    """Something needs an extra of the server that is not installed."""
     wanted = " ".join(f'"{requirement}"' for requirement in REQUIREMENTS[extra])
     return GymServerError(
         "missing_dependency",
@@ -78,7 +80,7 @@ def missing_extra(what: str, extra: str) -> GymServerError:
 
 
 def unmet_module(spec: EnvSpec) -> str | None:
-    """Return the module that an environment needs, is not installed, and comes with no extra."""
+    """Return a module that an environment needs, if it is not installed and no extra has it."""
     extra, module = _needs(spec)
     return module if extra is None and module and not _is_installed(module) else None
 
@@ -92,7 +94,7 @@ def _needs(spec: EnvSpec) -> tuple[str | None, str | None]:
 
 
 def _is_installed(module: str) -> bool:
-    # Only the package itself is looked for: looking inside it would import it.
+    # Only the package itself is looked for: to look for its submodules would import it.
     package = module.partition(".")[0]
     if package in sys.modules:
         return sys.modules[package] is not None

@@ -1,26 +1,27 @@
-"""Make an environment from its id, and say what is wrong with an id that names none."""
+"""Make an environment from its id, and explain what is wrong with an id that names none."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib
 from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar, cast
 
 import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
 
-from gym_server.envs import footprint, mujoco, repeats
+from gym_server.envs import argument_limits, mujoco
 from gym_server.envs.atari import classic_game
+from gym_server.envs.config import Wrapper
 from gym_server.envs.extras import extra_of, is_available, missing_extra, unmet_module
+from gym_server.envs.memory_estimate import environment_bytes
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import LONGEST_ID, importing, look_up, near
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
-from gym_server.json_values import brief, from_words
+from gym_server.json_values import brief, parse_nonfinite
 
-if TYPE_CHECKING:
-    from gym_server.envs.footprint import Account
-    from gym_server.envs.wrappers import Wrapper
+ResultT = TypeVar("ResultT")
 
 
 def make_env(
@@ -29,7 +30,7 @@ def make_env(
     kwargs: dict,
     allowed_modules: Collection[str],
     wrappers: Sequence[Wrapper],
-    account: Account,
+    memory: MemoryReservation,
 ) -> gymnasium.Env:
     """Make an environment.
 
@@ -40,7 +41,7 @@ def make_env(
         kwargs: handed to the environment.
         allowed_modules: names of the modules that an id may import.
         wrappers: what will be put around it.
-        account: what its memory is charged to.
+        memory: what reserves its memory.
 
     Raises:
         GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
@@ -49,11 +50,11 @@ def make_env(
     """
     check_kwargs(kwargs)
     spec = find_spec(env_id, allowed_modules)
-    repeats.check(spec, kwargs, wrappers)
-    account.charge(footprint.environment_bytes(spec, kwargs), spec.id)
+    argument_limits.check_environment(spec, kwargs, wrappers)
+    memory.reserve(environment_bytes(spec, kwargs), spec.id)
     with naming_extra(spec):
         chosen = choose_render_mode(load_creator(spec), spec, render_mode)
-        return make_from_spec(spec, chosen, from_words(kwargs))
+        return make_from_spec(spec, chosen, parse_nonfinite(kwargs))
 
 
 def check_kwargs(kwargs: dict) -> None:
@@ -68,7 +69,7 @@ def check_kwargs(kwargs: dict) -> None:
 
 @contextlib.contextmanager
 def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
-    """Name the server's extra in a refusal for want of what it would bring."""
+    """Name the extra of the server in a ``missing_dependency`` that the extra would prevent."""
     try:
         yield
     except GymServerError as refusal:
@@ -79,14 +80,14 @@ def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
         if refusal.code == "missing_dependency" and module:
             raise GymServerError(
                 "missing_dependency",
-                f"{spec.id} needs the Python package '{module}', which no extra brings",
+                f"{spec.id} needs the Python package '{module}', which no extra installs",
                 "install it into the server's Python",
             ) from refusal
         raise
 
 
 def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
-    """Return what the registry knows of an id, after importing its module when it names one.
+    """Return the spec of an id, after importing its module when it names one.
 
     Raises:
         GymServerError: as for ``make_env()``.
@@ -134,7 +135,7 @@ def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
 
 
 def _malformed(env_id: str) -> GymServerError:
-    # The classic server's words.
+    # This is the classic server's message.
     return GymServerError(
         "malformed_env_id", f"Attempted to look up malformed environment ID '{env_id}'"
     )
@@ -160,7 +161,7 @@ def _did_you_mean(name: str) -> str | None:
 
 
 def load_creator(spec: registration.EnvSpec) -> Callable:
-    """Import what makes an environment.
+    """Import the class or function that makes an environment.
 
     Raises:
         GymServerError: ``missing_dependency``, ``environment_error``.
@@ -173,10 +174,12 @@ def _load_creator(spec: registration.EnvSpec) -> Callable:
         importlib.import_module("gymnasium.wrappers")
         if callable(spec.entry_point):
             return spec.entry_point
+        # Gymnasium has it as text where it is not callable.
+        entry_point = cast(str, spec.entry_point)
         if extra_of(spec) != "mujoco":
-            return registration.load_env_creator(spec.entry_point)
+            return registration.load_env_creator(entry_point)
         mujoco.choose_gl()
-        creator = registration.load_env_creator(spec.entry_point)
+        creator = registration.load_env_creator(entry_point)
         mujoco.log_warnings()
         return creator
 
@@ -187,15 +190,15 @@ def choose_render_mode(
     """Return the render_mode to make an environment with.
 
     Args:
-        creator: what makes it; its metadata say what it can.
-        spec: names it.
-        wanted: see ``make_env()``.
+        creator: what makes it; its metadata lists its render modes.
+        spec: its spec, for its name.
+        wanted: the client's render_mode; see ``make_env()``.
 
     Raises:
         GymServerError: ``invalid_parameter``.
     """
     metadata = getattr(creator, "metadata", None)
-    # A function says nothing of what it makes; then Gymnasium gets to see what was asked.
+    # A function has no metadata. Then Gymnasium decides what becomes of the client's render_mode.
     modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
     if wanted is None:
         return "rgb_array" if modes and "rgb_array" in modes else None
@@ -209,13 +212,13 @@ def choose_render_mode(
 def make_from_spec(
     spec: registration.EnvSpec, render_mode: str | None, kwargs: dict
 ) -> gymnasium.Env:
-    """Make an environment of what the registry knows.
+    """Make an environment from its spec.
 
     Raises:
         GymServerError: ``missing_dependency``, ``invalid_kwargs``, ``environment_error``.
     """
-    # The checker would repeat itself in a log that nobody reads, and takes time in each step.
-    ours = {"disable_env_checker": True}
+    # The checker takes time in each step, and would fill the server's log.
+    ours: dict[str, Any] = {"disable_env_checker": True}
     if render_mode is not None:
         ours["render_mode"] = render_mode
     return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **kwargs}), kwargs)
@@ -245,7 +248,7 @@ def make_vector_entry_point(
     return ask(_refusing_kwargs, make, kwargs)
 
 
-def _refusing_kwargs(make: Callable, kwargs: dict):
+def _refusing_kwargs(make: Callable[[], ResultT], kwargs: dict) -> ResultT:
     try:
         return make()
     except TypeError as failure:
@@ -257,8 +260,8 @@ def _refusing_kwargs(make: Callable, kwargs: dict):
 _ABOUT_ARGUMENTS = ("unexpected keyword argument", "multiple values for", "required positional")
 
 
-def ask(function: Callable, *args: object):
-    """Call into Gymnasium or an environment; translate what it raises.
+def ask(function: Callable[..., ResultT], *args: object) -> ResultT:
+    """Call a function of Gymnasium or of an environment; translate what it raises.
 
     Raises:
         GymServerError: ``missing_dependency`` or ``environment_error``, or one that the function
@@ -271,6 +274,6 @@ def ask(function: Callable, *args: object):
     except (error.DependencyNotInstalled, ImportError) as failure:
         raise GymServerError("missing_dependency", str(failure)) from failure
     except BaseException as failure:
-        # Also KeyboardInterrupt and SystemExit: Ctrl-C is a signal handler's affair in this server,
-        # so only an environment raises them, and its client is owed an answer as for any error.
+        # KeyboardInterrupt and SystemExit are translated, too: a signal handler takes Ctrl-C here,
+        # so only an environment can raise them, and its client needs an answer.
         raise environment_error(failure) from failure

@@ -1,4 +1,4 @@
-"""What MuJoCo needs of its host: OpenGL without a display, and somebody who hears it warn."""
+"""Prepare MuJoCo for a server: OpenGL without a display, and warnings in the log."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _EGL_PLATFORM_DEVICE_EXT = 0x313F
 
 
 def choose_gl() -> None:
-    """Name the kind of OpenGL that works here, unless MUJOCO_GL names one.
+    """Set MUJOCO_GL to the kind of OpenGL that works here, unless it is set already.
 
-    MuJoCo reads the variable when it is first imported.  Left to itself it opens a window,
-    which fails on a Linux machine without a display, and ends the process on macOS, where only
-    the main thread may do so.
+    MuJoCo reads the variable when it is first imported.  Without it MuJoCo opens a window, which
+    fails on a Linux machine without a display, and ends the process on macOS, where only the main
+    thread may open windows.
     """
     if "MUJOCO_GL" in os.environ:
         return
@@ -33,7 +33,7 @@ def choose_gl() -> None:
 
 
 def log_warnings() -> None:
-    """Let MuJoCo warn in the server's log; it would write a file into the working directory."""
+    """Send MuJoCo's warnings to the server's log instead of a file in the working directory."""
     import mujoco
 
     mujoco.set_mju_user_warning(lambda words: log.warning("MuJoCo: %s", words))
@@ -44,7 +44,7 @@ def _has_display() -> bool:
 
 
 def _choose_cgl() -> None:
-    # Gymnasium's list of renderers lacks the one that needs no window.
+    # Gymnasium's list of renderers lacks macOS's renderer that needs no window.
     os.environ["MUJOCO_GL"] = "cgl"
     from gymnasium.envs.mujoco import mujoco_rendering
     from mujoco.cgl import GLContext
@@ -53,7 +53,7 @@ def _choose_cgl() -> None:
 
 
 def _has_egl() -> bool:
-    """Tell whether EGL has a device that can be opened, as MuJoCo will do."""
+    """Tell whether EGL has a device that MuJoCo will be able to open."""
     try:
         egl = ctypes.CDLL("libEGL.so.1")
     except OSError:

@@ -1,4 +1,4 @@
-"""What can be created: Gymnasium's registry, and what packages add to it."""
+"""The environments that can be made: Gymnasium's registry, and what packages add to it."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from gym_server.errors import GymServerError, invalid_parameter
 
 log = logging.getLogger(__name__)
 
-# Packages whose environments are known here: what they are like, and what their arguments mean.
+# The packages whose environments and arguments the server knows.
 KNOWN_PACKAGES = ("gymnasium", "ale_py")
 
-# Python lets go of its import locks where modules import each other in a circle, as Gymnasium's
-# do; two threads would see them half made.
+# Held during imports. Python releases its own import locks where modules import each other in a
+# circle, as Gymnasium's do, and a second thread could use a module that is not complete.
 importing = threading.RLock()
 
-# Nothing that is longer is looked for: saying what it resembles would take seconds.
+# Longer ids are not looked up: to find ids that resemble them would take seconds.
 LONGEST_ID = 200
 
-# Since Gymnasium 1.0 packages are no longer found by themselves.
+# Packages that register a namespace. Since Gymnasium 1.0 it does not import them by itself.
 _PACKAGES = {"ALE": "ale_py"}
 
-# The environments of older Gyms, when shimmy is installed. Their argument env_id names modules
-# that they import, whatever the operator allowed.
+# They make environments of older Gyms, when shimmy is installed. Their argument env_id can name any
+# module to import, also one that the operator has not allowed.
 _UNGUARDED = ("GymV21Environment", "GymV26Environment")
 _WHY_UNGUARDED = "may import any module that its env_id names, so this server makes none"
 
 
 def look_up(name: str) -> EnvSpec:
-    """Return what is registered under an id; the newest version for one that names none.
+    """Return the spec of an id; the newest version when the id names none.
 
     Raises:
-        gymnasium.error.Error: when nothing is.
+        gymnasium.error.Error: when nothing is registered under it.
         GymServerError: ``missing_dependency``, ``module_not_allowed``.
     """
     namespace, bare_name, _ = registration.parse_env_id(name)
@@ -62,7 +62,7 @@ def look_up(name: str) -> EnvSpec:
 
 
 def _require_atari(name: str, namespace: str | None) -> None:
-    """Name the extra that an Atari game needs, if it is missing."""
+    """Raise ``missing_dependency`` for an Atari game when its extra is missing."""
     if _PACKAGES["ALE"] in _registered:
         return
     if namespace == "ALE":
@@ -75,7 +75,7 @@ _registered: set[str] = set()
 
 
 def _register_packages() -> None:
-    """Import the packages that register environments, as far as they are installed."""
+    """Import the installed packages among those that register environments."""
     for package in _PACKAGES.values():
         if package not in _registered:
             with contextlib.suppress(ImportError):
@@ -106,13 +106,13 @@ def near(name: str, limit: int = 3) -> list[str]:
 
 
 def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
-    """Return what is registered, one object an environment.
+    """Return what is registered, one object for each environment.
 
     Args:
-        text: a part of the id, in lower or upper case; when it is part of none, the nearest ids
-            are returned. None for all. Longer ones than any id are refused: looking for what
-            is near them would take seconds.
-        allowed_modules: modules that the operator allowed; what they register belongs to it.
+        text: a part of the id, in lower or upper case; when no id contains it, the nearest ids
+            are returned. None for all. A text longer than any id is refused: to find ids near it
+            would take seconds.
+        allowed_modules: modules that the operator allowed; their environments are listed, too.
 
     Raises:
         GymServerError: ``invalid_parameter``.

@@ -1,11 +1,11 @@
-"""Sub-environments: how one is made, and Gymnasium's two ways to run many."""
+"""Making a sub-environment, and Gymnasium's two ways to run many."""
 
 from __future__ import annotations
 
 import contextlib
 import copy
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -16,15 +16,17 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import create_empty_array
 
 from gym_server import spaces
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import Wrapper
 from gym_server.envs.make import load_creator, make_from_spec
-from gym_server.envs.wrappers import Wrapper, wrap
+from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.wrappers import wrap
 from gym_server.processes import start
 from gym_server.rendering.render_thread import RenderThread
 
-# Workers that have not ended by then are ended.
+# Processes that have not exited by then are killed.
 _CLOSE_SECONDS = 3.0
 
+# How long the error of a process that failed may take to arrive.
 _ERROR_SECONDS = 5.0
 
 
@@ -38,56 +40,56 @@ class SubEnv:
         kwargs: dict,
         wrappers: Sequence[Wrapper],
         renderer: RenderThread,
-        account: Account | None = None,
+        memory: MemoryReservation | None = None,
     ) -> None:
-        """Note what to make; a call makes it.
+        """Keep the arguments; each call makes one.
 
         Args:
-            spec: what to make.
-            render_mode: what it gets as such, or None.
+            spec: of the environment.
+            render_mode: handed to it, or None.
             kwargs: handed to it.
             wrappers: see ``wrappers.wrap()``.
             renderer: where wrappers that draw are made.
-            account: what the memory of the wrappers is charged to, for all of them at the first;
-                None where it has been.
+            memory: reserves the memory of the wrappers for all sub-environments when the first one
+                is made; None where it has been reserved.
         """
-        self._how = spec, render_mode, kwargs
+        self._make_args = spec, render_mode, kwargs
         self._wrappers = wrappers
         self._renderer = renderer
-        self._account: Account | None = account
+        self._memory = memory
 
     def __call__(self) -> gymnasium.Env:
         """Make another one."""
-        account, self._account = self._account, None
-        return wrap(make_from_spec(*self._how), self._wrappers, self._renderer, account)
+        memory, self._memory = self._memory, None
+        return wrap(make_from_spec(*self._make_args), self._wrappers, self._renderer, memory)
 
 
 class WorkerSubEnv(SubEnv):
     """Makes a sub-environment in a process of its own."""
 
     def __init__(self, sub_env: SubEnv, autoreset_mode: AutoresetMode) -> None:
-        """Make what another one makes.
+        """Make what another ``SubEnv`` makes.
 
         Args:
-            sub_env: the other.
-            autoreset_mode: the sub-environment resets itself when it is NEXT_STEP.
+            sub_env: the other one.
+            autoreset_mode: with NEXT_STEP the sub-environment resets itself.
         """
-        super().__init__(*sub_env._how, sub_env._wrappers, sub_env._renderer, sub_env._account)
+        super().__init__(*sub_env._make_args, sub_env._wrappers, sub_env._renderer, sub_env._memory)
         self._resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
 
     def __getstate__(self) -> dict:
-        """Leave the render thread and the account here."""
-        return {**self.__dict__, "_renderer": None, "_account": None}
+        """Leave out the render thread and the reservation, which stay in the server's process."""
+        return {**self.__dict__, "_renderer": None, "_memory": None}
 
     def __call__(self) -> gymnasium.Env:
         """Make another one."""
         if self._renderer is None:
-            start.end_with_the_server()
-            load_creator(self._how[0])
-            self._renderer = _ThisThread()  # type: ignore[assignment]
+            start.exit_with_parent()
+            load_creator(self._make_args[0])
+            self._renderer = _ThisThread()
             return self._make()
         env = self._make()
-        # Before processes are started for nothing, and cannot tell what is wrong with them.
+        # Refuses an unsupported space here, before any process starts.
         spaces.describe(env.observation_space)
         spaces.describe(env.action_space)
         return env
@@ -98,7 +100,10 @@ class WorkerSubEnv(SubEnv):
 
 
 class _ThisThread:
-    """A render thread for a process that has but one."""
+    """Stands for the render thread in a process with a single thread.
+
+    It has the one method that wrappers call.
+    """
 
     def run(self, draw: Callable, *args: object) -> object:
         return draw(*args)
@@ -109,33 +114,33 @@ class SyncSubEnvs(SyncVectorEnv):
 
     def __init__(self, sub_env: SubEnv, num_envs: int, autoreset_mode: AutoresetMode) -> None:
         """Make all sub-environments."""
-        # What it returns is encoded before it moves again.
+        # No copies: what a step returns is encoded before the next step.
         super().__init__([sub_env] * num_envs, copy=False, autoreset_mode=autoreset_mode)
 
-    def step_sub_envs(self, sub_envs: np.ndarray, actions: Any) -> tuple:
+    def step_sub_envs(self, which: np.ndarray, actions: Any) -> tuple:
         """Step some of the sub-environments.
 
         Args:
-            sub_envs: their numbers from 0, in order.
+            which: their numbers from 0, in order.
             actions: a batch of one action for each of them.
 
         Returns:
             What ``step()`` returns, with one row for each of these sub-environments.
         """
         some = copy.copy(self)
-        # Older Gymnasiums close the environments of one that is gone.
+        # Older Gymnasiums close the environments when the copy is collected, unless it is closed.
         some.closed = True
-        some.num_envs = len(sub_envs)
-        some.envs = [self.envs[sub_env] for sub_env in sub_envs]
-        some._env_obs = [self._env_obs[sub_env] for sub_env in sub_envs]
-        some._observations = create_empty_array(self.single_observation_space, n=len(sub_envs))
+        some.num_envs = len(which)
+        some.envs = [self.envs[sub_env] for sub_env in which]
+        some._env_obs = [self._env_obs[sub_env] for sub_env in which]
+        some._observations = create_empty_array(self.single_observation_space, n=len(which))
         for name in _FLAGS:
-            setattr(some, name, getattr(self, name)[sub_envs])
+            setattr(some, name, getattr(self, name)[which])
         answer = SyncVectorEnv.step(some, actions)
-        for sub_env, observation in zip(sub_envs, some._env_obs, strict=True):
+        for sub_env, observation in zip(which, some._env_obs, strict=True):
             self._env_obs[sub_env] = observation
         for name in _FLAGS:
-            getattr(self, name)[sub_envs] = getattr(some, name)
+            getattr(self, name)[which] = getattr(some, name)
         return answer
 
     def render_sub_env(self, sub_env: int) -> object:
@@ -143,26 +148,26 @@ class SyncSubEnvs(SyncVectorEnv):
         return self.envs[sub_env].render()
 
     def observation_of(self, sub_env: int) -> object:
-        """Return what one sub-environment was last seen to be."""
+        """Return the last observation of one sub-environment."""
         return self._env_obs[sub_env]
 
 
-# What Gymnasium keeps of each sub-environment, beside its observation.
+# The arrays that Gymnasium keeps with an entry for each sub-environment, beside the observations.
 _FLAGS = ("_rewards", "_terminations", "_truncations", "_autoreset_envs")
 
 
 class AsyncSubEnvs(AsyncVectorEnv):
-    """Sub-environments in a process each, which end when they are told to, or else are ended."""
+    """Sub-environments in a process each, killed when they do not exit as they are asked to."""
 
     def __init__(self, sub_env: SubEnv, num_envs: int, autoreset_mode: AutoresetMode) -> None:
         """Start all processes."""
-        # Observations come through the pipes: in shared memory Gymnasium has no Sequence, no
-        # Graph and no half floats, and its Texts never change. Without it, its worker forgets
-        # at a reset that an episode had ended, so there the sub-environments see to that
-        # themselves.
+        # Observations come through the pipes, because Gymnasium's shared memory takes no Sequence,
+        # no Graph and no half floats, and its Texts never change. But Gymnasium's worker without
+        # shared memory forgets at a reset that an episode had ended. So with NEXT_STEP each
+        # sub-environment resets itself, and Gymnasium's worker does not.
         resets_itself = autoreset_mode == AutoresetMode.NEXT_STEP
         self._failed = False
-        # Before Gymnasium starts them.
+        # Prepares the fork server before Gymnasium starts it.
         start.context()
         try:
             self._with_workers(
@@ -179,13 +184,15 @@ class AsyncSubEnvs(AsyncVectorEnv):
         self.autoreset_mode = autoreset_mode
         self.metadata["autoreset_mode"] = autoreset_mode
 
-    def reset(self, **how: Any) -> tuple:
+    def reset(self, **arguments: Any) -> tuple:
         """Reset all sub-environments, or those of a mask."""
-        return self._with_workers(super().reset, **how)
+        result: tuple = self._with_workers(super().reset, **arguments)
+        return result
 
     def step(self, actions: Any) -> tuple:
         """Step all sub-environments."""
-        return self._with_workers(super().step, actions)
+        result: tuple = self._with_workers(super().step, actions)
+        return result
 
     def render_sub_env(self, sub_env: int) -> object:
         """Draw one sub-environment."""
@@ -198,44 +205,46 @@ class AsyncSubEnvs(AsyncVectorEnv):
         self._raise_if_errors([success])
         return frame
 
-    def _with_workers(self, move: Callable, *args: Any, **how: Any) -> Any:
+    def _with_workers(self, method: Callable, *args: Any, **kwargs: Any) -> Any:
         if self._failed:
             raise RuntimeError("one of its processes ended; close it and create another")
-        # When one fails, the answers of the others would be taken for those to the next call.
+        # After a failure it stays failed: the results of the other processes are still in their
+        # pipes, and would be taken for the results of the next call.
         self._failed = True
         try:
-            answer = move(*args, **how)
+            result = method(*args, **kwargs)
         except (EOFError, OSError) as failure:
             raise RuntimeError(f"the process of {self._ended()} ended without a word") from failure
         self._failed = False
-        return answer
+        return result
 
     def _ended(self) -> str:
-        sentinels = [process.sentinel for process in self.processes]
+        sentinels: list[Any] = [process.sentinel for process in self.processes]
         ended = wait(sentinels, timeout=1)
         return f"sub-environment {sentinels.index(ended[0])}" if ended else "a sub-environment"
 
-    def _raise_if_errors(self, successes: Sequence[bool]) -> None:
+    def _raise_if_errors(self, successes: Iterable[bool]) -> None:
         if all(successes):
             return
         try:
             _, _, failure, _ = self.error_queue.get(timeout=_ERROR_SECONDS)
         except Exception:
-            # Not every exception survives the way here.
+            # Not every exception can be sent: some cannot be pickled or read again.
             raise RuntimeError("a sub-environment failed, and could not send why") from None
         raise failure
 
     def kill(self) -> None:
-        """End every process at once; whoever waits for one learns that it is gone."""
+        """End every process at once; a call that waits for one of them fails."""
         for process in self.processes:
-            # One that was closed meanwhile is no process any more.
+            # It is closed already.
             with contextlib.suppress(ValueError):
                 process.kill()
 
-    def close_extras(self, **_: Any) -> None:
-        """Ask every process to end, and end those that do not."""
+    # The type ignored: Gymnasium calls it with names, all of which fit.
+    def close_extras(self, **_: Any) -> None:  # type: ignore[override]
+        """Ask every process to exit, and kill those that do not."""
         for pipe in getattr(self, "parent_pipes", ()):
-            # One that ended before cannot be asked.
+            # It has ended already.
             with contextlib.suppress(OSError, ValueError):
                 pipe.send(("close", None))
         deadline = time.monotonic() + _CLOSE_SECONDS

@@ -5,89 +5,91 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import cast
 
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from gym_server.envs import make, repeats
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account, answer_bytes, environment_bytes, vector_bytes
+from gym_server.envs import argument_limits, make
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv, SyncSubEnvs
 from gym_server.errors import GymServerError, wrong_length
-from gym_server.json_values import from_words
+from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
 
-# Each is a process.
+# Of vectorization_mode "async", which runs each sub-environment in a process.
 MOST_PROCESSES = 64
 
 
 def make_vector_env(
-    choices: Choices,
+    config: EnvConfig,
     allowed_modules: Collection[str],
-    most: int,
+    max_num_envs: int,
     renderer: RenderThread,
-    account: Account,
+    memory: MemoryReservation,
 ) -> tuple[VectorEnv, str]:
     """Make a vector environment.
 
     Args:
-        choices: what the client wants; its wrappers are on the list.
+        config: what the client chose, with a num_envs; its wrappers are allowed ones.
         allowed_modules: as for ``make.make_env()``.
-        most: how many sub-environments the server allows.
+        max_num_envs: how many sub-environments the server allows.
         renderer: the process's render thread.
-        account: what its memory is charged to.
+        memory: what reserves its memory.
 
     Returns:
-        It, and its vectorization_mode.
+        The vector environment, and its vectorization_mode.
 
     Raises:
         GymServerError: as for ``make.make_env()``; ``too_many_sub_envs``, ``too_much_memory``,
             ``not_supported``.
     """
-    kwargs = choices.kwargs or {}
+    kwargs = config.kwargs or {}
+    num_envs = cast(int, config.num_envs)
     make.check_kwargs(kwargs)
-    spec = make.find_spec(choices.env_id, allowed_modules)
-    _check(choices, most)
-    repeats.check(spec, kwargs, choices.wrappers, choices.num_envs)
+    spec = make.find_spec(config.env_id, allowed_modules)
+    _check(config, num_envs, max_num_envs)
+    argument_limits.check_environment(spec, kwargs, config.wrappers, num_envs)
     with make.naming_extra(spec):
-        asked = _Asked(spec, choices, from_words(kwargs), renderer, account)
-        match choices.vectorization_mode:
+        request = _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
+        match config.vectorization_mode:
             case None:
-                env = None if _against_entry_point(asked) else _try_entry_point(asked)
-                return (_make_sync(asked), "sync") if env is None else (env, "vector_entry_point")
+                env = None if _why_no_entry_point(request) else _try_entry_point(request)
+                return (_make_sync(request), "sync") if env is None else (env, "vector_entry_point")
             case "sync":
-                return _make_sync(asked), "sync"
+                return _make_sync(request), "sync"
             case "async":
-                return _make_async(asked), "async"
+                return _make_async(request), "async"
             case _:
-                return _insist_on_entry_point(asked), "vector_entry_point"
+                return _require_entry_point(request), "vector_entry_point"
 
 
 @dataclass(frozen=True)
-class _Asked:
-    spec: EnvSpec
-    choices: Choices
-    kwargs: dict
-    renderer: RenderThread
-    account: Account
+class _Request:
+    """What all functions below need to make a vector environment."""
 
-    @property
-    def num_envs(self) -> int:
-        return self.choices.num_envs  # type: ignore[return-value]
+    spec: EnvSpec
+    config: EnvConfig
+    kwargs: dict
+    num_envs: int
+    renderer: RenderThread
+    memory: MemoryReservation
 
     @property
     def autoreset_mode(self) -> AutoresetMode:
-        return self.choices.autoreset_mode or AutoresetMode.NEXT_STEP
+        return self.config.autoreset_mode or AutoresetMode.NEXT_STEP
 
 
-def check_single(choices: Choices) -> None:
-    """Raise ``invalid_parameter`` for what only sub-environments can have."""
-    sub_envs_only = {
-        "vectorization_mode": choices.vectorization_mode,
-        "autoreset_mode": choices.autoreset_mode,
-        "seed": choices.seed if isinstance(choices.seed, tuple) else None,
+def check_single(config: EnvConfig) -> None:
+    """Raise ``invalid_parameter`` for parameters that only vector environments have."""
+    of_vector_environments = {
+        "vectorization_mode": config.vectorization_mode,
+        "autoreset_mode": config.autoreset_mode,
+        "seed": config.seed if isinstance(config.seed, tuple) else None,
     }
-    for name, value in sub_envs_only.items():
+    for name, value in of_vector_environments.items():
         if value is not None:
             what = "A list as 'seed'" if name == "seed" else f"The parameter '{name}'"
             raise GymServerError(
@@ -97,20 +99,20 @@ def check_single(choices: Choices) -> None:
             )
 
 
-def _check(choices: Choices, most: int) -> None:
-    if isinstance(choices.seed, tuple) and len(choices.seed) != choices.num_envs:
-        raise wrong_length("seed", len(choices.seed), choices.num_envs, "integer or null")
-    if choices.num_envs > most:
+def _check(config: EnvConfig, num_envs: int, max_num_envs: int) -> None:
+    if isinstance(config.seed, tuple) and len(config.seed) != num_envs:
+        raise wrong_length("seed", len(config.seed), num_envs, "integer or null")
+    if num_envs > max_num_envs:
         raise GymServerError(
             "too_many_sub_envs",
-            f"This server takes at most {most} sub-environments, not {choices.num_envs}",
+            f"This server takes at most {max_num_envs} sub-environments, not {num_envs}",
             "the server's option --max-num-envs sets the limit",
         )
-    if choices.vectorization_mode == "async" and choices.num_envs > MOST_PROCESSES:
+    if config.vectorization_mode == "async" and num_envs > MOST_PROCESSES:
         raise GymServerError(
             "too_many_sub_envs",
             f"'async' takes at most {MOST_PROCESSES} sub-environments, a process each, not "
-            f"{choices.num_envs}",
+            f"{num_envs}",
             "vectorization_mode 'sync' takes as many as the server's option --max-num-envs says",
         )
 
@@ -118,54 +120,55 @@ def _check(choices: Choices, most: int) -> None:
 # An environment's own implementation --------------------------------------------------------
 
 
-def _against_entry_point(asked: _Asked) -> str | None:
-    """Return why the environment's own implementation cannot do it, as far as is known before."""
-    if asked.spec.vector_entry_point is None:
-        return f"{asked.spec.id} has none"
-    if asked.choices.wrappers or asked.spec.additional_wrappers:
+def _why_no_entry_point(request: _Request) -> str | None:
+    """Return why the environment's own implementation cannot do it, if that is known beforehand."""
+    if request.spec.vector_entry_point is None:
+        return f"{request.spec.id} has none"
+    if request.config.wrappers or request.spec.additional_wrappers:
         return "it takes no wrappers"
-    if asked.kwargs.get("max_episode_steps", 1) in (-1, None):
-        return "it has no words for no time limit"
-    if isinstance(asked.choices.seed, tuple):
+    if request.kwargs.get("max_episode_steps", 1) in (-1, None):
+        return "it has no value for no time limit"
+    if isinstance(request.config.seed, tuple):
         return "it has one generator for all sub-environments, so it takes one seed"
     return None
 
 
-def _try_entry_point(asked: _Asked) -> VectorEnv | None:
+def _try_entry_point(request: _Request) -> VectorEnv | None:
     try:
-        env = _make_entry_point(asked)
-        if _is_the_same_task(env, asked):
+        env = _make_entry_point(request)
+        if _is_the_same_task(env, request):
             return env
         env.close()
-    except _CannotDo:
+    except _NotPossibleError:
         pass
-    asked.account.give_back()
+    request.memory.give_back()
     return None
 
 
-def _is_the_same_task(env: VectorEnv, asked: _Asked) -> bool:
-    """Tell whether sub-environments have the spaces of the environment.
+def _is_the_same_task(env: VectorEnv, request: _Request) -> bool:
+    """Tell whether a vector environment has the spaces of the single environment.
 
-    Atari's own see other pictures. They are also taken for the same when only they can be made.
+    Atari's own implementation does not: it observes other pictures. Where the single environment
+    cannot be made there is nothing to compare with, and the answer is yes.
     """
     try:
-        single = make.make_from_spec(asked.spec, None, asked.kwargs)
+        single = make.make_from_spec(request.spec, None, request.kwargs)
     except GymServerError:
         return True
     same = (env.single_observation_space, env.single_action_space) == (
         single.observation_space,
         single.action_space,
     )
-    asked.renderer.run(single.close)
+    request.renderer.run(single.close)
     return same
 
 
-def _insist_on_entry_point(asked: _Asked) -> VectorEnv:
-    reason = _against_entry_point(asked)
+def _require_entry_point(request: _Request) -> VectorEnv:
+    reason = _why_no_entry_point(request)
     try:
         if reason is None:
-            return _make_entry_point(asked)
-    except _CannotDo as refusal:
+            return _make_entry_point(request)
+    except _NotPossibleError as refusal:
         reason = str(refusal)
     raise GymServerError(
         "not_supported",
@@ -174,75 +177,77 @@ def _insist_on_entry_point(asked: _Asked) -> VectorEnv:
     )
 
 
-class _CannotDo(Exception):  # noqa: N818 - where nothing was chosen, it is no error
-    """What was asked for is not what an implementation does."""
+class _NotPossibleError(Exception):
+    """An environment's own implementation cannot do what the client chose."""
 
 
-def _make_entry_point(asked: _Asked) -> VectorEnv:
-    asked.account.charge(vector_bytes(asked.spec, asked.kwargs), asked.spec.id)
-    wanted = asked.choices.render_mode
-    vector_spec = copy.copy(asked.spec)
-    vector_spec.entry_point = asked.spec.vector_entry_point
+def _make_entry_point(request: _Request) -> VectorEnv:
+    request.memory.reserve(vector_bytes(request.spec, request.kwargs), request.spec.id)
+    vector_spec = copy.copy(request.spec)
+    # The type ignored: load_creator() is to load the class of the vector environment.
+    vector_spec.entry_point = request.spec.vector_entry_point  # type: ignore[assignment]
     creator = make.load_creator(vector_spec)
     try:
-        render_mode = make.choose_render_mode(creator, asked.spec, wanted)
-        env = make.make_vector_entry_point(asked.spec, asked.num_envs, render_mode, asked.kwargs)
+        render_mode = make.choose_render_mode(creator, request.spec, request.config.render_mode)
+        env = make.make_vector_entry_point(
+            request.spec, request.num_envs, render_mode, request.kwargs
+        )
     except GymServerError as refusal:
         if refusal.code in ("invalid_parameter", "invalid_kwargs"):
-            raise _CannotDo(refusal.message) from refusal
+            raise _NotPossibleError(refusal.message) from refusal
         raise
     mode = env.metadata.get("autoreset_mode")
-    if mode != asked.autoreset_mode:
+    if mode != request.autoreset_mode:
         env.close()
-        raise _CannotDo(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
-    env.spec = _with_time_limit(asked)
+        raise _NotPossibleError(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
+    env.spec = _with_time_limit(request)
     try:
-        asked.account.charge(answer_bytes(env.single_observation_space), "What is observed")
+        request.memory.reserve(answer_bytes(env.single_observation_space), "What is observed")
     except GymServerError:
         env.close()
         raise
     return env
 
 
-def _with_time_limit(asked: _Asked) -> EnvSpec:
-    """Return the spec with the smallest of the time limits that each sub-environment has."""
-    spec = copy.copy(asked.spec)
-    chosen = asked.kwargs.get("max_episode_steps")
+def _with_time_limit(request: _Request) -> EnvSpec:
+    """Return the spec with the smallest of the time limits of a sub-environment."""
+    spec = copy.copy(request.spec)
+    chosen = request.kwargs.get("max_episode_steps")
     if chosen is not None:
         spec.max_episode_steps = None if chosen == -1 else chosen
     limits = [
-        from_words(wrapper.kwargs["max_episode_steps"])
-        for wrapper in asked.choices.wrappers
+        parse_nonfinite(wrapper.kwargs["max_episode_steps"])
+        for wrapper in request.config.wrappers
         if wrapper.name == "TimeLimit"
     ]
     spec.max_episode_steps = min(filter(None, [spec.max_episode_steps, *limits]), default=None)
     return spec
 
 
-# Gymnasium's --------------------------------------------------------------------------------
+# Gymnasium's implementations --------------------------------------------------------------------
 
 
-def _make_sync(asked: _Asked) -> VectorEnv:
-    return _make_sub_envs(SyncSubEnvs, asked)
+def _make_sync(request: _Request) -> VectorEnv:
+    return _make_sub_envs(SyncSubEnvs, request)
 
 
-def _make_async(asked: _Asked) -> VectorEnv:
-    return _make_sub_envs(AsyncSubEnvs, asked)
+def _make_async(request: _Request) -> VectorEnv:
+    return _make_sub_envs(AsyncSubEnvs, request)
 
 
-def _make_sub_envs(kind: type[SyncSubEnvs] | type[AsyncSubEnvs], asked: _Asked) -> VectorEnv:
+def _make_sub_envs(kind: type[SyncSubEnvs] | type[AsyncSubEnvs], request: _Request) -> VectorEnv:
     render_mode = make.choose_render_mode(
-        make.load_creator(asked.spec), asked.spec, asked.choices.render_mode
+        make.load_creator(request.spec), request.spec, request.config.render_mode
     )
-    asked.account.charge(environment_bytes(asked.spec, asked.kwargs), asked.spec.id)
+    request.memory.reserve(environment_bytes(request.spec, request.kwargs), request.spec.id)
     sub_env = SubEnv(
-        asked.spec,
+        request.spec,
         render_mode,
-        asked.kwargs,
-        asked.choices.wrappers,
-        asked.renderer,
-        asked.account,
+        request.kwargs,
+        request.config.wrappers,
+        request.renderer,
+        request.memory,
     )
-    env = make.ask(kind, sub_env, asked.num_envs, asked.autoreset_mode)
-    env.spec = _with_time_limit(asked)
+    env = make.ask(kind, sub_env, request.num_envs, request.autoreset_mode)
+    env.spec = _with_time_limit(request)
     return env

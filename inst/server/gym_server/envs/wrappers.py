@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import gymnasium
 import numpy as np
 from gymnasium import error
 
+from gym_server.envs.argument_limits import check_wrapper
+from gym_server.envs.config import Wrapper
 from gym_server.envs.extras import missing_extra
-from gym_server.envs.footprint import Account, answer_bytes, reckon_wrapper
+from gym_server.envs.memory_estimate import answer_bytes, wrapper_bytes
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
-from gym_server.json_values import brief, from_words
+from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
 
-# Those that take numbers, texts and lists, keep one environment one environment, and write no
-# files.  (Not: Autoreset, whose resets nobody would see; what takes functions or devices; what
-# opens windows.)
+# Wrappers whose arguments are numbers, texts and lists, and which keep one environment one
+# environment and write no files.  Not among them: Autoreset, whose resets no client would see;
+# wrappers that take functions or devices; wrappers that open windows.
 _ALLOWED = (
     "AddRenderObservation",
     "AddWhiteNoise",
@@ -48,7 +50,7 @@ _ALLOWED = (
     "TimeLimit",
 )
 
-# Arguments whose lists are arrays, of a space's dtype; Gymnasium wants other lists as tuples.
+# Arguments whose lists become arrays of a space's dtype. Gymnasium wants other lists as tuples.
 _ARRAYS = {
     "min_action": "action_space",
     "max_action": "action_space",
@@ -56,31 +58,14 @@ _ARRAYS = {
     "max_obs": "observation_space",
 }
 
-# What takes room by the number that it is given: one client must not use up the machine.
-_AT_MOST = {
-    "AtariPreprocessing": {"screen_size": 4_096},
-    "DelayObservation": {"delay": 1_000},
-    "DiscretizeAction": {"bins": 10_000},
-    "DiscretizeObservation": {"bins": 10_000},
-    "FrameStackObservation": {"stack_size": 1_000},
-    "ResizeObservation": {"shape": 4_096},
-}
-
-# One in another: each takes its time in each step.
+# Each takes time in each step.
 _MOST_WRAPPERS = 32
 
-# They draw when they are made and in each step.
+# Wrappers that draw when they are made and in each step.
 _DRAWING = ("AddRenderObservation",)
 
-# Environments whose observation is a picture that they draw themselves, in each step.
+# Environments that draw their own observation, a picture, in each step.
 _DRAWING_ENVIRONMENTS = ("gymnasium.envs.box2d.car_racing",)
-
-
-class Wrapper(NamedTuple):
-    """A wrapper that a client chose."""
-
-    name: str
-    kwargs: dict
 
 
 def allowed() -> list[str]:
@@ -113,7 +98,7 @@ def wrap(
     env: gymnasium.Env,
     wrappers: Sequence[Wrapper],
     renderer: RenderThread,
-    account: Account | None = None,
+    memory: MemoryReservation | None = None,
 ) -> gymnasium.Env:
     """Put wrappers around an environment, the first one innermost; see ``check()``.
 
@@ -121,24 +106,26 @@ def wrap(
         env: the environment.
         wrappers: what is put around it.
         renderer: where wrappers that draw are made.
-        account: what memory is charged to, before it is taken; None where it has been.
+        memory: what reserves the memory of the wrappers; None where it has been reserved.
 
     Raises:
         GymServerError: ``invalid_kwargs``, ``missing_dependency``, ``too_much_memory``.
     """
     for wrapper in wrappers:
-        drawing = wrapper.name in _DRAWING
-        how = env, wrapper, account
-        env = renderer.run(_wrap, *how) if drawing else _wrap(*how)
-    if account is not None:
-        account.charge(answer_bytes(env.observation_space), "What is observed")
+        if wrapper.name in _DRAWING:
+            env = renderer.run(_wrap, env, wrapper, memory)
+        else:
+            env = _wrap(env, wrapper, memory)
+    if memory is not None:
+        memory.reserve(answer_bytes(env.observation_space), "What is observed")
     return env
 
 
 def time_limit(env: gymnasium.Env) -> int | None:
     """Return the smallest time limit of an environment and the wrappers around it, or None.
 
-    Each layer's spec tells the outermost limit from there inwards, and all of them are counted.
+    The spec of each layer knows the outermost limit below it, so the specs of all layers together
+    know every limit.
     """
     limits = [env.spec.max_episode_steps if env.spec else None]
     while isinstance(env, gymnasium.Wrapper):
@@ -158,24 +145,24 @@ def draws_when_stepped(env: gymnasium.Env) -> bool:
     return False
 
 
-def _wrap(env: gymnasium.Env, wrapper: Wrapper, account: Account | None) -> gymnasium.Env:
+def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None) -> gymnasium.Env:
     kind = getattr(gymnasium.wrappers, wrapper.name)
     try:
-        # What it does not know says more than what is missing.
+        # Of two mistakes, an unknown argument and a missing one, the unknown one is reported.
         inspect.signature(kind).bind_partial(env, **wrapper.kwargs)
         inspect.signature(kind).bind(env, **wrapper.kwargs)
     except TypeError as failure:
         raise GymServerError("invalid_kwargs", f"{wrapper.name}: {failure}") from failure
-    _check_sizes(wrapper)
-    if account is not None:
-        reckoned = reckon_wrapper(wrapper.name, from_words(wrapper.kwargs), env)
-        account.charge(reckoned.kept, wrapper.name, reckoned.answer)
+    check_wrapper(wrapper)
+    if memory is not None:
+        estimate = wrapper_bytes(wrapper.name, parse_nonfinite(wrapper.kwargs), env)
+        memory.reserve(estimate.kept, wrapper.name, later=estimate.answer)
     try:
-        return kind(
-            env, **{name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}
-        )
+        arguments = {name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}
+        wrapped: gymnasium.Env = kind(env, **arguments)
+        return wrapped
     except error.DependencyNotInstalled as failure:
-        # All of them need OpenCV, which no extra of Gymnasium's own brings alone.
+        # Wrappers that lack a dependency lack OpenCV, which this extra of ours installs.
         raise missing_extra(wrapper.name, "atari") from failure
     except Exception as failure:
         words = str(failure) or "it says no more"
@@ -185,28 +172,17 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper, account: Account | None) -> gymn
         ) from failure
 
 
-def _check_sizes(wrapper: Wrapper) -> None:
-    for name, most in _AT_MOST.get(wrapper.name, {}).items():
-        value = from_words(wrapper.kwargs.get(name))
-        for number in value if isinstance(value, list) else [value]:
-            if isinstance(number, (int, float)) and not number <= most:
-                raise GymServerError(
-                    "invalid_kwargs",
-                    f"{wrapper.name}: {name} must be at most {most}, not {brief(number)}",
-                )
-
-
 def _argument(env: gymnasium.Env, name: str, value: object) -> object:
-    value = from_words(value)
+    value = parse_nonfinite(value)
     if isinstance(value, list):
         items = [_argument(env, name, item) for item in value]
         return _array(getattr(env, _ARRAYS[name]), items) if name in _ARRAYS else tuple(items)
-    # Many of them insist on integers, which a client may write as 4.0.
+    # Many wrappers insist on integers, and a client may write 4 as 4.0.
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _array(space: gymnasium.Space, items: list) -> np.ndarray:
     array = np.array(items)
-    # Gymnasium warns of precision lost where nothing is.
+    # Gymnasium would warn that precision is lost, where none is.
     is_float = space.dtype is not None and space.dtype.kind == "f"
     return array.astype(space.dtype) if is_float else array

@@ -23,7 +23,7 @@ from httptools import HttpParserError
 from gym_server.budget import Share
 from gym_server.errors import GymServerError, answer_to
 from gym_server.http_server.request_parser import Reader, Request, malformed
-from gym_server.protocol import wire
+from gym_server.protocol import answers
 
 # Seconds that a connection may be idle.
 _IDLE_SECONDS = 3600.0
@@ -352,9 +352,9 @@ class Connection:
 
 def _refuse(refusal: GymServerError) -> tuple[str, list[tuple[str, str]], bytes]:
     status, body = answer_to(refusal)
-    data = wire.dumps(body)
+    data = answers.dumps(body)
     headers = [
-        ("Content-Type", wire.JSON),
+        ("Content-Type", answers.JSON),
         ("Content-Length", str(len(data))),
         *refusal.headers,
     ]

@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Callable, Collection
 
 from gym_server.envs import make, vectorization, wrappers
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance
 from gym_server.instances.vector_instance import VectorInstance
@@ -15,12 +15,12 @@ from gym_server.rendering.render_thread import RenderThread
 
 
 def make_instance(
-    choices: Choices,
+    choices: EnvConfig,
     allowed_modules: Collection[str],
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
-    account: Account,
+    account: MemoryReservation,
 ) -> Instance:
     """Make an instance of what a client wants.
 

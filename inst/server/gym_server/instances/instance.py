@@ -10,8 +10,8 @@ import gymnasium
 import numpy as np
 
 from gym_server import spaces
-from gym_server.envs import repeats
-from gym_server.envs.config import Choices
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import ask
 from gym_server.envs.wrappers import draws_when_stepped, time_limit
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
@@ -35,7 +35,7 @@ class Instance(Listed):
     instance was being closed raises ``unknown_instance``, or why it was closed.
     """
 
-    def __init__(self, env: gymnasium.Env, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(self, env: gymnasium.Env, choices: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Raises:
@@ -123,7 +123,7 @@ class Instance(Listed):
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         if self._for_eyes:
             self.screen.pace()
-        repeats.check_options(self._env, options)
+        argument_limits.check_reset_options(self._env, options)
         with self.hold:
             reset = self._monitor.reset if self._monitor else self._env.reset
             seed_to_use = self._seed_for_reset if seed is None else seed

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gym_server.errors import invalid_parameter
 
 if TYPE_CHECKING:
-    from gym_server.envs.config import Choices
+    from gym_server.envs.config import EnvConfig
     from gym_server.instances.lock import Hold
     from gym_server.viewing.viewer import Screen
 
@@ -22,7 +22,7 @@ class Listed:
     env_id: str
     hold: Hold
     screen: Screen
-    _choices: Choices
+    _choices: EnvConfig
     # None where there are no sub-environments.
     _num_envs: int | None = None
     # As many as can be looked at.

@@ -10,8 +10,8 @@ from gymnasium.spaces import Dict, Space, Tuple
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server import spaces
-from gym_server.envs import repeats
-from gym_server.envs.config import Choices
+from gym_server.envs import argument_limits
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import ask
 from gym_server.envs.vector_envs import AsyncSubEnvs, SyncSubEnvs
 from gym_server.envs.wrappers import draws_when_stepped
@@ -32,7 +32,9 @@ class VectorInstance(Instance):
     _env: VectorEnv
     _tally: SubEnvTally
 
-    def __init__(self, env: VectorEnv, mode: str, choices: Choices, renderer: RenderThread) -> None:
+    def __init__(
+        self, env: VectorEnv, mode: str, choices: EnvConfig, renderer: RenderThread
+    ) -> None:
         """Take over a vector environment.
 
         Args:
@@ -144,7 +146,7 @@ class VectorInstance(Instance):
             raise self._not_supported("one seed a sub-environment")
 
     def _check_options(self, options: dict | None) -> None:
-        repeats.check_options(self._env, options)
+        argument_limits.check_reset_options(self._env, options)
         if options and "reset_mask" in options:
             raise GymServerError(
                 "invalid_parameter",

@@ -8,17 +8,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.listed import Listed
 from gym_server.instances.lock import Hold
 from gym_server.isolation.worker import Surroundings, keep_instance
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.processes.messages import Seen
+from gym_server.processes.messages import Result
 from gym_server.processes.worker_process import WorkerProcess
+from gym_server.protocol.answers import Ready
 from gym_server.protocol.safetensors import Tensor
-from gym_server.protocol.wire import Ready
 from gym_server.spaces import Parts
 from gym_server.viewing.viewer import Screen
 
@@ -39,7 +39,7 @@ class IsolatedInstance(Listed):
 
     def __init__(
         self,
-        choices: Choices,
+        choices: EnvConfig,
         surroundings: Surroundings,
         on_end: Callable[[IsolatedInstance, GymServerError], None],
     ) -> None:
@@ -69,7 +69,7 @@ class IsolatedInstance(Listed):
             keep_instance, choices, surroundings, on_end=self._end, hint=hint
         )
 
-    def create(self, account: Account) -> None:
+    def create(self, account: MemoryReservation) -> None:
         """Wait until the environment is made.
 
         Args:
@@ -78,7 +78,7 @@ class IsolatedInstance(Listed):
         Raises:
             GymServerError: see ``factory.make_instance()``; ``environment_died``.
         """
-        made = self._value(self._worker.first_word())
+        made = self._value(self._worker.first_result())
         self._about = made["about"]
         account.take(max(0.0, float(made["memory"])), self.env_id)
         self.env_id = str(self._about["env_id"])
@@ -88,10 +88,10 @@ class IsolatedInstance(Listed):
 
     def stay(self) -> None:
         """Hear that it is on the list, which it leaves when its process ends."""
-        self._worker.stay()
+        self._worker.report_end()
 
     @staticmethod
-    def _value(seen: Seen) -> dict:
+    def _value(seen: Result) -> dict:
         return seen.value  # type: ignore[return-value]
 
     # Moves ----------------------------------------------------------------------------------
@@ -128,12 +128,12 @@ class IsolatedInstance(Listed):
 
     def _move(self, method: str, *args: object) -> Ready:
         self._tell_of_move()
-        return self._worker.move(method, *args)
+        return self._worker.call(method, *args)
 
     def sample_action(self) -> object:
         """Draw an action from the action space's own generator."""
         with self.hold:
-            return self._worker.move("sample_action").value
+            return self._worker.call("sample_action").value
 
     # Looks ----------------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ class IsolatedInstance(Listed):
         """Draw the current state of a sub-environment; see ``Instance.render()``."""
         self.check_sub_env(sub_env)
         with self.hold:
-            return self._worker.move("render", sub_env).frame
+            return self._worker.call("render", sub_env).frame
 
     def draws_on_render_thread(self) -> bool:
         """Tell whether a picture takes the server's render thread."""
@@ -149,7 +149,7 @@ class IsolatedInstance(Listed):
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; whoever calls it has the hold."""
-        seen = self._worker.move("look", sub_env)
+        seen = self._worker.call("look", sub_env)
         return dict(self._value(seen)), seen.frame
 
     # While it moves -------------------------------------------------------------------------
@@ -157,25 +157,25 @@ class IsolatedInstance(Listed):
     @property
     def action_space_info(self) -> dict:
         """The description of the action space."""
-        return self._value(self._worker.question("action_space_info"))
+        return self._value(self._worker.query("action_space_info"))
 
     @property
     def observation_space_info(self) -> dict:
         """The description of the observation space."""
-        return self._value(self._worker.question("observation_space_info"))
+        return self._value(self._worker.query("observation_space_info"))
 
     def action_contains(self, claim: dict) -> bool:
         """Answer a client's "contains"; see ``spaces.contains()``."""
-        return bool(self._worker.question("action_contains", claim).value)
+        return bool(self._worker.query("action_contains", claim).value)
 
     def observation_contains(self, claim: dict) -> bool:
         """Answer a client's "contains"; see ``spaces.contains()``."""
-        return bool(self._worker.question("observation_contains", claim).value)
+        return bool(self._worker.query("observation_contains", claim).value)
 
     def about(self) -> dict:
         """Return all that is known of the instance, without waiting for its environment."""
         try:
-            self._about = self._value(self._worker.question("about", seconds=_ABOUT_SECONDS))
+            self._about = self._value(self._worker.query("about", timeout=_ABOUT_SECONDS))
         except TimeoutError:
             logging.getLogger(__name__).info("Instance %s says nothing now", self.instance_id)
         return {**self._about, **self.line(), "isolated": True}
@@ -183,7 +183,7 @@ class IsolatedInstance(Listed):
     @property
     def busy_since(self) -> float | None:
         """Since when a call has waited for it; also one that asks what can be said meanwhile."""
-        since = (self.hold.busy_since, self._worker.questioned_since)
+        since = (self.hold.busy_since, self._worker.query_since)
         return min((one for one in since if one is not None), default=None)
 
     # Monitors -------------------------------------------------------------------------------
@@ -193,12 +193,12 @@ class IsolatedInstance(Listed):
         with self.hold:
             # Sub-environments are refused by the process, which says why.
             path = None if self._num_envs is not None else root.resolve(directory)
-            self._worker.move("start_monitor", self.instance_id, path, directory, *how)
+            self._worker.call("start_monitor", self.instance_id, path, directory, *how)
 
     def close_monitor(self) -> None:
         """Stop recording and finish the files; see ``Instance.close_monitor()``."""
         with self.hold:
-            self._worker.move("close_monitor")
+            self._worker.call("close_monitor")
 
     # The end --------------------------------------------------------------------------------
 
@@ -208,18 +208,18 @@ class IsolatedInstance(Listed):
             gone = self.hold.gone()
             self.hold.closed = True
             self.screen.end(gone)
-            self._worker.expect_end()
+            self._worker.begin_close()
             try:
-                self._worker.move("close")
+                self._worker.call("close")
             finally:
-                self._worker.let_go(gone)
+                self._worker.close(gone)
 
     def condemn(self, why: GymServerError) -> None:
         """End the process at once.
 
         Who waits for it hears why, and so does everybody who comes later: none is stuck.
         """
-        self._worker.condemn(why)
+        self._worker.kill(why)
         self.screen.end(why)
 
     def _end(self, why: GymServerError) -> None:

@@ -126,16 +126,16 @@ class Isolation:
             on_end=lambda why: None,
             hint="",
         )
-        overdue = threading.Timer(seconds, worker.condemn, (_search_too_long(seconds),))
+        overdue = threading.Timer(seconds, worker.kill, (_search_too_long(seconds),))
         overdue.daemon = True
         if seconds:
             overdue.start()
         try:
-            return worker.first_word().value
+            return worker.first_result().value
         finally:
             overdue.cancel()
             # It has no more to say, and a thread of a module's would keep it.
-            worker.condemn(shutting_down())
+            worker.kill(shutting_down())
 
 
 def _search_too_long(seconds: float) -> GymServerError:

@@ -23,18 +23,21 @@ from pathlib import Path
 
 from gym_server.budget import Budget
 from gym_server.envs import registry
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import answer_to
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.monitoring.monitor_directory import claim
 from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
-from gym_server.processes.messages import read_question, refusal_of, value_of
+from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
-from gym_server.protocol import wire
+from gym_server.protocol import answers
 from gym_server.rendering.render_thread import RenderThread
+
+# Its imports take longer than the start of a process.
+start.preload(__name__)
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class Surroundings:
         allowed_modules: names of the modules that an env_id may import.
         imported: those that are imported before anything is made.
         max_num_envs: how many sub-environments an environment may have.
-        memory: how many bytes it may be reckoned to take; see ``footprint``.
+        memory: how many bytes it may be estimated to take; see ``memory_estimate``.
         max_mb: how much memory the process may have, in MiB; 0 for no limit.
         log_level: what goes to standard error.
     """
@@ -59,7 +62,7 @@ class Surroundings:
 
 
 def keep_instance(
-    moves: Connection, questions: Connection, choices: Choices, surroundings: Surroundings
+    moves: Connection, questions: Connection, choices: EnvConfig, surroundings: Surroundings
 ) -> None:
     """Make an environment and serve it until it is closed.
 
@@ -97,7 +100,7 @@ def _settle(surroundings: Surroundings) -> None:
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    start.end_with_the_server(group=True)
+    start.exit_with_parent(group=True)
     logging.basicConfig(
         level=surroundings.log_level,
         stream=sys.stderr,
@@ -121,7 +124,7 @@ def _limit_memory(size: int) -> None:
 def _serve(channel: Pipe, asked: _Asked) -> None:
     while not asked.is_closed:
         try:
-            number, method, args = read_question(channel.receive())
+            number, method, args = read_call(channel.receive())
         except (EOFError, OSError):
             # The server let go of it, or is gone.
             os._exit(1)
@@ -131,14 +134,14 @@ def _serve(channel: Pipe, asked: _Asked) -> None:
 def _answer(channel: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
-        if isinstance(result, wire.Answer):
-            message = messages.answer_of(number, result)
+        if isinstance(result, answers.Answer):
+            message = messages.answer_message(number, result)
         elif isinstance(result, _Look):
-            message = value_of(number, result.facts, result.frame)
+            message = value_message(number, result.facts, result.frame)
         else:
-            message = value_of(number, result)
+            message = value_message(number, result)
     except BaseException as error:
-        message = refusal_of(number, answer_to(error)[1])
+        message = refusal_message(number, answer_to(error)[1])
     try:
         channel.send(message)
     except (OSError, ValueError):
@@ -154,7 +157,7 @@ class _Look:
 class _Asked:
     """What the server can ask for, by name."""
 
-    def __init__(self, choices: Choices, surroundings: Surroundings) -> None:
+    def __init__(self, choices: EnvConfig, surroundings: Surroundings) -> None:
         self._choices = choices
         self._surroundings = surroundings
         self.instance: Instance | None = None
@@ -164,7 +167,7 @@ class _Asked:
         for module in self._surroundings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
-        account = Account(Budget(self._surroundings.memory), self._choices.num_envs or 1)
+        account = MemoryReservation(Budget(self._surroundings.memory), self._choices.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make_instance(
                 self._choices,
@@ -184,11 +187,11 @@ class _Asked:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: object) -> wire.Answer:
-        return wire.answer(self.instance.reset(*args), None)
+    def reset(self, *args: object) -> answers.Answer:
+        return answers.answer(self.instance.reset(*args), None)
 
-    def step(self, *args: object) -> wire.Answer:
-        return wire.answer(self.instance.step(*args), None)
+    def step(self, *args: object) -> answers.Answer:
+        return answers.answer(self.instance.step(*args), None)
 
     def sample_action(self) -> object:
         return self.instance.sample_action()

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from gym_server.budget import Budget
 from gym_server.envs import registry, vectorization, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.envs.config import Choices
-from gym_server.envs.footprint import Account
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
@@ -34,7 +34,7 @@ class _Share(NamedTuple):
     """What an environment takes of what there is for all, until it is gone."""
 
     room: Room
-    account: Account
+    account: MemoryReservation
 
 
 @dataclass
@@ -50,7 +50,7 @@ class _Making:
         settled: whether it was answered for, once it is given up.
     """
 
-    choices: Choices
+    choices: EnvConfig
     share: _Share
     condemn: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
@@ -100,7 +100,7 @@ class Instances:
         self._departed = Departed()
         self._stopping = False
 
-    def create(self, choices: Choices) -> str:
+    def create(self, choices: EnvConfig) -> str:
         """Make an environment and return its instance_id, 8 hex digits.
 
         Raises:
@@ -139,10 +139,10 @@ class Instances:
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, choices: Choices, isolated: bool) -> Iterator[_Making]:
+    def _room_for(self, choices: EnvConfig, isolated: bool) -> Iterator[_Making]:
         """Keep room for an environment while it is made."""
         room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
-        share = _Share(room, Account(self._budget, room.sub_envs))
+        share = _Share(room, MemoryReservation(self._budget, room.sub_envs))
         making, thread = _Making(choices, share), threading.get_ident()
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
@@ -169,7 +169,7 @@ class Instances:
             share.account.give_back()
             self.left_garbage = True
 
-    def _make(self, choices: Choices, making: _Making, undo: contextlib.ExitStack) -> Instance:
+    def _make(self, choices: EnvConfig, making: _Making, undo: contextlib.ExitStack) -> Instance:
         return make_instance(
             choices,
             self._allowed_modules,
@@ -180,7 +180,7 @@ class Instances:
         )
 
     def _make_isolated(
-        self, choices: Choices, making: _Making, undo: contextlib.ExitStack
+        self, choices: EnvConfig, making: _Making, undo: contextlib.ExitStack
     ) -> IsolatedInstance:
         surroundings = self._isolation.surroundings(
             choices.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
@@ -379,7 +379,7 @@ class Instances:
                 return instance_id
 
 
-def _processes_of(choices: Choices, isolated: bool) -> int:
+def _processes_of(choices: EnvConfig, isolated: bool) -> int:
     """Return how many processes of its own run an environment."""
     sub_envs = choices.num_envs or 1
     return isolated + (sub_envs if choices.vectorization_mode == "async" else 0)

@@ -40,8 +40,8 @@ class Limits:
             there are, each takes 7 MB of its own when it is made and 20 MB in use, two threads
             and 15 files, whether it is used or not; this is two environments of as many as one
             may have, or a class in which everybody has some isolated ones.
-        max_memory_mb: how much memory all of them may be reckoned to take together at their most,
-            in MiB; see ``footprint``. Half of what a small machine has.
+        max_memory_mb: how much memory all of them may be estimated to take together at their most,
+            in MiB; see ``memory_estimate``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
         max_call_seconds: how long one call may take before its instance is given up; 0 for ever.
             Longer than any one call that means well, and short enough that somebody who comes

@@ -1,1 +1,1 @@
-"""Processes of the server's own, and how it talks with them."""
+"""Processes that the server starts, and the messages between it and them."""

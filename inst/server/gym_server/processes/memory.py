@@ -1,4 +1,4 @@
-"""Memory that is not used any more goes back to the system."""
+"""Return memory that is no longer used to the system."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import gc
 import sys
 from collections.abc import Callable
 
-# glibc's numbers for what mallopt() sets, and to what: what is as large as a body comes from the
-# system, each for itself, and goes back there; and how much a pool may have free at its end.
+# glibc's numbers of two settings of mallopt(), and our values. A block from _LARGE_BYTES on, such
+# as a request's body, is a mapping of its own, which goes back to the system when it is freed. A
+# pool keeps at most _FREE_BYTES free at its end.
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES = 2**20
 _FREE_BYTES = 2**22
 
 
 def _glibc(name: str) -> Callable[..., int] | None:
-    # macOS and Windows give back by themselves, as does musl, which has no such functions.
+    # macOS, Windows and musl return memory without being asked, and have no such functions.
     return getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
 
 
@@ -24,13 +25,13 @@ _mallopt = _glibc("mallopt")
 
 
 def prepare() -> None:
-    """Get ready to give back; call it once, when all is loaded.
+    """Prepare for ``give_back()``; call it once, when all modules are loaded.
 
-    Later collections are spared the look at what is there now, above all code: one that finds
-    nothing takes some microseconds instead of 25 ms, in which nobody gets an answer.
+    The objects that exist now, most of them code, are taken out of later garbage collections: one
+    that finds nothing takes some microseconds instead of 25 ms, in which nothing is answered.
 
-    And glibc does not take the size of what was freed for the size that it had better keep, up to
-    32 MiB at the end of each of its pools, where nothing gives it back.
+    glibc's two thresholds are fixed, because it raises them to the size of blocks that were freed,
+    up to 32 MiB, and keeps that much at the end of each pool.
     """
     gc.collect()
     gc.freeze()
@@ -40,15 +41,16 @@ def prepare() -> None:
 
 
 def give_back(garbage: bool = True) -> None:
-    """Collect the garbage, and return what is free.
+    """Collect the garbage and return free memory to the system.
+
+    Environments refer to themselves in circles, so closed ones stay until Python's garbage
+    collection, which starts by the number of new objects and not by their size. And glibc has a
+    pool of memory for every few threads, and keeps what is free there for as long as any block
+    behind it is in use.
 
     Args:
-        garbage: whether there may be some; to look for it takes the longer the more there is.
-
-    Environments refer to themselves in circles, so that those that were closed wait for Python's
-    collection, which comes by the number of new objects and not by their size. And glibc keeps
-    what threads have freed, in a pool for each few of them, for as long as anything that lies
-    behind it is in use.
+        garbage: whether to collect the garbage first; the more objects there are, the longer it
+            takes.
     """
     if garbage:
         gc.collect()

@@ -1,8 +1,9 @@
-"""Messages between two processes, as fast as they can be.
+"""Messages between two processes, sent and received with as few system calls as possible.
 
-``multiprocessing``'s connections read the length of a message and then the message.  Where there
-are sockets below them one read has both: a question and its answer take 25 us so instead of 43
-(medians of 1,500 with 300 us between them, which let the caches cool, as a client does).
+``multiprocessing``'s connections read the length of a message first and then the message.  Where
+they are sockets underneath, one read gets both: a call and its result take 25 us instead of 43
+(medians of 1,500 with pauses of 300 us between them, in which the caches cool down, as a client
+makes them).
 """
 
 from __future__ import annotations
@@ -11,16 +12,17 @@ import contextlib
 import os
 import select
 import socket
+import sys
 from multiprocessing.connection import Connection
 
 _LENGTH_BYTES = 8
-_AT_ONCE = 2**16
+_READ_BYTES = 2**16
 
-# Longer ones are no honest answers; nothing is allocated on the word of a length.
+# No honest message is longer. Nothing is allocated because of a length that was sent.
 _LONGEST = 2**31 - 1
 
 
-class Nonsense(Exception):  # noqa: N818
+class MalformedMessageError(Exception):
     """What came from the other process is no message."""
 
 
@@ -39,20 +41,23 @@ class ConnectionPipe:
         """Wait for a message.
 
         Raises:
-            EOFError, OSError: nobody has the other end any more.
-            Nonsense: it is none.
+            EOFError, OSError: no process has the other end any more.
+            MalformedMessageError: what came is no message.
         """
         return self._connection.recv_bytes(_LONGEST)
 
-    def has_come(self, seconds: float) -> bool:
-        """Wait for the beginning of a message, or the end; tell whether it has come."""
+    def poll(self, seconds: float) -> bool:
+        """Wait for the beginning of a message or the end of the pipe; return whether it came."""
         return self._connection.poll(seconds)
 
     def wake(self) -> None:
-        """Let who waits for a message find that none comes, whoever else has the other end."""
+        """Make a ``receive()`` in another thread fail, even while processes have the other end.
+
+        Only sockets can do that; here it does nothing.
+        """
 
     def close(self) -> None:
-        """Close this end; nobody may wait here."""
+        """Close this end; no thread may be receiving."""
         self._connection.close()
 
 
@@ -70,20 +75,20 @@ class SocketPipe(ConnectionPipe):
         self._socket.sendall(len(message).to_bytes(_LENGTH_BYTES, "little") + message)
 
     def receive(self) -> bytes:
-        """Wait for a message; see above."""
+        """Wait for a message; see ``ConnectionPipe.receive()``."""
         read = self._rest or self._read()
         while len(read) < _LENGTH_BYTES:
             read += self._read()
         end = _LENGTH_BYTES + int.from_bytes(read[:_LENGTH_BYTES], "little")
         if end > _LONGEST:
-            raise Nonsense("a message of no length")
+            raise MalformedMessageError("a message of no length")
         if len(read) < end:
             read = self._read_until(end, read)
         self._rest = read[end:]
         return read[_LENGTH_BYTES:end]
 
     def _read(self) -> bytes:
-        read = self._socket.recv(_AT_ONCE)
+        read = self._socket.recv(_READ_BYTES)
         if not read:
             raise EOFError
         return read
@@ -95,23 +100,26 @@ class SocketPipe(ConnectionPipe):
             length += len(pieces[-1])
         return b"".join(pieces)
 
-    def has_come(self, seconds: float) -> bool:
-        """Wait for the beginning of a message, or the end; tell whether it has come."""
+    def poll(self, seconds: float) -> bool:
+        """Wait for the beginning of a message or the end of the pipe; return whether it came."""
         if self._rest:
             return True
-        # Not select(), which knows no more than 1,024 files.
+        # Not select(), which takes only the first 1,024 file descriptors.
         waiting = select.poll()
         waiting.register(self._socket, select.POLLIN)
         return bool(waiting.poll(1000 * seconds))
 
     def wake(self) -> None:
-        """Let who waits for a message find that none comes; see above."""
+        """Make a ``receive()`` in another thread fail; see ``ConnectionPipe.wake()``."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close this end; nobody may wait here."""
+        """Close this end; no thread may be receiving."""
         self._socket.close()
 
 
-Pipe = SocketPipe if os.name == "posix" else ConnectionPipe
+if sys.platform == "win32":
+    Pipe = ConnectionPipe
+else:
+    Pipe = SocketPipe

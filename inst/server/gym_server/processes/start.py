@@ -1,4 +1,4 @@
-"""Processes of the server's own: how they start, and that none outlives it."""
+"""How the server starts processes, and makes sure that none outlives it."""
 
 from __future__ import annotations
 
@@ -11,69 +11,79 @@ import sys
 import threading
 from functools import cache
 from multiprocessing import util
-from multiprocessing.context import BaseContext
+from typing import Any
 
-# A forkserver copies a process that has only just imported what all of them need; Windows has
-# none.  Never a fork: it would copy locks that other threads hold, and our signals.
+# A fork server forks a process that has imported the preloaded modules and does nothing else;
+# Windows has none.  The server itself is never forked: a copy would have locks that other threads
+# hold, and our signal handlers.
 START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
-_PRELOADED = ["gym_server.isolation.worker"]
+_preloaded: list[str] = []
 
 
-def context() -> BaseContext:
-    """Return what starts processes."""
+def preload(module: str) -> None:
+    """Let processes start with a module imported, where the system can copy one that has it.
+
+    Call it before the first process starts.
+    """
+    _preloaded.append(module)
+
+
+def context() -> Any:
+    """Return the ``multiprocessing`` context that starts processes."""
     context = multiprocessing.get_context(START_METHOD)
-    context.set_forkserver_preload(_PRELOADED)
-    with _first:
+    context.set_forkserver_preload(_preloaded)
+    with _folder_lock:
         _temporary_folder()
     return context
 
 
-_first = threading.Lock()
+_folder_lock = threading.Lock()
 
 
 @cache
 def _temporary_folder() -> str:
-    """Return the folder of the sockets that processes are started by, for all of them.
+    """Return the folder of the sockets over which processes are started.
 
-    Each process that starts others makes one, unless it has got one from the process that started
-    it. So the server's is made first: those that are killed would leave theirs behind.
+    A process that starts others makes such a folder unless it inherits one. The server makes its
+    folder before it starts any process, so that all share this one: a process that is killed
+    would leave a folder of its own behind.
     """
     return util.get_temp_dir()
 
 
 def remove_temporary_folder() -> None:
-    """Remove what an ordinary exit removes by itself, before one that is not."""
+    """Remove the folder, which an ordinary exit does by itself, before ``os._exit()``."""
     if _temporary_folder.cache_info().currsize:
         shutil.rmtree(_temporary_folder(), ignore_errors=True)
 
 
-def end_with_the_server(group: bool = False) -> None:
-    """End this process when the one that started it ends, however that comes about.
+def exit_with_parent(group: bool = False) -> None:
+    """Let this process exit when the process that started it ends, in whatever way.
 
     Args:
-        group: whether all others of its process group end, too.
+        group: whether all other processes of its group are killed, too.
     """
-    server = multiprocessing.parent_process()
-    if server is None:
+    parent = multiprocessing.parent_process()
+    if parent is None:
         return
     if group and sys.platform == "linux":
-        _be_killed_by(server.sentinel)
+        _kill_group_at_end_of(parent.sentinel)
 
-    def end() -> None:
-        server.join()
+    def exit_after_parent() -> None:
+        parent.join()
         if group:
             with contextlib.suppress(OSError, AttributeError):
                 os.killpg(os.getpid(), signal.SIGKILL)
         os._exit(1)
 
-    threading.Thread(target=end, daemon=True).start()
+    threading.Thread(target=exit_after_parent, daemon=True).start()
 
 
-def _be_killed_by(sentinel: int) -> None:
-    """Let the system end this process group when the other end of a pipe closes.
+def _kill_group_at_end_of(sentinel: int) -> None:
+    """Let the system kill this process group when the other end of a pipe closes.
 
-    That needs no thread: code that never lets another one run would keep it from its work.
+    That needs no thread of Python's, which code in C that keeps the interpreter's lock would stop.
     """
     import fcntl
 

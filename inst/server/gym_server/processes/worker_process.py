@@ -1,4 +1,4 @@
-"""A process that the server has started, what it is asked, and how it ended."""
+"""A process that the server has started: calls to it, and how it ended."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ import threading
 from collections.abc import Callable
 from multiprocessing import process as multiprocessing_process
 from multiprocessing.connection import wait
+from typing import Any, cast
 
 from gym_server.errors import GymServerError, environment_died
 from gym_server.processes import start
-from gym_server.processes.messages import Channel, Seen
-from gym_server.processes.pipe import Nonsense
-from gym_server.protocol.wire import Ready
+from gym_server.processes.messages import CallPipe, Result
+from gym_server.processes.pipe import MalformedMessageError
 
 log = logging.getLogger(__name__)
 
-# Once its end of the pipe is closed it has nothing to do any more.
-_LEAVES_SECONDS = 2.0
+# After its end of the pipe is closed the process has nothing left to do.
+_EXIT_SECONDS = 2.0
 
-# How it ended is known a little later than that it did, on a busy machine more than a little.
-_NEWS_SECONDS = 10.0
+# The exit status comes a little after the pipe is closed, and on a busy machine later.
+_EXIT_STATUS_SECONDS = 10.0
 
-# What a process that is gone, or no longer what it was, is known by.
-_FAULTS = (EOFError, OSError, ValueError, Nonsense)
+# What a call raises when the process is gone, or was taken over.
+_FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
 
 
 class WorkerProcess:
-    """A process with a channel for moves and one for what can be asked meanwhile.
+    """A process with one pipe for calls in turn, and one for queries that it answers meanwhile.
 
     Attributes:
         pid: its number.
-        why: the reason that everybody gets once it has ended, else None.
+        why: the reason that every caller gets once it has ended, else None.
     """
 
     def __init__(
@@ -43,63 +43,81 @@ class WorkerProcess:
         """Start it.
 
         Args:
-            target: what runs there; gets its ends of the channels, then the arguments.
+            target: what runs there; gets its ends of the two pipes, then the arguments.
             *args: the arguments.
-            on_end: called with the reason, in a thread of its own, once it has ended in a way
-                that was not asked for.
+            on_end: called with the reason, in a thread of its own, once the process has ended
+                without having been asked to; see ``report_end()``.
             hint: what to do about such an end, or "".
         """
         self._on_end = on_end
         self._hint = hint or None
         self._lock = threading.Lock()
-        self._condemned: GymServerError | None = None
-        self._nonsense = ""
-        self._doing = "while it was created"
-        # Who waits for what it makes hears of an end at once.
-        self._expected = True
+        # Why we ended it, if we did.
+        self._our_reason: GymServerError | None = None
+        # What was wrong with what it sent.
+        self._fault = ""
+        self._phase = "while it was created"
+        # Until report_end(): the creation that waits for it gets the error itself.
+        self._end_expected = True
         self._ended = threading.Event()
         self.why: GymServerError | None = None
         context = start.context()
         pipes = [context.Pipe() for _ in range(2)]
-        self._moves, self._questions = (Channel(ours) for ours, _ in pipes)
-        # Not a daemon: those may start no processes, as sub-environments are.
+        self._calls, self._queries = (CallPipe(ours) for ours, _ in pipes)
+        # Not a daemon: a daemon may start no processes, and sub-environments can be processes.
         self._process = context.Process(
             target=target, args=(*(theirs for _, theirs in pipes), *args), daemon=False
         )
         try:
             self._process.start()
-            self.pid = self._process.pid
+            self.pid = cast(int, self._process.pid)
             threading.Thread(target=self._await_end, daemon=True).start()
         except BaseException:
-            self._kill()
-            for channel in (self._moves, self._questions):
-                channel.close()
+            self._send_kill()
+            for pipe in (self._calls, self._queries):
+                pipe.close()
             raise
         finally:
             for _, theirs in pipes:
                 theirs.close()
-        # Else whoever starts another one would ask after this one's end, too, and the server's
-        # end would wait for it.
+        # multiprocessing asks every process on this list whether it has ended when it starts
+        # another one, and waits for all of them at exit. Only our own thread may wait for this one.
+        # The type ignored: the list is private.
         multiprocessing_process._children.discard(self._process)  # type: ignore[attr-defined]
 
-    def first_word(self) -> Seen:
-        """Wait for what it says unasked; see ``move()``."""
+    def first_result(self) -> Result:
+        """Wait for the result that it sends without a call.
+
+        Raises:
+            GymServerError: as for ``call()``.
+        """
         try:
-            return self._moves.hear()
+            return cast(Result, self._calls.first_result())
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
-    def stay(self) -> None:
-        """Take no end of it for what was asked for: none from now on, and none that has come."""
-        with self._lock:
-            self._doing = "by itself"
-            self._expected = False
-            ended = self.why
-        if ended is not None:
-            self._on_end(ended)
+    def report_end(self) -> None:
+        """From now on call ``on_end`` when it ends without being asked to, or if it has already.
 
-    def move(self, method: str, *args: object) -> Ready | Seen:
-        """Ask for a move or a look; one at a time.
+        It may end while this is called. The lock leaves two orders, and ``on_end`` is called once:
+
+        1. ``_await_end()`` sets ``why`` first and sees an expected end, of which it tells no one;
+           then this finds ``why`` and calls ``on_end``.
+        2. This clears ``_end_expected`` first and finds no ``why``; then ``_await_end()`` calls
+           ``on_end``.
+        """
+        with self._lock:
+            self._phase = "by itself"
+            self._end_expected = False
+            why = self.why
+        if why is not None:
+            self._on_end(why)
+
+    def call(self, method: str, *args: object) -> Any:
+        """Call a method there; the caller sees to it that only one call runs at a time.
+
+        Returns:
+            ``Ready`` for a reset or a step, else ``Result``.
 
         Raises:
             GymServerError: what it refused with, or why it has ended.
@@ -107,62 +125,62 @@ class WorkerProcess:
         if self.why is not None:
             raise self.why.again()
         try:
-            return self._moves.ask(method, *args)
+            return self._calls.call(method, *args)
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
-    def question(self, method: str, *args: object, seconds: float | None = None) -> Seen:
-        """Ask what can be said while it moves.
+    def query(self, method: str, *args: object, timeout: float | None = None) -> Result:
+        """Call a method that it answers even while a ``call()`` runs.
 
         Raises:
-            GymServerError: as for ``move()``.
+            GymServerError: as for ``call()``.
             TimeoutError: it took more than these seconds.
         """
         if self.why is not None:
             raise self.why.again()
         try:
-            return self._questions.ask(method, *args, seconds=seconds)
+            return cast(Result, self._queries.call(method, *args, timeout=timeout))
         except TimeoutError:
             raise
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
     @property
-    def questioned_since(self) -> float | None:
-        """Since when it owes an answer to a ``question()``, in the clock's seconds, or None."""
-        return self._questions.busy_since
+    def query_since(self) -> float | None:
+        """Since when a ``query()`` has waited for its result, in the clock's seconds, or None."""
+        return self._queries.busy_since
 
     def _end_after(self, fault: Exception) -> GymServerError:
-        """Return why a process that is of no use has ended, after seeing to that."""
-        if isinstance(fault, Nonsense):
-            self._nonsense = f"it sent {fault}"
-            self._kill()
-        elif not self._ended.wait(_NEWS_SECONDS):
-            self._nonsense = "it closed its connection to the server"
-            self._kill()
-        self._ended.wait(_LEAVES_SECONDS)
-        # None of one that the system itself cannot end.
+        """Return why the process has ended, after making sure that it has."""
+        if isinstance(fault, MalformedMessageError):
+            self._fault = f"it sent {fault}"
+            self._send_kill()
+        elif not self._ended.wait(_EXIT_STATUS_SECONDS):
+            self._fault = "it closed its connection to the server"
+            self._send_kill()
+        self._ended.wait(_EXIT_SECONDS)
+        # There is no exit status of a process that even the system cannot end.
         return self.why.again() if self.why else self._died(None)
 
-    def condemn(self, why: GymServerError) -> None:
-        """End it at once; whoever waits for it gets the reason."""
+    def kill(self, why: GymServerError) -> None:
+        """End it at once; every call that waits for it raises the reason."""
         with self._lock:
-            self._condemned = self._condemned or why
-        self._kill()
+            self._our_reason = self._our_reason or why
+        self._send_kill()
 
-    def let_go(self, why: GymServerError) -> None:
-        """Wait for its end, which was asked for, and end it when it does not come."""
+    def begin_close(self) -> None:
+        """Take its end from now on for one that was asked for."""
+        self._end_expected = True
+
+    def close(self, why: GymServerError) -> None:
+        """Wait until it has exited as it was asked to, and kill it when it does not."""
         with self._lock:
-            self._condemned = self._condemned or why
-            self._expected = True
-        if not self._ended.wait(_LEAVES_SECONDS):
-            self._kill()
+            self._our_reason = self._our_reason or why
+            self._end_expected = True
+        if not self._ended.wait(_EXIT_SECONDS):
+            self._send_kill()
 
-    def expect_end(self) -> None:
-        """Take its end from now on for what was asked for."""
-        self._expected = True
-
-    def _kill(self) -> None:
+    def _send_kill(self) -> None:
         if not self._ended.is_set():
             with contextlib.suppress(OSError, ValueError, AttributeError):
                 self._process.kill()
@@ -173,25 +191,25 @@ class WorkerProcess:
         code = self._process.exitcode
         self._kill_group()
         with self._lock:
-            self.why = self._condemned or self._died(code)
-            told = self._expected or self._condemned is not None
+            self.why = self._our_reason or self._died(code)
+            was_expected = self._end_expected or self._our_reason is not None
         self._ended.set()
-        for channel in (self._moves, self._questions):
-            channel.wake()
-            channel.close()
+        for pipe in (self._calls, self._queries):
+            pipe.wake()
+            pipe.close()
         self._process.close()
-        if not told:
+        if not was_expected:
             log.warning("Process %d: %s", self.pid, self.why.message)
             self._on_end(self.why)
 
     def _kill_group(self) -> None:
-        """End what the process has started."""
+        """Kill what the process has started."""
         if hasattr(os, "killpg"):
             with contextlib.suppress(OSError):
                 os.killpg(self.pid, signal.SIGKILL)
 
     def _died(self, code: int | None) -> GymServerError:
-        return environment_died(self._nonsense or _how(code), self._doing, self._hint)
+        return environment_died(self._fault or _how(code), self._phase, self._hint)
 
 
 def _how(code: int | None) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -70,6 +71,19 @@ class Tensor(NamedTuple):
         dtype = _DTYPES[self.dtype]
         array = np.frombuffer(self.data, dtype).reshape(self.shape)
         return array.astype(dtype.newbyteorder("="))
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A value in parts, as a space's members and its batches travel.
+
+    Attributes:
+        tensors: each part that is made of numbers, by its name.
+        texts: each text, by its name.
+    """
+
+    tensors: dict[str, Tensor] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
 
 
 _FEW_COLUMNS = 16

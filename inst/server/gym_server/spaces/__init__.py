@@ -4,6 +4,8 @@ Each of the three is a ``functools.singledispatch`` function; every kind of spac
 own in a file of its name.  ``tensor_parts`` encodes and decodes members as tensors.
 """
 
+from gym_server.protocol.safetensors import Parts
+
 # Importing a kind registers it.
 from gym_server.spaces import (  # noqa: F401
     box,
@@ -29,7 +31,6 @@ from gym_server.spaces.membership import contains, describes
 from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe
 from gym_server.spaces.tensor_parts import (
-    Parts,
     decode_tensors,
     encode_tensors,
     travels_as_tensors,

@@ -5,12 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import singledispatch
+from typing import Any, Protocol
 
 import numpy as np
-from gymnasium.spaces import Space
 
 from gym_server.json_values import NONFINITE
 from gym_server.spaces.kinds import NotInSpace
+
+
+class ArraySpace(Protocol):
+    """What is needed of a space whose members are arrays, or of a batch of such members."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the arrays."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Their dtype."""
 
 
 def is_number(value: object) -> bool:
@@ -18,11 +30,11 @@ def is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def read_integer(value: object) -> int:
+def read_integer(value: Any) -> int:
     """Return the integer that a JSON number stands for, else raise TypeError."""
-    if not is_number(value) or value % 1 != 0:  # type: ignore[operator]
+    if not is_number(value) or value % 1 != 0:
         raise TypeError("not an integer")
-    return int(value)  # type: ignore[call-overload]
+    return int(value)
 
 
 def read_bit(value: object) -> bool:
@@ -39,12 +51,12 @@ def _natural(value: object) -> int:
     return number
 
 
-def _float(value: object) -> float:
+def _float(value: Any) -> float:
     if isinstance(value, str) and value in NONFINITE:
         return NONFINITE[value]
     if not is_number(value):
         raise TypeError("not a number")
-    return float(value)  # type: ignore[arg-type]
+    return float(value)
 
 
 _READERS = {"f": _float, "i": read_integer, "u": _natural, "b": read_bit}
@@ -75,12 +87,12 @@ class Bounds:
 
 
 @singledispatch
-def bounds_of(space: Space) -> Bounds:
+def bounds_of(space: object) -> Bounds:
     """Return the smallest and the largest member of a space of arrays; batches have the same."""
     raise TypeError(f"no bounds for {type(space).__name__}")
 
 
-def check_bounds(space: Space, bounds: Bounds, array: np.ndarray) -> None:
+def check_bounds(space: object, bounds: Bounds, array: np.ndarray) -> None:
     """Raise NotInSpace, with the index, for the first element that lies outside (or is NaN)."""
     inside = (array >= bounds.low) & (array <= bounds.high)
     if not inside.all():
@@ -91,7 +103,7 @@ def check_bounds(space: Space, bounds: Bounds, array: np.ndarray) -> None:
 
 
 def read_array(
-    space: Space, bounds: Bounds, read_element: Callable[[object], object], value: object
+    space: ArraySpace, bounds: Bounds, read_element: Callable[[object], object], value: object
 ) -> np.ndarray:
     """Return a JSON value as an array of a space's dtype and shape.
 
@@ -105,8 +117,8 @@ def read_array(
     Raises:
         NotInSpace: with the path to the element that does not fit, when it is one element.
     """
-    bare = space.shape == (1,) and not isinstance(value, list)
-    nested = [value] if bare else value
+    is_bare = space.shape == (1,) and not isinstance(value, list)
+    nested = [value] if is_bare else value
     try:
         array = _array(space, read_element, nested)
     except (TypeError, ValueError, OverflowError):
@@ -114,16 +126,17 @@ def read_array(
     try:
         check_bounds(space, bounds, array.reshape(space.shape))
     except NotInSpace as refusal:
-        if bare:
+        if is_bare:
             refusal.path.clear()
         elif array.shape != space.shape:
-            # It came as a flat list, and the client wants to find the element there.
-            refusal.path[:] = [int(np.ravel_multi_index(refusal.path, space.shape))]
+            # The client sent a flat list, and the path must lead to the element there.
+            index: tuple[Any, ...] = tuple(refusal.path)
+            refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
         raise
     return array.reshape(space.shape)
 
 
-def _array(space: Space, read_element: Callable, nested: object) -> np.ndarray:
+def _array(space: ArraySpace, read_element: Callable, nested: object) -> np.ndarray:
     elements = _each(read_element, nested, max(len(space.shape), 1))
     to_array = _float_array if space.dtype.kind == "f" else _integer_array
     array = to_array(elements, space.dtype)
@@ -159,8 +172,8 @@ def _integer_array(numbers: object, dtype: np.dtype) -> np.ndarray:
     return array
 
 
-def _refusal(space: Space, read_element: Callable, value: object) -> NotInSpace:
-    """Find out which element it was; the whole value when each of them is fine."""
+def _refusal(space: ArraySpace, read_element: Callable, value: object) -> NotInSpace:
+    """Return the refusal of the first bad element; of the whole value when each element is good."""
     to_array = _float_array if space.dtype.kind == "f" else _integer_array
     for path, element in _elements(value, len(space.shape), ()):
         try:

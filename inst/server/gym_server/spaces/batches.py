@@ -1,21 +1,22 @@
-"""Batches of members of a space, one a sub-environment, as in Gymnasium's vector environments.
+"""Batches of members of a space, one for each sub-environment, as in Gymnasium's vector classes.
 
-Arrays carry the sub-environments along their first axis, Tuples and Dicts are batched part by part,
-and Text, Sequence, Graph and OneOf have one entry a sub-environment.  Nothing here loops over the
-sub-environments of an array.
+Arrays have the sub-environments along their first axis, Tuples and Dicts are batched part by part,
+and Text, Sequence, Graph and OneOf have one entry for each sub-environment.  Nothing here loops
+over the sub-environments of an array.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import singledispatch
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Text, Tuple
 
-from gym_server.protocol.safetensors import Tensor
+from gym_server.protocol.safetensors import Parts, Tensor
 from gym_server.spaces.arrays import (
+    ArraySpace,
     bounds_of,
     check_bounds,
     choice_reader_of,
@@ -27,7 +28,6 @@ from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode_part, encode
 from gym_server.spaces.stacking import stack, unstack
 from gym_server.spaces.tensor_parts import (
-    Parts,
     part_name,
     put_array,
     put_part_together,
@@ -39,9 +39,9 @@ _ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
 
 
 @singledispatch
-def encode_batch(space: Space, batch: object) -> object:
+def encode_batch(space: Space, batch: Any) -> Any:
     """Return a batch of members of a space as JSON values (floats may still be non-finite)."""
-    return [encode(space, member) for member in batch]  # type: ignore[attr-defined]
+    return [encode(space, member) for member in batch]
 
 
 @encode_batch.register
@@ -67,17 +67,17 @@ def _(space: Dict, batch: dict) -> object:
 
 
 def encode_sub_envs(space: Space, batch: object) -> list:
-    """Return a batch as JSON values, one a sub-environment: what ``decode_sub_envs()`` reads."""
-    return [encode(space, member) for member in unstack(space, batch)]  # type: ignore[arg-type]
+    """Return a batch as a list of JSON values, as ``decode_sub_envs()`` reads it."""
+    return [encode(space, member) for member in unstack(space, batch)]
 
 
-def decode_sub_envs(space: Space, value: object, sub_envs: int, whose: str) -> object:
-    """Return the batch that a list of JSON values stands for, each of them a sub-environment's.
+def decode_sub_envs(space: Space, value: object, num_envs: int, whose: str) -> object:
+    """Return the batch that a list of JSON values stands for, one for each sub-environment.
 
     Args:
         space: of one sub-environment.
-        value: what came.
-        sub_envs: how many there are.
+        value: the list.
+        num_envs: how many sub-environments there are.
         whose: names the sub-environments where the number is wrong, in words that follow "for each
             of".
 
@@ -85,15 +85,15 @@ def decode_sub_envs(space: Space, value: object, sub_envs: int, whose: str) -> o
         NotInSpace: for a wrong number of sub-environments; for a value that is no member, with the
             sub-environment (from 0) as the first step of its path.
     """
-    if not isinstance(value, list) or len(value) != sub_envs:
+    if not isinstance(value, list) or len(value) != num_envs:
         found = f", not {len(value)}" if isinstance(value, list) else ", as a list"
         raise NotInSpace(space, value, f"one action for each of {whose} is needed{found}")
     if isinstance(space, _ARRAYS):
         try:
             return _all_at_once(space, value)
         except (TypeError, ValueError, OverflowError, NotInSpace):
-            # Sub-environments may write their values in several ways, and a refusal names the
-            # sub-environment.
+            # Some values may be written in another way that is allowed; else the refusal must name
+            # the sub-environment. So decode them one by one.
             pass
     return stack(space, [decode_part(space, item, sub_env) for sub_env, item in enumerate(value)])
 
@@ -105,11 +105,11 @@ class _Batched(NamedTuple):
     dtype: np.dtype
 
 
-def _all_at_once(space: Space, value: list) -> np.ndarray:
+def _all_at_once(space: Any, value: list) -> np.ndarray:
     batched = _Batched((len(value), *space.shape), space.dtype)
     if not isinstance(space, Discrete):
         reader = _reader_of(space)
-        return read_array(batched, bounds_of(space), reader, value)  # type: ignore[arg-type]
+        return read_array(batched, bounds_of(space), reader, value)
     if not set(map(type, value)) <= {int, bool}:
         raise TypeError("not only integers")
     array = np.array(value, dtype=wide_dtype(space))
@@ -117,7 +117,7 @@ def _all_at_once(space: Space, value: list) -> np.ndarray:
     return array.astype(space.dtype)
 
 
-def _reader_of(space: Space) -> Callable[[object], object]:
+def _reader_of(space: Any) -> Callable[[object], object]:
     match space:
         case MultiBinary():
             return read_bit
@@ -154,7 +154,7 @@ def _(space: Discrete, name: str, batch: object, parts: Parts) -> None:
 @_take_apart.register
 def _(space: Text, name: str, batch: tuple, parts: Parts) -> None:
     for sub_env, text in enumerate(batch):
-        parts.texts[part_name(name, sub_env)] = encode(space, text)  # type: ignore[assignment]
+        parts.texts[part_name(name, sub_env)] = encode(space, text)
 
 
 @_take_apart.register
@@ -170,15 +170,15 @@ def _(space: Dict, name: str, batch: dict, parts: Parts) -> None:
 
 
 def decode_sub_envs_tensors(
-    space: Space, name: str, sent: Parts, sub_envs: int, whose: str
+    space: Space, name: str, sent: Parts, num_envs: int, whose: str
 ) -> object:
-    """Return the batch that some tensors are, the sub-environments along their first axes.
+    """Return the batch that tensors are, with the sub-environments along their first axes.
 
     Args:
         space: of one sub-environment.
         name: of the tensors.
-        sent: what came.
-        sub_envs: how many there are.
+        sent: the parts that were sent.
+        num_envs: how many sub-environments there are.
         whose: as for ``decode_sub_envs()``.
 
     Raises:
@@ -186,15 +186,21 @@ def decode_sub_envs_tensors(
             dtype or shape.
     """
     left = Parts(dict(sent.tensors), dict(sent.texts))
-    batch = _put_together(space, name, left, _SubEnvs(sub_envs, whose))
+    batch = _put_together(space, name, left, _SubEnvs(num_envs, whose))
     refuse_leftovers(space, name, left)
     return batch
 
 
 class _SubEnvs(NamedTuple):
-    """How many sub-environments there must be, their name, and where in their members we are."""
+    """The sub-environments that a batch is for.
 
-    number: int
+    Attributes:
+        num_envs: how many there are.
+        whose: names them; see ``decode_sub_envs()``.
+        path: leads to the part of their members that is being decoded.
+    """
+
+    num_envs: int
     whose: str
     path: tuple[str | int, ...] = ()
 
@@ -228,7 +234,7 @@ def _(space: Text, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     try:
         return tuple(
             put_part_together(space, name, sub_env, parts, sub_env)
-            for sub_env in range(sub_envs.number)
+            for sub_env in range(sub_envs.num_envs)
         )
     except NotInSpace as refusal:
         refusal.path[1:1] = sub_envs.path
@@ -238,7 +244,7 @@ def _(space: Text, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: Space, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
+def _(space: ArraySpace, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     return _take_sub_envs(space, name, space.dtype, parts, sub_envs)
 
 
@@ -246,34 +252,34 @@ def _(space: Space, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
 def _(space: Discrete, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
     wide = wide_dtype(space)
     sent = parts.tensors.get(name)
-    # R's integers are these.
+    # R has only 32 bit integers.
     is_short = sent is not None and sent.dtype == "I32" and wide == np.int64
     array = _take_sub_envs(space, name, np.dtype(np.int32) if is_short else wide, parts, sub_envs)
     return array.astype(space.dtype, copy=False)
 
 
 def _take_sub_envs(
-    space: Space, name: str, dtype: np.dtype, parts: Parts, sub_envs: _SubEnvs
+    space: Any, name: str, dtype: np.dtype, parts: Parts, sub_envs: _SubEnvs
 ) -> np.ndarray:
     try:
         _check_number(space, parts.tensors.get(name), sub_envs)
-        array = take_array(space, name, dtype, (sub_envs.number, *(space.shape or ())), parts)
+        array = take_array(space, name, dtype, (sub_envs.num_envs, *(space.shape or ())), parts)
     except NotInSpace as refusal:
         refusal.path[:] = sub_envs.path
         raise
     try:
         check_bounds(space, bounds_of(space), array)
     except NotInSpace as refusal:
-        # Its path begins with the sub-environment.
+        # The first step of its path is the sub-environment.
         refusal.path[1:1] = sub_envs.path
         raise
     return array
 
 
-def _check_number(space: Space, sent: Tensor | None, sub_envs: _SubEnvs) -> None:
+def _check_number(space: Any, sent: Tensor | None, sub_envs: _SubEnvs) -> None:
     if not sent or not sent.shape or sent.shape[1:] != (space.shape or ()):
         return
-    if sent.shape[0] != sub_envs.number:
+    if sent.shape[0] != sub_envs.num_envs:
         raise NotInSpace(
             space,
             f"{sent.dtype} {list(sent.shape)}",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gymnasium.spaces import Dict
 
 from gym_server.json_values import brief
@@ -21,17 +23,14 @@ def _(space: Dict) -> dict[str, object]:
 
 
 @encode.register
-def _(space: Dict, value: object) -> object:
-    return {
-        str(key): encode(part, value[key])  # type: ignore[index]
-        for key, part in space.spaces.items()
-    }
+def _(space: Dict, value: Any) -> Any:
+    return {str(key): encode(part, value[key]) for key, part in space.spaces.items()}
 
 
 @decode.register
 def _(space: Dict, value: object) -> object:
     if value == [] and not space.spaces:
-        # R has one empty list for both.
+        # R writes an empty list and an empty object alike.
         return {}
     if not isinstance(value, dict):
         raise NotInSpace(space, value, "an object is needed")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from gymnasium.spaces import Discrete
 
@@ -20,8 +22,8 @@ def _(space: Discrete) -> dict[str, object]:
 
 
 @encode.register
-def _(space: Discrete, value: object) -> object:
-    return int(value)  # type: ignore[call-overload]
+def _(space: Discrete, value: Any) -> Any:
+    return int(value)
 
 
 @bounds_of.register

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from gymnasium.spaces import Graph, GraphInstance, Space
+from gymnasium.spaces import Graph, GraphInstance
 
 from gym_server.spaces.arrays import read_integer
 from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
@@ -29,7 +31,7 @@ def _(space: Graph, value: GraphInstance) -> object:
     }
 
 
-def _encode_batch(space: Space, batch: object) -> list:
+def _encode_batch(space: Any, batch: object) -> list:
     return [encode(space, member) for member in unstack(space, batch)]
 
 
@@ -59,7 +61,7 @@ def _list(space: Graph, value: dict, name: str) -> list | None:
     return part
 
 
-def _decode_batch(space: Space, items: list, name: str) -> object:
+def _decode_batch(space: Any, items: list, name: str) -> Any:
     return stack(space, [decode_part(space, item, name, index) for index, item in enumerate(items)])
 
 

@@ -1,9 +1,10 @@
-"""What every kind of space registers, and how a value that is no member is refused."""
+"""The functions that every kind of space registers, and the error of a value that is no member."""
 
 from __future__ import annotations
 
 import re
 from functools import singledispatch
+from typing import Any
 
 from gymnasium.spaces import Space
 
@@ -13,16 +14,16 @@ from gym_server.json_values import brief
 class NotInSpace(Exception):  # noqa: N818 - it answers a question as often as it is an error
     """A value that is no member of a space."""
 
-    def __init__(self, space: Space, value: object, reason: str = "") -> None:
-        """Say what is not where.
+    def __init__(self, space: object, value: object, reason: str = "") -> None:
+        """Keep what the message says.
 
         Args:
-            space: the space that the value should be in; a part of the one that was asked.
-            value: the part of the value that is wrong.
+            space: the space that the value is not in; it may be a part of the client's space.
+            value: the part of the client's value that is wrong.
             reason: what is wrong with it, where space and value do not show it.
         """
         super().__init__(space, value, reason)
-        # Steps from the outermost value to this one: the keys and the indices, which begin at 0.
+        # The keys, and the indices from 0, that lead from the client's value to this part.
         self.path: list[str | int] = []
 
     def __str__(self) -> str:
@@ -41,12 +42,12 @@ def _named(key: str) -> str:
     return f"${key}" if re.fullmatch(r"[A-Za-z.][\w.]*", key) else f"$`{key}`"
 
 
-def brief_space(space: Space, width: int = 120) -> str:
+def brief_space(space: object, width: int = 120) -> str:
     """Return a space as short text, for error messages."""
     try:
         text = repr(space)
     except Exception:
-        # An environment's own, or one that contains itself.
+        # An environment's own kind of space may raise anything; a space may contain itself.
         text = type(space).__name__
     return text if len(text) <= width else text[: width - 3] + "..."
 
@@ -58,7 +59,7 @@ def description(space: Space) -> dict[str, object]:
 
 
 @singledispatch
-def encode(space: Space, value: object) -> object:
+def encode(space: Space, value: Any) -> Any:
     """Return a member of a space as JSON values (floats may still be non-finite)."""
     raise TypeError(f"no encoding for {type(space).__name__}")
 

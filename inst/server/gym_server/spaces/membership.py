@@ -1,8 +1,9 @@
-"""Answer whether a value is a member of a space, or a description its own."""
+"""Answer whether a value is a member of a space, or whether a description fits it."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from gymnasium.spaces import Space
 
@@ -18,7 +19,7 @@ def contains(space: Space, space_info: dict, claim: dict) -> bool:
         space_info: its description.
         claim: ``{"value": ...}`` asks whether a JSON value stands for a member; anything else is
             a classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
-            whether all of it is so.
+            whether all of it is true of the space.
     """
     if "value" not in claim:
         return describes(claim, space_info)
@@ -30,13 +31,13 @@ def contains(space: Space, space_info: dict, claim: dict) -> bool:
 
 
 def describes(claim: dict, space_info: dict) -> bool:
-    """Tell whether all of a classic client's description of a space is so."""
+    """Tell whether all of a classic client's description is true of a space."""
     return all(
         name in space_info and _same(value, space_info[name]) for name, value in claim.items()
     )
 
 
-def _same(claimed: object, real: object) -> bool:
+def _same(claimed: Any, real: object) -> bool:
     if isinstance(real, dict):
         return (
             isinstance(claimed, dict)
@@ -44,12 +45,12 @@ def _same(claimed: object, real: object) -> bool:
             and all(_same(claimed[name], real[name]) for name in real)
         )
     if isinstance(real, list):
-        # R's jsonlite writes a vector of length one as a bare value.
+        # R's jsonlite writes a vector of length one as a scalar.
         claimed = claimed if isinstance(claimed, list) else [claimed]
         return len(claimed) == len(real) and all(map(_same, claimed, real))
     if isinstance(real, bool):
         return claimed is real
     if is_number(claimed) and isinstance(real, float):
-        # It also writes 15 digits of a bound that has 17.
-        return math.isclose(claimed, real, rel_tol=1e-12)  # type: ignore[arg-type]
-    return type(claimed) is not bool and claimed == real
+        # R's jsonlite writes only 15 digits of a bound that has 17.
+        return math.isclose(claimed, real, rel_tol=1e-12)
+    return type(claimed) is not bool and bool(claimed == real)

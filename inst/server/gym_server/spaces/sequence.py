@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gymnasium.spaces import Sequence
 
 from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
@@ -19,9 +21,9 @@ def _(space: Sequence) -> dict[str, object]:
 
 
 @encode.register
-def _(space: Sequence, value: object) -> object:
+def _(space: Sequence, value: Any) -> Any:
     members = unstack(space.feature_space, value) if space.stack else value
-    return [encode(space.feature_space, member) for member in members]  # type: ignore[attr-defined]
+    return [encode(space.feature_space, member) for member in members]
 
 
 @decode.register

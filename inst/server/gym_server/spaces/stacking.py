@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Tuple
 
 
 @singledispatch
-def stack(space: Space, members: list) -> object:
+def stack(space: Space, members: list) -> Any:
     """Return members of a space as one batch: arrays with the members along the first axis.
 
     Tuples and Dicts are stacked part by part; Text, Sequence, Graph and OneOf have no batch but
@@ -43,13 +43,13 @@ def _(space: Dict, members: list) -> object:
 
 
 @singledispatch
-def unstack(space: Space, batch: Iterable) -> list:
+def unstack(space: Space, batch: Any) -> list:
     """Return the members of a batch."""
     return list(batch)
 
 
 @unstack.register
-def _(space: Tuple, batch: Iterable) -> list:
+def _(space: Tuple, batch: tuple) -> list:
     parts = [unstack(part, items) for part, items in zip(space.spaces, batch, strict=True)]
     return list(zip(*parts, strict=True))
 

@@ -1,4 +1,4 @@
-"""Describe a space to clients, or refuse one that the wire has no words for."""
+"""Describe a space to clients, or refuse one that the protocol cannot describe."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from gymnasium.spaces import Box, Dict, Graph, OneOf, Sequence, Space, Tuple
 from gym_server.errors import GymServerError
 from gym_server.spaces.kinds import brief_space, description
 
-# Lists and objects in each other that a member may have as JSON. Python's recursion and that of
-# JSON readers end somewhere, and a space that contains itself must.
+# How deep the lists and objects of a member may be nested as JSON. Recursion has a limit in Python
+# and in JSON readers, and a space that contains itself must be refused.
 DEEPEST = 100
 
 
@@ -62,6 +62,6 @@ def _supported() -> list[str]:
 def _unsupported(space: Space, reason: str, hint: str | None = None) -> GymServerError:
     return GymServerError(
         "unsupported_space",
-        f"This server cannot speak of the space {brief_space(space)}: {reason}",
+        f"This server does not support the space {brief_space(space)}: {reason}",
         hint,
     )

@@ -6,8 +6,8 @@ holds one of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import (
@@ -21,23 +21,10 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.protocol.safetensors import Tensor, has_tensor, tensor_name
-from gym_server.spaces.arrays import bounds_of, check_bounds
+from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, tensor_name
+from gym_server.spaces.arrays import ArraySpace, bounds_of, check_bounds
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode
-
-
-@dataclass(frozen=True)
-class Parts:
-    """A member in parts.
-
-    Attributes:
-        tensors: each part that is made of numbers, by its name.
-        texts: each text, by its name.
-    """
-
-    tensors: dict[str, Tensor] = field(default_factory=dict)
-    texts: dict[str, str] = field(default_factory=dict)
 
 
 def encode_tensors(space: Space, name: str, value: object) -> Parts:
@@ -88,7 +75,9 @@ def part_name(name: str, key: object) -> str:
     return f"{name}/{str(key).replace('~', '~0').replace('/', '~1')}"
 
 
-def put_part_together(space: Space, name: str, key: object, parts: Parts, step: str | int):
+def put_part_together(
+    space: Space, name: str, key: object, parts: Parts, step: str | int
+) -> object:
     """Return a part of a member; a refusal names the step that leads to it."""
     try:
         return _put_together(space, part_name(name, key), parts)
@@ -98,7 +87,7 @@ def put_part_together(space: Space, name: str, key: object, parts: Parts, step: 
 
 
 def take_array(
-    space: Space, name: str, dtype: np.dtype, shape: tuple[int, ...], parts: Parts
+    space: object, name: str, dtype: np.dtype, shape: tuple[int, ...], parts: Parts
 ) -> np.ndarray:
     """Take the tensor of a name out of some parts; raise NotInSpace for another dtype or shape."""
     tensor = parts.tensors.pop(name, None)
@@ -129,7 +118,7 @@ def _(space: Space) -> bool:
 @_take_apart.register(Box)
 @_take_apart.register(MultiBinary)
 @_take_apart.register(MultiDiscrete)
-def put_array(space: Space, name: str, value: object, parts: Parts) -> None:
+def put_array(space: ArraySpace, name: str, value: object, parts: Parts) -> None:
     """Put an array of a space's numbers, of one member or of many, into some parts."""
     array = np.asarray(value)
     if not has_tensor(array.dtype):
@@ -140,7 +129,7 @@ def put_array(space: Space, name: str, value: object, parts: Parts) -> None:
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: Space, name: str, parts: Parts) -> object:
+def _(space: ArraySpace, name: str, parts: Parts) -> object:
     array = take_array(space, name, space.dtype, space.shape, parts)
     check_bounds(space, bounds_of(space), array)
     return array
@@ -150,8 +139,8 @@ def _(space: Space, name: str, parts: Parts) -> object:
 
 
 @_take_apart.register
-def _(space: Discrete, name: str, value: object, parts: Parts) -> None:
-    parts.tensors[name] = Tensor.of(np.array(int(value), wide_dtype(space)))  # type: ignore[call-overload]
+def _(space: Discrete, name: str, value: Any, parts: Parts) -> None:
+    parts.tensors[name] = Tensor.of(np.array(int(value), wide_dtype(space)))
 
 
 @_put_together.register

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gymnasium.spaces import Tuple
 
 from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
@@ -13,11 +15,8 @@ def _(space: Tuple) -> dict[str, object]:
 
 
 @encode.register
-def _(space: Tuple, value: object) -> object:
-    return [
-        encode(part, item)
-        for part, item in zip(space.spaces, value, strict=True)  # type: ignore[call-overload]
-    ]
+def _(space: Tuple, value: Any) -> Any:
+    return [encode(part, item) for part, item in zip(space.spaces, value, strict=True)]
 
 
 @decode.register

@@ -1,37 +1,39 @@
-"""Spaces of the actions that are handed on, whose Boxes hold all that their dtype can.
+"""Spaces for reading actions, with Boxes whose bounds are the limits of their dtype.
 
-Gymnasium does not check the bounds of a Box when an environment steps: each does with what lies
-outside as it likes, and most clip it.
+Gymnasium does not check the bounds of a Box when an environment steps. What happens to an action
+outside of them is up to the environment; most clip it.
 """
 
 from __future__ import annotations
 
 import copy
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Graph, OneOf, Sequence, Space, Tuple
 
 
 class _WideBox(Box):
-    """A Box that reaches as far as its dtype, and looks like the one that it was made of.
+    """A Box with the limits of its dtype as bounds, whose ``repr()`` is that of the original.
 
-    An infinite bound stays: only there an infinity is a member.
+    An infinite bound stays infinite, because an infinity is a member only there.
     """
 
     def __init__(self, space: Box) -> None:
-        limits = np.finfo(space.dtype) if space.dtype.kind == "f" else np.iinfo(space.dtype)
+        dtype: Any = space.dtype
+        limits: Any = np.finfo(dtype) if dtype.kind == "f" else np.iinfo(dtype)
         low, high = space.low.copy(), space.high.copy()
         low[np.isfinite(low)] = limits.min
         high[np.isfinite(high)] = limits.max
-        super().__init__(low, high, space.shape, space.dtype)  # type: ignore[arg-type]
+        super().__init__(low, high, space.shape, dtype)
         self._narrow = space
 
     def __repr__(self) -> str:
         return repr(self._narrow)
 
 
-def with_wide_boxes(space: Space) -> Space:
-    """Return a space like another one whose Boxes reach as far as their dtype."""
+def with_wide_boxes(space: Space) -> Any:
+    """Return a copy of a space whose Boxes have the limits of their dtype as bounds."""
     match space:
         case Box():
             return space if space.dtype.kind == "b" else _WideBox(space)

@@ -14,7 +14,7 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from gym_server.errors import GymServerError
-from gym_server.protocol import wire
+from gym_server.protocol.answers import dumps
 from gym_server.rendering.png import png
 from gym_server.viewing.capture import Busy, glimpse
 
@@ -120,7 +120,7 @@ class Screen:
             with self._changed:
                 if self._ended is not None:
                     raise self._ended from None
-            return wire.dumps({"number": after, "state": "busy"})
+            return dumps({"number": after, "state": "busy"})
         finally:
             with self._changed:
                 self._asking -= 1
@@ -184,7 +184,7 @@ class Screen:
         facts, frame = seen.facts, seen.frame
         # The instance goes on while this is put into words.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
-        body = wire.dumps({"number": self._numbers + 1, **facts})
+        body = dumps({"number": self._numbers + 1, **facts})
         with self._changed:
             share = _PACED_SHARE if self._next_tick > seen.began - 1 else _SHARE
             # The first time it finds its screen, its fonts, its colours.

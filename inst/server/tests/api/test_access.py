@@ -4,6 +4,8 @@ import pytest
 
 from gym_server.api.access import Access, Guard
 from gym_server.api.app import Config, create_app
+from gym_server.api.routes import ROUTES
+from gym_server.api.routing import Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.errors import GymServerError
 
@@ -21,10 +23,11 @@ def refusal(access, method="GET", path=HEALTH, keys=None, query="", **headers):
         **{f"HTTP_{name.upper()}": text for name, text in headers.items() if text is not None},
     }
     guard = Guard(access, keys or WatchKeys())
+    match = Router(ROUTES).match(environ)
     try:
         # Twice, as it remembers what it let in.
-        guard.check(environ)
-        guard.check(environ)
+        guard.check(environ, match)
+        guard.check(environ, match)
     except GymServerError as error:
         return error.code
     return None
@@ -99,7 +102,7 @@ def test_names_that_clients_think_up_take_no_room():
     guard = Guard(Access(), WatchKeys())
     for number in range(1000):
         host = f"127.0.0.1:{number}"
-        guard.check({"HTTP_HOST": host, "REQUEST_METHOD": "GET", "PATH_INFO": HEALTH})
+        guard.check({"HTTP_HOST": host, "REQUEST_METHOD": "GET", "PATH_INFO": HEALTH}, None)
     assert len(guard._known_hosts) <= 100
 
 

@@ -1,6 +1,5 @@
 import io
 import json
-import re
 
 import pytest
 
@@ -198,37 +197,6 @@ def test_a_request_that_is_none_is_refused(client):
     answer = client.post("/v1/envs/", json={**CREATE, "request": "1"})
     assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
     assert client.get("/v1/envs/").json == {"all_envs": {}}
-
-
-def test_resets_and_steps_are_answered_alike_with_and_without_flask_dispatch(
-    client, create, monkeypatch
-):
-    url = create(seed=1)
-    tensors = {"Accept": "application/x-safetensors"}
-    requests = [
-        ("step", {"action": 0}, {}),
-        ("reset", {"seed": 3}, {}),
-        ("step", once("a", 1, action=1), {}),
-        ("step", once("a", 1, action=1), {}),
-        ("step", once("a", 1, action=0), {}),
-        ("step", {"action": 2}, {}),
-        ("reset/", {"seed": 3}, tensors),
-        ("step/", {"action": 1}, {"Accept": "application/json;q=0.5, application/x-safetensors"}),
-        ("step/", {"action": 1}, {"Accept": "application/x-safetensors;q=0.5, application/json"}),
-    ]
-
-    def answers(key):
-        for route, body, headers in requests:
-            text = json.dumps(body).replace('"a"', f'"{key}"')
-            answer = client.post(f"{url}/{route}", data=text, headers=headers)
-            yield answer.status_code, answer.content_type, answer.data.replace(key.encode(), b"")
-        yield client.get(f"{url}/step/").json
-
-    client.post(f"{url}/reset/", json={"seed": 0})
-    short = list(answers("k1"))
-    monkeypatch.setattr("gym_server.api.app._HOT", re.compile("nothing"))
-    client.post(f"{url}/reset/", json={"seed": 0})
-    assert list(answers("k2")) == short
 
 
 def test_a_field_of_a_query_is_given_once(client, create):

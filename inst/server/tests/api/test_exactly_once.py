@@ -2,8 +2,9 @@ import threading
 
 import pytest
 
-from gym_server.api.exactly_once import ExactlyOnce, Outcome, RequestId
+from gym_server.api.exactly_once import ExactlyOnce, Outcome
 from gym_server.errors import GymServerError
+from gym_server.protocol.fields import RequestId
 
 
 class Counter:

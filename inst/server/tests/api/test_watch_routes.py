@@ -57,7 +57,7 @@ def test_a_browser_reads_words_about_an_environment_that_is_not_there(client):
 
 
 def test_what_is_asked_for_must_be_numbers(client, create):
-    for query in ("sub-environment=x", "after=-1", "after=1.5"):
+    for query in ("sub_env=x", "after=-1", "after=1.5"):
         answer = client.get(f"{create()}/watch/state/?{query}")
         assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
 

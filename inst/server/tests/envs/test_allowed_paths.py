@@ -3,14 +3,13 @@ import sys
 import pytest
 
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.envs.config import Choices
-from gym_server.envs.wrappers import Wrapper
+from gym_server.envs.config import EnvConfig, Wrapper
 from gym_server.errors import GymServerError
 
 
 def refusal(paths, kwargs=None, wrappers=()):
     try:
-        paths.check(Choices("A-v0", kwargs=kwargs, wrappers=wrappers))
+        paths.check(EnvConfig("A-v0", kwargs=kwargs, wrappers=wrappers))
     except GymServerError as error:
         assert error.code == "invalid_kwargs"
         return error

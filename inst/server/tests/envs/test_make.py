@@ -7,15 +7,15 @@ import pytest
 
 from gym_server.envs import make, registry
 from gym_server.envs.atari import _GAMES, classic_game
-from gym_server.envs.footprint import Account
 from gym_server.envs.make import find_spec
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 
 MALFORMED = "Attempted to look up malformed environment ID"
 
 
 def make_simple(env_id, render_mode, kwargs, allowed):
-    return make.make_env(env_id, render_mode, kwargs, allowed, (), Account())
+    return make.make_env(env_id, render_mode, kwargs, allowed, (), MemoryReservation())
 
 
 def refusal(env_id, render_mode=None, kwargs=None, allowed=()):

@@ -53,8 +53,8 @@ print(json.dumps([registry.search(env_id, [])[0]["reason"] for env_id in ids]))
 """
     assert python(hidden(*modules) + code) == [
         "it needs the server's extra 'box2d'",
-        "it needs the Python package 'jax', which no extra brings",
-        "it needs the Python package 'no_such_package', which no extra brings",
+        "it needs the Python package 'jax', which no extra installs",
+        "it needs the Python package 'no_such_package', which no extra installs",
     ]
 
 

@@ -98,7 +98,7 @@ from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv
 from gymnasium.vector import AutoresetMode
 import gymnasium, faulty_envs, numpy
 if __name__ == "__main__":
-    sub-environment = Sub-environment(gymnasium.spec("Hanging-v0"), None, {}, (), RenderThread())
+    sub_env = SubEnv(gymnasium.spec("Hanging-v0"), None, {}, (), RenderThread())
     env = AsyncSubEnvs(sub_env, 2, AutoresetMode.NEXT_STEP)
     env.reset()
     env.step_async(numpy.zeros(2, numpy.int64))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from gym_server.envs import wrappers
+from gym_server.envs.argument_limits import check_wrapper
+from gym_server.envs.config import Wrapper
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import TENSORS, read
 
@@ -262,7 +264,7 @@ def test_a_wrapper_whose_library_is_missing_names_the_extra(client, monkeypatch)
 def test_no_wrapper_may_use_up_the_machine(name, kwargs):
     # The check alone: were it missing, the real thing would take all memory.
     with pytest.raises(GymServerError) as refusal:
-        wrappers._check_sizes(wrappers.Wrapper(name, kwargs))
+        check_wrapper(Wrapper(name, kwargs))
     assert refusal.value.code == "invalid_kwargs"
     assert "at most" in str(refusal.value)
 

@@ -1,4 +1,4 @@
-"""Calls that take too long, and instances that nobody uses, on a real server."""
+"""Calls that take too long, on a real server."""
 
 import contextlib
 import http.client
@@ -9,10 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import ServerProcess
+from conftest import ServerProcess, created
 from faulty_envs import HangsWhere
 
-from gym_server.api.app import Config, create_app
 from gym_server.manager.limits import Limits
 
 # Ample for whatever does not hang.
@@ -219,36 +218,12 @@ def test_what_is_slow_but_not_too_slow_delays_nobody(serve):
 # Without HTTP --------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def quick():
-    """Make an application with limits of time."""
-    apps = []
-
-    def quick(**limits):
-        apps.append(
-            create_app(
-                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
-            )
-        )
-        return apps[-1]
-
-    yield quick
-    for app in apps:
-        app.close()
-
-
 def is_alive(process):
     try:
         return process.is_alive()
     except ValueError:
         # It is closed already.
         return False
-
-
-def created(client, env_id="faulty_envs:Counting-v0", **fields):
-    answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
-    assert answer.status_code == 200, answer.json
-    return f"/v1/envs/{answer.json['instance_id']}"
 
 
 def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, eventually):
@@ -342,34 +317,6 @@ def test_0_seconds_are_for_ever(quick):
     url = created(client, kwargs={"seconds": 1.5})
     client.post(f"{url}/reset/")
     assert client.post(f"{url}/step/", json={"action": 0}).status_code == 200
-
-
-def test_an_instance_that_nobody_uses_is_closed_and_says_so(quick, eventually):
-    client = quick(idle_minutes=0.01).test_client()
-    url = created(client)
-    eventually(lambda: client.get("/v1/envs/").json["all_envs"] == {})
-    for answer in (client.get(url), client.post(f"{url}/reset/"), client.post(f"{url}/close/")):
-        assert (answer.status_code, answer.json["code"]) == (410, "instance_idle_closed")
-        assert answer.json["message"].endswith(
-            "of faulty_envs:Counting-v0 was closed: nobody used it for 0.01 minutes"
-        )
-
-
-def test_an_instance_that_is_used_or_watched_stays(quick):
-    client = quick(idle_minutes=0.01).test_client()
-    used, watched = created(client), created(client)
-    end = time.monotonic() + 2
-    while time.monotonic() < end:
-        assert client.post(f"{used}/reset/").status_code == 200
-        assert client.get(f"{watched}/watch/presence/").status_code == 200
-        time.sleep(0.05)
-
-
-def test_0_minutes_are_never(quick):
-    client = quick(idle_minutes=0, max_call_seconds=0.1).test_client()
-    url = created(client)
-    time.sleep(0.5)
-    assert client.get(url).status_code == 200
 
 
 def test_an_answer_for_another_never_reaches_the_next_request(strict):

@@ -1,4 +1,4 @@
-"""What the process of an environment says is looked at before it is believed."""
+"""What the process of an environment sends is checked before it is used."""
 
 import multiprocessing
 import pickle
@@ -8,50 +8,56 @@ import numpy as np
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.processes.messages import _HEAD, Channel, answer_of, refusal_of, value_of
-from gym_server.processes.pipe import ConnectionPipe, Nonsense, Pipe
-from gym_server.protocol import wire
+from gym_server.processes.messages import (
+    _HEAD,
+    CallPipe,
+    answer_message,
+    refusal_message,
+    value_message,
+)
+from gym_server.processes.pipe import ConnectionPipe, MalformedMessageError, Pipe
+from gym_server.protocol.answers import JSON, Answer
 from gym_server.protocol.safetensors import TENSORS
 
 
 @pytest.fixture(params=[Pipe, ConnectionPipe])
 def ends(request, monkeypatch):
-    """Return a channel and the pipe at its other end."""
+    """Return a pipe for calls and the pipe at its other end."""
     monkeypatch.setattr("gym_server.processes.messages.Pipe", request.param)
     ours, theirs = multiprocessing.Pipe()
-    channel, other = Channel(ours), request.param(theirs)
-    yield channel, other
-    channel.wake()
-    channel.close()
+    pipe, other = CallPipe(ours), request.param(theirs)
+    yield pipe, other
+    pipe.wake()
+    pipe.close()
     other.close()
 
 
-def test_questions_and_answers_arrive_as_they_were(ends):
-    channel, other = ends
+def test_calls_and_results_arrive_as_they_were(ends):
+    pipe, other = ends
     frame = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    long = wire.Answer(200, b"x" * 300_000, TENSORS)
+    long = Answer(200, b"x" * 300_000, TENSORS)
     for message in (
-        answer_of(1, wire.Answer(200, b'{"a":1}')),
-        answer_of(2, long),
-        value_of(3, {"a": [1, "ä", None]}),
-        value_of(4, None, frame),
+        answer_message(1, Answer(200, b'{"a":1}')),
+        answer_message(2, long),
+        value_message(3, {"a": [1, "ä", None]}),
+        value_message(4, None, frame),
     ):
         sender = threading.Thread(target=other.send, args=(message,))
         sender.start()
-        answer = channel.ask("step", [1], {"b": 2})
+        answer = pipe.call("step", [1], {"b": 2})
         sender.join()
         number, method, args = pickle.loads(other.receive())
         assert (method, args) == ("step", ([1], {"b": 2}))
         if number < 3:
-            assert answer == ((b'{"a":1}', wire.JSON), (long.body, TENSORS))[number - 1]
+            assert answer == ((b'{"a":1}', JSON), (long.body, TENSORS))[number - 1]
     assert (answer.frame == frame).all()
 
 
 def test_a_refusal_is_raised_with_all_its_words(ends):
-    channel, other = ends
-    other.send(refusal_of(1, {"code": "reset_needed", "message": "m", "hint": "h"}))
+    pipe, other = ends
+    other.send(refusal_message(1, {"code": "reset_needed", "message": "m", "hint": "h"}))
     with pytest.raises(GymServerError) as caught:
-        channel.ask("step")
+        pipe.call("step")
     assert (caught.value.code, caught.value.message, caught.value.hint) == (
         "reset_needed",
         "m",
@@ -59,13 +65,13 @@ def test_a_refusal_is_raised_with_all_its_words(ends):
     )
 
 
-def test_an_answer_that_came_too_late_is_nobodys(ends):
-    channel, other = ends
+def test_a_result_that_came_too_late_is_ignored(ends):
+    pipe, other = ends
     with pytest.raises(TimeoutError):
-        channel.ask("about", seconds=0.01)
-    other.send(value_of(1, "late"))
-    other.send(value_of(2, "mine"))
-    assert channel.ask("about", seconds=5).value == "mine"
+        pipe.call("about", timeout=0.01)
+    other.send(value_message(1, "late"))
+    other.send(value_message(2, "mine"))
+    assert pipe.call("about", timeout=5).value == "mine"
 
 
 FORGED = [
@@ -90,18 +96,18 @@ FORGED = [
 
 
 @pytest.mark.parametrize("forged", FORGED)
-def test_what_is_no_answer_is_refused(ends, forged):
-    channel, other = ends
+def test_what_is_no_result_is_refused(ends, forged):
+    pipe, other = ends
     other.send(forged)
-    with pytest.raises(Nonsense):
-        channel.ask("step")
+    with pytest.raises(MalformedMessageError):
+        pipe.call("step")
 
 
 def test_nothing_is_allocated_on_the_word_of_a_length():
     ours, theirs = multiprocessing.Pipe()
-    channel = Channel(ours)
+    pipe = CallPipe(ours)
     theirs.send_bytes((2**62).to_bytes(8, "little")[4:])
-    with pytest.raises((Nonsense, OSError, EOFError)):
+    with pytest.raises((MalformedMessageError, OSError, EOFError)):
         theirs.close()
-        channel.ask("step")
-    channel.close()
+        pipe.call("step")
+    pipe.close()

@@ -9,7 +9,7 @@ from schemathesis import GenerationMode
 from schemathesis.core.parameters import ParameterLocation
 
 from gym_server.api.routes import ROUTES
-from gym_server.protocol import wire
+from gym_server.protocol.fields import read
 
 ENV_IDS = itertools.cycle(
     [
@@ -81,4 +81,4 @@ def fields_are_taken(context, response, case):
     """What the document allows is no field of a wrong form."""
     name = case.operation.definition.raw["operationId"]
     if isinstance(case.body, dict) and _is_meant(case, ParameterLocation.BODY) and name in FIELDS:
-        wire.read(case.body, FIELDS[name])
+        read(case.body, FIELDS[name])

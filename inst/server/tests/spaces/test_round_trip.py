@@ -8,7 +8,7 @@ import safetensors.numpy
 from random_spaces import random_member, random_space, same
 
 from gym_server import spaces
-from gym_server.protocol import wire
+from gym_server.protocol.answers import dumps
 from gym_server.protocol.safetensors import read, write
 from gym_server.spaces import Parts, arrays, tensor_parts
 
@@ -34,7 +34,7 @@ def pairs(seed, **how):
 @pytest.mark.parametrize("seed", range(20))
 def test_a_member_comes_back_through_json_as_it_was(seed):
     for space, member in pairs(seed):
-        sent = json.loads(wire.dumps({"value": spaces.encode(space, member)}))["value"]
+        sent = json.loads(dumps({"value": spaces.encode(space, member)}))["value"]
         back = spaces.decode(space, sent)
         assert same(member, back), (space, member, back)
 

@@ -3,7 +3,8 @@ import pytest
 from gymnasium.spaces import Box, Dict, Discrete, Graph, OneOf, Sequence, Space, Text, Tuple
 
 from gym_server.errors import GymServerError
-from gym_server.protocol import wire
+from gym_server.protocol.answers import dumps
+from gym_server.protocol.bodies import loads
 from gym_server.spaces import decode, describe, encode
 from gym_server.spaces.support import DEEPEST
 
@@ -76,9 +77,9 @@ def test_what_can_be_described_can_travel():
     space = _nested(DEEPEST)
     member = space.sample()
     described = describe(space)
-    assert wire.loads(wire.dumps({"info": described}))["info"] == described
+    assert loads(dumps({"info": described}))["info"] == described
     answer = {"observation": encode(space, member), "nan": float("nan")}
-    assert decode(space, wire.loads(wire.dumps(answer))["observation"]) == member
+    assert decode(space, loads(dumps(answer))["observation"]) == member
     assert "nested deeper" in refusal(_nested(DEEPEST + 1)).message
 
 

@@ -4,7 +4,7 @@ import pytest
 from faulty_envs import SPACES
 from gymnasium.vector.utils import batch_space, create_empty_array
 
-from gym_server.protocol import wire
+from gym_server.protocol.answers import dumps
 from gym_server.spaces.stacking import stack
 from gym_server.viewing.observation_summary import entries, sub_env_of
 
@@ -51,7 +51,7 @@ def test_an_observation_of_any_space_can_be_looked_at(kind):
     for _ in range(5):
         seen = entries(space.sample())
         assert len(seen["names"]) == len(seen["values"])
-        assert wire.dumps(seen)
+        assert dumps(seen)
 
 
 @pytest.mark.parametrize("kind", SPACES)

@@ -1,8 +1,8 @@
-"""How much memory an environment will take, reckoned before it takes it.
+"""Estimates of the memory that an environment will take, made before it takes it.
 
-What is reckoned is the most that the environment and one answer in JSON need at a time. The figures
-for the environments themselves were measured as the growth of a process by each further one
-(Gymnasium 1.4, ale_py 0.12), and rounded up.
+An estimate is the most that the environment and one answer in JSON need at the same time. The
+figures for the environments themselves were measured as the growth of a process with each further
+environment (Gymnasium 1.4, ale_py 0.12), and rounded up.
 """
 
 from __future__ import annotations
@@ -13,17 +13,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import gymnasium
-import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Dict, Graph, OneOf, Sequence, Text, Tuple
 
-from gym_server.budget import Budget
 from gym_server.envs.registry import module_of
-from gym_server.errors import GymServerError
 
 _KB, _MB = 2**10, 2**20
 
-# By the beginning of its module, the longest first; those of all other modules are small.
+# By the beginning of the module's name, the longest first; environments of all others are small.
 _ENVIRONMENT_BYTES = {
     "gymnasium.envs.toy_text.taxi": 1 * _MB,
     "gymnasium.envs.toy_text": 128 * _KB,
@@ -34,86 +31,28 @@ _ENVIRONMENT_BYTES = {
 }
 _OTHER_ENVIRONMENT_BYTES = 16 * _KB
 
-# A map of FrozenLake becomes a table of transitions, of so much for each of its letters. What a
-# few arguments say is in the figures above.
+# A map of FrozenLake becomes a table of transitions, and each of its letters takes this much there.
+# The figures above include arguments that are no longer than _FREE_ARGUMENT_LETTERS.
 _ARGUMENT_LETTER_BYTES = 2 * _KB
 _FREE_ARGUMENT_LETTERS = 64
 
-# Arrays of bounds, with the digits that they are written in.
+# A wrapper's arguments may be arrays of bounds: the bytes per digit that they are written in.
 _WRAPPER_LETTER_BYTES = 16
 _WRAPPER_BYTES = 1 * _KB
 
-# Each space has an object for each part of it; its bounds, and an observation.
+# Each part of a space is an object, and there are three arrays of its size: its two bounds, and an
+# observation.
 _PART_BYTES = 512
 _COPIES = 3
 
-# A number as it is sent as JSON: an object in a list (small integers are there already), its digits
-# in a text, and again as bytes. And its two bounds as such objects in the space's description.
+# What a number takes that is sent as JSON: an object in a list (Python keeps small integers in any
+# case), its digits in a text, and again as bytes; and its two bounds as such objects in the space's
+# description.
 _SHORT_NUMBER_BYTES, _NUMBER_BYTES = 44 + 16, 80 + 64
 
 
-class Account:
-    """What one creation takes of a budget.
-
-    Attributes:
-        taken: how many bytes that are.
-    """
-
-    def __init__(self, budget: Budget | None = None, num_envs: int = 1) -> None:
-        """Have taken nothing.
-
-        Args:
-            budget: what it takes from; None for one without an end.
-            num_envs: what is charged is charged for so many.
-        """
-        self._budget = budget or Budget()
-        self._num_envs = num_envs
-        self.taken = 0.0
-
-    def charge(self, size: float, what: str, soon: float = 0.0) -> None:
-        """Take memory for something of each sub-environment, before it is made.
-
-        Args:
-            size: bytes of one of them.
-            what: names it in a refusal.
-            soon: bytes that will be charged later, for which there must be room as well.
-
-        Raises:
-            GymServerError: ``too_much_memory``.
-        """
-        self.take((size + soon) * self._num_envs, what)
-        self.taken -= soon * self._num_envs
-        self._budget.give_back(soon * self._num_envs)
-
-    def take(self, size: float, what: str) -> None:
-        """Take memory; see ``charge()``."""
-        if not self._budget.take(size):
-            raise self._refusal(size, what)
-        self.taken += size
-
-    def give_back(self) -> None:
-        """Give everything back."""
-        taken, self.taken = self.taken, 0.0
-        self._budget.give_back(taken)
-
-    def _refusal(self, size: float, what: str) -> GymServerError:
-        whose = f" of {self._num_envs} sub-environments" if self._num_envs > 1 else ""
-        return GymServerError(
-            "too_much_memory",
-            f"{what}{whose} would bring this environment to {_in_mb(self.taken + size)} MiB, "
-            f"reckoned at its most, and {_in_mb(self._budget.left + self.taken)} MiB are left of "
-            f"the {_in_mb(self._budget.most)} MiB for all environments together",
-            "fewer sub-environments or smaller observations take less; close what is not needed, "
-            "GET /v1/instances/ lists it; the server's option --max-memory-mb sets the limit",
-        )
-
-
-def _in_mb(size: float) -> str:
-    return f"{size / _MB:,.0f}" if size < 1e15 else f"{size / _MB:.1e}"
-
-
 def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
-    """Reckon an environment without its observations."""
+    """Estimate an environment without its observations."""
     module = module_of(spec)
     letters = len(json.dumps(kwargs, default=str))
     for beginning, size in _ENVIRONMENT_BYTES.items():
@@ -123,17 +62,17 @@ def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
 
 
 def vector_bytes(spec: EnvSpec, kwargs: dict) -> float:
-    """Reckon a sub-environment of an environment's own vector implementation."""
+    """Estimate a sub-environment of an environment's own vector implementation."""
     if module_of(spec).partition(".")[0] != "ale_py":
         return environment_bytes(spec, kwargs)
-    # Atari's stacks pictures of a size that its arguments say.
+    # Atari's implementation stacks pictures, whose size and number are arguments.
     sides = [_number(kwargs.get(f"img_{side}", 84)) for side in ("height", "width")]
     frames = _number(kwargs.get("stack_num", 4)) * (1 if kwargs.get("grayscale", True) else 3)
     return environment_bytes(spec, kwargs) + _COPIES * frames * math.prod(sides)
 
 
 def answer_bytes(space: gymnasium.Space) -> float:
-    """Reckon an observation on its way to the client, for each sub-environment."""
+    """Estimate an observation of one sub-environment on its way to the client."""
     return sum(
         _PART_BYTES
         + _COPIES * elements * size
@@ -147,15 +86,15 @@ def observation_bytes(space: gymnasium.Space) -> float:
     return sum(elements * size for elements, size in _parts(space))
 
 
-class Reckoned(NamedTuple):
-    """What a wrapper takes, in bytes: for as long as it is there, and on the way to the client."""
+class WrapperBytes(NamedTuple):
+    """What a wrapper takes, in bytes: for as long as it exists, and for an answer."""
 
     kept: float
     answer: float
 
 
-def reckon_wrapper(name: str, kwargs: dict, env: gymnasium.Env) -> Reckoned:
-    """Reckon a wrapper around an environment, before it is made.
+def wrapper_bytes(name: str, kwargs: dict, env: gymnasium.Env) -> WrapperBytes:
+    """Estimate a wrapper around an environment, before it is made.
 
     Args:
         name: the wrapper's.
@@ -190,7 +129,7 @@ def reckon_wrapper(name: str, kwargs: dict, env: gymnasium.Env) -> Reckoned:
             queue = 16 * _bins(kwargs.get("bins"), env.action_space)
     letters = len(json.dumps(kwargs, default=str))
     objects = _WRAPPER_BYTES + _PART_BYTES * len(list(_parts(space)))
-    return Reckoned(
+    return WrapperBytes(
         objects + _WRAPPER_LETTER_BYTES * letters + _COPIES * observation + queue,
         elements * (_NUMBER_BYTES if observation > elements else _SHORT_NUMBER_BYTES),
     )
@@ -220,7 +159,7 @@ def _flat_elements(space: gymnasium.Space) -> float:
     try:
         return gymnasium.spaces.flatdim(space)
     except (ValueError, NotImplementedError, OverflowError):
-        # It is refused when it is made.
+        # Making the wrapper will fail.
         return 0
 
 
@@ -240,6 +179,7 @@ def _product(shape: object) -> float:
 
 
 def _number(value: object) -> float:
-    """Return an argument that should be a number; what is none is refused when it is used."""
-    is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    return max(0, value) if is_number else 0
+    """Return an argument that should be a number; 0 for anything else, which is refused later."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return max(0, value)
+    return 0

@@ -1,4 +1,4 @@
-"""Memory is reckoned before it is taken, for all environments together."""
+"""Memory is estimated before it is taken, for all environments together."""
 
 import gymnasium
 import numpy as np
@@ -9,8 +9,10 @@ from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
 from gym_server.api.app import Config, create_app
 from gym_server.budget import Budget
 from gym_server.envs import make, vectorization
-from gym_server.envs.footprint import Account, observation_bytes
-from gym_server.envs.wrappers import Wrapper, wrap
+from gym_server.envs.config import Wrapper
+from gym_server.envs.memory_estimate import observation_bytes
+from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.wrappers import wrap
 from gym_server.errors import GymServerError
 from gym_server.manager.limits import Limits
 from gym_server.rendering.render_thread import RenderThread
@@ -98,7 +100,7 @@ def test_nested_wrappers_are_refused_before_they_take_memory(
     assert client.application._instances._budget.left == 4096 * MB
 
 
-def test_atari_stacks_of_its_own_are_reckoned(limited):
+def test_atari_stacks_of_its_own_are_estimated(limited):
     pytest.importorskip("ale_py")
     kwargs = {"stack_num": 64, "img_height": 1024, "img_width": 1024, "grayscale": False}
     how = {"num_envs": 64, "vectorization_mode": "vector_entry_point"}
@@ -163,13 +165,13 @@ def test_a_vector_implementation_that_was_tried_in_vain_is_not_counted(limited):
     ids=lambda value: str(value)[:20],
 )
 def test_what_people_do_is_within_the_default(env_id, num_envs, wrappers):
-    account = Account(Budget(Limits.max_memory_mb * MB), num_envs)
+    memory = MemoryReservation(Budget(Limits.max_memory_mb * MB), num_envs)
     chosen = [Wrapper(one["name"], one.get("kwargs", {})) for one in wrappers]
     renderer = RenderThread()
-    env = make.make_env(env_id, None, {}, (), chosen, account)
-    wrap(env, chosen, renderer, account)
+    env = make.make_env(env_id, None, {}, (), chosen, memory)
+    wrap(env, chosen, renderer, memory)
     renderer.stop()
-    assert account.taken < Limits.max_memory_mb * MB
+    assert memory.taken < Limits.max_memory_mb * MB
 
 
 def test_what_is_taken_is_at_most_what_there_is():
@@ -182,14 +184,14 @@ def test_what_is_taken_is_at_most_what_there_is():
     assert budget.left == 10
 
 
-def test_an_account_gives_back_what_it_took():
+def test_a_reservation_gives_back_what_it_took():
     budget = Budget(100)
-    account = Account(budget, 4)
-    account.charge(20, "It")
+    memory = MemoryReservation(budget, 4)
+    memory.reserve(20, "It")
     with pytest.raises(GymServerError):
-        account.charge(6, "It")
+        memory.reserve(6, "It")
     assert budget.left == 20
-    account.give_back()
+    memory.give_back()
     assert budget.left == 100
 
 
@@ -214,7 +216,7 @@ def test_an_observation_has_the_bytes_that_numpy_counts(space):
 
 
 @pytest.mark.parametrize("kind", ["Letters-v0", "Nested-v0", "Deep-v0"])
-def test_every_space_can_be_reckoned(kind):
+def test_every_space_can_be_estimated(kind):
     import faulty_envs  # noqa: F401
 
     kwargs = {"depth": 50} if kind == "Deep-v0" else {}

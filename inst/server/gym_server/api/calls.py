@@ -1,0 +1,62 @@
+"""What a route's handler is given: the parsed request, and what the routes work on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from gym_server.api.routing import Route
+from gym_server.api.watch_keys import WatchKeys
+from gym_server.instances.instance import Instance
+from gym_server.manager.instance_manager import Instances
+from gym_server.manager.limits import Watchers
+from gym_server.monitoring.monitor_directory import MonitorRoot
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the routes work on.
+
+    Attributes:
+        instances: the environments.
+        monitor_root: where monitors may write.
+        stop: asks the server to stop once the requests under way are answered.
+        watchers: those who wait for a picture.
+        routes: all routes, which one of them describes.
+        watch_keys: the keys that open watch pages; None where no page asks for one.
+    """
+
+    instances: Instances
+    monitor_root: MonitorRoot
+    stop: Callable[[], None]
+    watchers: Watchers
+    routes: Sequence[Route]
+    watch_keys: WatchKeys | None = None
+
+
+class Call(NamedTuple):
+    """A request, parsed.
+
+    Attributes:
+        services: what to work on.
+        path: the variable parts of the URL.
+        body: the request's JSON object, or the query of a GET.
+        fields: the values of the fields that the route declares; None for absent ones.
+        tensors: whether the client wants tensors where the route has them.
+        url: the path as it was asked for.
+        accept: what the client says it takes.
+    """
+
+    services: Services
+    path: dict[str, str]
+    body: dict
+    fields: dict
+    tensors: bool = False
+    url: str = ""
+    accept: str = ""
+
+    @property
+    def instance(self) -> Instance:
+        """The instance that the URL names."""
+        return self.services.instances.get(self.path["instance_id"])

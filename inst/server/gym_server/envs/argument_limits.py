@@ -1,0 +1,178 @@
+"""How large arguments may be, and how many steps of its environment one call may take.
+
+Some arguments say how often something is repeated. A loop in Python runs until the limit of time
+ends it, and slows all other calls meanwhile; a loop in an environment's own C code cannot be ended
+in the server's process at all. So the numbers of repeats themselves are limited.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import gymnasium
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import VectorEnv
+
+from gym_server.envs.config import Wrapper
+from gym_server.envs.registry import KNOWN_PACKAGES, module_of
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief, parse_nonfinite
+
+# Of one environment, where the repeats of several wrappers multiply.
+MOST_REPEATS = 1_000
+
+# Of all sub-environments together: half a minute of the slow ones; and as many of Atari's
+# environments as a vector environment may have, each with the usual 30 idle steps after a reset.
+MOST_STEPS = 500_000
+
+# The arguments that repeat steps, by wrapper.
+_REPEATING = {
+    "AtariPreprocessing": ("frame_skip", "noop_max"),
+    "MaxAndSkipObservation": ("skip",),
+    "RepeatAction": ("num_repeats",),
+}
+
+# The arguments that repeat steps, of the environments that run in the server's process: MuJoCo's
+# and Atari's.
+_REPEATING_ARGUMENTS: tuple[str, ...] = ("frame_skip", "frameskip", "noop_max")
+
+# Arguments of environments that take memory or time in proportion to their value: the size of
+# MuJoCo's pictures and what they show, Atari's own vector environment.
+_ENVIRONMENT_LIMITS = {
+    "width": 4_096,
+    "height": 4_096,
+    "max_geom": 100_000,
+    "img_width": 1_024,
+    "img_height": 1_024,
+    "stack_num": 64,
+    "num_threads": 64,
+    "batch_size": 16_384,
+}
+
+# The same of wrappers.
+_WRAPPER_LIMITS = {
+    "AtariPreprocessing": {"screen_size": 4_096},
+    "DelayObservation": {"delay": 1_000},
+    "DiscretizeAction": {"bins": 10_000},
+    "DiscretizeObservation": {"bins": 10_000},
+    "FrameStackObservation": {"stack_size": 1_000},
+    "ResizeObservation": {"shape": 4_096},
+}
+
+# A map of FrozenLake of 250 x 250, which takes a second to be made.
+_LONGEST_ARGUMENTS = 65_536
+
+# It brings an angle into its range one turn at a time, however many turns that takes.
+_TURNING = "gymnasium.envs.classic_control.acrobot"
+_LARGEST_ANGLE = 100_000
+
+
+def check_environment(
+    spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: int = 1
+) -> None:
+    """Refuse arguments that are too large, and repeats that make one call too many steps.
+
+    Args:
+        spec: of the environment.
+        kwargs: its arguments.
+        wrappers: what will be put around it.
+        num_envs: how many sub-environments a call steps.
+
+    Raises:
+        GymServerError: ``invalid_kwargs``.
+    """
+    if _is_known(spec):
+        _check_length(kwargs)
+        _check_sizes(kwargs, _ENVIRONMENT_LIMITS)
+    _check_steps(spec, kwargs, wrappers, num_envs)
+
+
+def check_wrapper(wrapper: Wrapper) -> None:
+    """Refuse arguments of a wrapper that are too large.
+
+    Raises:
+        GymServerError: ``invalid_kwargs``.
+    """
+    _check_sizes(wrapper.kwargs, _WRAPPER_LIMITS.get(wrapper.name, {}), f"{wrapper.name}: ")
+
+
+def check_reset_options(env: gymnasium.Env | VectorEnv, options: dict | None) -> None:
+    """Refuse options of a reset that make a long loop.
+
+    Raises:
+        GymServerError: ``invalid_parameter``.
+    """
+    if not options or env.spec is None or module_of(env.spec) != _TURNING:
+        return
+    for name in ("low", "high"):
+        value = options.get(name)
+        if isinstance(value, (int, float)) and abs(value) > _LARGEST_ANGLE:
+            raise GymServerError(
+                "invalid_parameter",
+                f"The option '{name}' of {env.spec.id} must be between {-_LARGEST_ANGLE:,} and "
+                f"{_LARGEST_ANGLE:,}, not {brief(value)}",
+            )
+
+
+def _check_length(kwargs: dict) -> None:
+    length = len(json.dumps(kwargs, default=str))
+    if length > _LONGEST_ARGUMENTS:
+        raise GymServerError(
+            "invalid_kwargs",
+            f"kwargs must be of at most {_LONGEST_ARGUMENTS:,} characters of JSON, not {length:,}",
+        )
+
+
+def _check_sizes(kwargs: dict, limits: Mapping[str, int], prefix: str = "") -> None:
+    """Refuse arguments above their limits; the prefix begins the message."""
+    for name, limit in limits.items():
+        for number in _numbers(kwargs.get(name)):
+            # NaN is refused as well.
+            if not number <= limit:
+                raise GymServerError(
+                    "invalid_kwargs",
+                    f"{prefix}{name} must be at most {limit}, not {brief(number)}",
+                )
+
+
+def _check_steps(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: int) -> None:
+    arguments = [(kwargs, _REPEATING_ARGUMENTS)] if _is_known(spec) else []
+    arguments += [(one.kwargs, _REPEATING.get(one.name, ())) for one in wrappers]
+    given = [(name, owner[name]) for owner, names in arguments for name in names if name in owner]
+    repeats = math.prod(
+        max([1, *(_largest(owner.get(name)) for name in names)]) for owner, names in arguments
+    )
+    if repeats > MOST_REPEATS or (repeats > 1 and repeats * num_envs > MOST_STEPS):
+        raise GymServerError(
+            "invalid_kwargs",
+            f"One call would take {_formatted(repeats * num_envs)} steps, by "
+            + ", ".join(f"{name} {brief(value)}" for name, value in given)
+            + (f" and {num_envs} sub-environments" if num_envs > 1 else ""),
+            f"it may take {MOST_REPEATS:,} of one environment, {MOST_STEPS:,} of all its "
+            "sub-environments; repeat less and step more often",
+        )
+
+
+def _is_known(spec: EnvSpec) -> bool:
+    # What the arguments of other environments mean is not known. By default those run in a process
+    # of their own.
+    return module_of(spec).partition(".")[0] in KNOWN_PACKAGES
+
+
+def _numbers(value: object) -> Iterator[float]:
+    """Return the numbers in an argument, which may be a list of them."""
+    value = parse_nonfinite(value)
+    items = value if isinstance(value, list) else [value]
+    return (item for item in items if isinstance(item, (int, float)))
+
+
+def _largest(value: object) -> float:
+    """Return the largest number in an argument; 0 when there is none."""
+    # 10**18 stands for all larger ones, because not every integer can be multiplied by every float.
+    return max((min(number, 10**18) for number in _numbers(value)), default=0)
+
+
+def _formatted(number: float) -> str:
+    return f"{number:,}" if number < 10**15 else "more than 10^15"

@@ -1,0 +1,67 @@
+"""Environments that misbehave, or have spaces that the classic ones lack.
+
+For tests: ``--allow-module faulty_envs`` lets a server make them, as in
+``faulty_envs:Echo-v0``.  The module needs Gymnasium and nothing else.
+"""
+
+import gymnasium
+
+from faulty_envs.counting import Counting
+from faulty_envs.drawing import Drawing, OldRenderModes
+from faulty_envs.hanging import Hanging, HangsWhere, Meeting, Spins
+from faulty_envs.odd_spaces import (
+    SPACES,
+    CustomSpace,
+    Deep,
+    Echo,
+    Letters,
+    LongDouble,
+    Nested,
+    NotANumber,
+    Shifted,
+)
+from faulty_envs.raising import (
+    ExitsInStep,
+    ImportsInStep,
+    RaisesInClose,
+    RaisesInConstructor,
+    RaisesInReset,
+    RaisesInStep,
+    Variables,
+)
+from faulty_envs.rogue import Rogue
+from faulty_envs.uneven import CannotSaySo, Insists, KillsItself, SpoilsOneSubEnv, Uneven
+
+__all__ = ["SPACES"]
+
+for _kind in (
+    Counting,
+    CannotSaySo,
+    CustomSpace,
+    Deep,
+    Drawing,
+    Echo,
+    ExitsInStep,
+    Hanging,
+    HangsWhere,
+    Insists,
+    KillsItself,
+    Letters,
+    LongDouble,
+    Meeting,
+    Nested,
+    NotANumber,
+    OldRenderModes,
+    RaisesInClose,
+    RaisesInConstructor,
+    RaisesInReset,
+    RaisesInStep,
+    ImportsInStep,
+    Rogue,
+    Shifted,
+    Spins,
+    SpoilsOneSubEnv,
+    Uneven,
+    Variables,
+):
+    gymnasium.register(id=f"{_kind.__name__}-v0", entry_point=_kind)

@@ -1,0 +1,85 @@
+"""Environments that take long, or never return."""
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from faulty_envs.counting import Counting
+
+
+class Hanging(Counting):
+    def step(self, action):
+        time.sleep(3600)
+
+
+class Meeting(Counting):
+    """A step waits until as many files lie in a directory as are to come, its own included."""
+
+    def __init__(self, directory, count):
+        super().__init__()
+        self.directory, self.count = Path(directory), count
+
+    def step(self, action):
+        (self.directory / f"{os.getpid()}-{id(self)}").touch()
+        end = time.monotonic() + 20
+        while len(list(self.directory.iterdir())) < self.count:
+            if time.monotonic() > end:
+                raise RuntimeError("The others did not come")
+            time.sleep(0.01)
+        return super().step(action)
+
+
+class HangsWhere(Counting):
+    """Hangs for some seconds where its kwarg says: in "init", "reset", "render" or "close"."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+    closed = 0
+
+    def __init__(self, where, hours=1.0, render_mode=None):
+        super().__init__()
+        self.where, self.hours, self.render_mode = where, hours, render_mode
+        self.hang("init")
+
+    def hang(self, here):
+        if self.where == here:
+            time.sleep(3600 * self.hours)
+
+    def reset(self, *, seed=None, options=None):
+        self.hang("reset")
+        return super().reset(seed=seed, options=options)
+
+    def render(self):
+        self.hang("render")
+        return np.zeros((2, 2, 3), dtype=np.uint8)
+
+    def close(self):
+        self.hang("close")
+        type(self).closed += 1
+
+
+class Spins(Counting):
+    """Loops without an end where its kwarg says: in "init", "step", "render" or "close"."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, where, render_mode=None):
+        super().__init__()
+        self.where, self.render_mode = where, render_mode
+        self.spin("init")
+
+    def spin(self, here):
+        while self.where == here:
+            pass
+
+    def step(self, action):
+        self.spin("step")
+        return super().step(action)
+
+    def render(self):
+        self.spin("render")
+        return np.zeros((2, 2, 3), dtype=np.uint8)
+
+    def close(self):
+        self.spin("close")

@@ -1,0 +1,116 @@
+"""An environment that ends its process, or does worse to it."""
+
+import contextlib
+import ctypes
+import os
+import pickle
+import signal
+import stat
+import time
+
+import numpy as np
+
+from faulty_envs.counting import Counting
+
+
+class Rogue(Counting):
+    """Does something to its process, by name, where it is told to."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, does="nothing", at="step", render_mode=None, **kwargs):
+        super().__init__(**kwargs)
+        self.does, self.at, self.render_mode = does, at, render_mode
+        self.hoard = []
+        self.act("constructor")
+
+    def act(self, at):
+        if at == self.at:
+            getattr(self, self.does)()
+
+    def reset(self, *, seed=None, options=None):
+        self.act("reset")
+        observation, info = super().reset(seed=seed, options=options)
+        return observation, {**info, "pid": os.getpid()}
+
+    def step(self, action):
+        self.act("step")
+        return super().step(action)
+
+    def render(self):
+        self.act("render")
+        return np.zeros((2, 2, 3), np.uint8)
+
+    def close(self):
+        self.act("close")
+
+    def nothing(self):
+        pass
+
+    def exits(self):
+        os._exit(7)
+
+    def interrupts(self):
+        raise KeyboardInterrupt("by hand")
+
+    def leaves(self):
+        raise SystemExit(3)
+
+    def ends_a_generator(self):
+        raise GeneratorExit
+
+    def is_killed(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def crashes(self):
+        ctypes.string_at(0)
+
+    def closes_all_files(self):
+        os.closerange(0, 4096)
+
+    def ignores_sigterm(self):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+    def prints(self):
+        print("hello" * 1000, flush=True)
+        os.write(1, b"to the first descriptor\n")
+
+    def forks_and_exits(self):
+        if os.fork() == 0:
+            time.sleep(3600)
+        os._exit(8)
+
+    def forks_a_stranger_and_exits(self):
+        if os.fork() == 0:
+            os.setsid()
+            time.sleep(8)
+            os._exit(0)
+        os._exit(8)
+
+    def hoards(self):
+        self.hoard.append(np.ones(2**27))
+
+    def never_returns(self):
+        # Nor does any other thread of its process run meanwhile.
+        ctypes.PyDLL(None).sleep(3600)
+
+    def forges(self):
+        for descriptor in range(3, 64):
+            with contextlib.suppress(OSError):
+                os.fstat(descriptor)
+                if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                    os.write(descriptor, FORGED)
+
+
+class Unpickled:
+    """Creates the file that a test looks for, where it is unpickled."""
+
+    def __reduce__(self):
+        return open, (os.environ.get("FORGED_FILE", os.devnull), "w")
+
+
+_FORGED = pickle.dumps(Unpickled())
+
+
+# As a message of the server's own.
+FORGED = len(_FORGED).to_bytes(8, "little") + _FORGED

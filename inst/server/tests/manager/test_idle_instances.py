@@ -1,0 +1,33 @@
+"""Instances that are not used for some time."""
+
+import time
+
+from conftest import created
+
+
+def test_an_instance_that_nobody_uses_is_closed_and_says_so(quick, eventually):
+    client = quick(idle_minutes=0.01).test_client()
+    url = created(client)
+    eventually(lambda: client.get("/v1/envs/").json["all_envs"] == {})
+    for answer in (client.get(url), client.post(f"{url}/reset/"), client.post(f"{url}/close/")):
+        assert (answer.status_code, answer.json["code"]) == (410, "instance_idle_closed")
+        assert answer.json["message"].endswith(
+            "of faulty_envs:Counting-v0 was closed: nobody used it for 0.01 minutes"
+        )
+
+
+def test_an_instance_that_is_used_or_watched_stays(quick):
+    client = quick(idle_minutes=0.01).test_client()
+    used, watched = created(client), created(client)
+    end = time.monotonic() + 2
+    while time.monotonic() < end:
+        assert client.post(f"{used}/reset/").status_code == 200
+        assert client.get(f"{watched}/watch/presence/").status_code == 200
+        time.sleep(0.05)
+
+
+def test_0_minutes_are_never(quick):
+    client = quick(idle_minutes=0, max_call_seconds=0.1).test_client()
+    url = created(client)
+    time.sleep(0.5)
+    assert client.get(url).status_code == 200

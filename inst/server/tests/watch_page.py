@@ -1,0 +1,65 @@
+"""The watch page in a browser without a window, and what it shows."""
+
+import shutil
+import time
+
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+
+_MINUS, _DASH = "\u2212", "\u2013"
+
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def start_chromium():
+    """Start a browser without a window; return None where there is none."""
+    binary = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    driver = shutil.which("chromedriver")
+    if binary is None or driver is None:
+        return None
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(options=options, service=Service(driver))
+    browser.set_window_size(1100, 700)
+    return browser
+
+
+def text(browser, name):
+    return browser.find_element(By.ID, name).text
+
+
+def number(browser, name):
+    words = text(browser, name).replace(",", "").replace(_MINUS, "-")
+    return float(words) if words.strip(_DASH) else 0.0
+
+
+def picture(browser):
+    return browser.execute_script("return document.getElementById('picture').toDataURL()")
+
+
+def pictures(browser, seconds=1.5):
+    """Return the different pictures that are shown for a while."""
+    seen, end = set(), time.monotonic() + seconds
+    while time.monotonic() < end:
+        seen.add(picture(browser))
+    return seen
+
+
+def complaints(browser):
+    return [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def drawn(server, url):
+    """Return how often an environment was drawn; asking for it draws it, too, if it moved."""
+    return server.get(f"{url}/watch/state/")[1]["number"]
+
+
+def pace(server, url, seconds=1):
+    """Return how many steps a second an environment takes; one that is watched takes 50."""
+    began, before = time.monotonic(), server.get(url)[1]["steps"]
+    time.sleep(seconds)
+    return (server.get(url)[1]["steps"] - before) / (time.monotonic() - began)
