@@ -56,7 +56,7 @@ test_that("a value for each sub-environment belongs, drawn from each kind of spa
       values <- space_sample(batch)
       expect_true(space_contains(batch, values))
       expect_no_error(check_sub_envs(space, batch_space(space, n), values, n, NULL))
-      for (sub_env in seq_len(n)) expect_true(space_contains(space, sub_env_value(space, values, sub_env)))
+      for (i in seq_len(n)) expect_true(space_contains(space, sub_env_value(space, values, i)))
     }
   }
   expect_type(space_sample(batch_space(sub_envs_of_spaces()$text, 3)), "character")
@@ -119,7 +119,8 @@ test_that("the sub-environment whose value does not fit is named, counted from 1
   refused(spaces$discrete, c(5, 6.5), 2L, "Sub-environment 2: ", "6.5")
   refused(spaces$discrete, c(5, Inf), 2L, "Sub-environment 2: ")
   refused(spaces$discrete, c("left", "right"), 2L, "Sub-environment 1: ", "\"left\"")
-  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Sub-environment 2: ", "`$[1]`", "<Box float32 [2]>")
+  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Sub-environment 2: ", "`$[1]`",
+          "<Box float32 [2]>")
   refused(spaces$dials, rbind(c(0, 4), c(0.5, 4)), 2L, "Sub-environment 2: ", "not whole")
   refused(spaces$text, c("a", NA), 2L, "Sub-environment 2: ", "one string")
   both <- new_space(describe_dict(x = describe_box(c(0, 0), c(1, 1)),
@@ -142,7 +143,7 @@ test_that("what has not the form of sub-environments is refused", {
   refused(both, list(x = c(0, 0), y = 0), 2L, "`$y`")
 })
 
-test_that("logicals are actions of sub-environments that are Discrete, a vector those of one number", {
+test_that("logicals are actions of Discrete sub-environments, a vector those of one number", {
   spaces <- sub_envs_of_spaces()
   moves <- discrete_space(2L)
   expect_no_error(check_sub_envs(moves, batch_space(moves, 2), c(TRUE, FALSE), 2L, NULL))
