@@ -91,7 +91,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   json <- if (is.null(num_envs)) {
     write_value(space, value)
   } else {
-    write_sub_envs(single, value, num_envs)
+    write_batch(single, value, num_envs)
   }
   fields <- c(value = json)
   answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)

@@ -34,9 +34,9 @@ step_vector_env <- function(client, instance, action, fields, which, call) {
     observations <- batch_space(instance$single_observation_space, n)
   }
   single <- instance$single_action_space
-  check_sub_envs(single, actions, action, n, call, which)
+  check_batch(single, actions, action, n, call, which)
   answer <- send_action(
-    client, instance, actions, action, write_sub_envs(single, action, n), fields, call
+    client, instance, actions, action, write_batch(single, action, n), fields, call
   )
   result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
@@ -71,7 +71,7 @@ final_observations <- function(instance, answer, n) {
   space <- instance$single_observation_space
   values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
   final <- vector("list", n)
-  final[ended] <- lapply(seq_along(ended), function(i) sub_env_value(space, values, i))
+  final[ended] <- lapply(seq_along(ended), function(i) batch_value(space, values, i))
   final
 }
 
@@ -82,7 +82,7 @@ decode_sample <- function(instance, json) {
     decode_value(single, json)
   } else {
     check_list(json, instance$num_envs, "all sub-environments")
-    sub_envs_from(single, lapply(json, decode_value, space = single))
+    batch_of(single, lapply(json, decode_value, space = single))
   }
 }
 

@@ -7,8 +7,8 @@ closing_time <- 2
 
 #' Create an instance on the server, and remember it
 #'
-#' An instance may be created although its answer is lost, and then nobody knows its id. So creations
-#' have idempotency keys of their own:
+#' An instance may be created although its answer is lost, and then nobody knows its id. So
+#' creations have idempotency keys of their own:
 #'
 #' 1. The request is remembered with its key and body before it is sent.
 #' 2. The server creates the instance; an interrupt or a lost connection comes before the answer.

@@ -59,7 +59,7 @@ new_batch <- function(episodes, seeds) {
 # of steps, which is `taken`.
 play_batch <- function(vector_env, batch, policy, history, max_steps, keep_steps) {
   playing <- batch$sub_env
-  observation <- sub_env_rows(vector_env$observation_space, vector_env$reset(batch$seeds), playing)
+  observation <- batch_rows(vector_env$observation_space, vector_env$reset(batch$seeds), playing)
   keep_frame(batch, vector_env)
   if (batch$episodes[[1L]] == 1L) {
     ask_beforehand(policy, observation, playing, vector_env)
@@ -86,7 +86,7 @@ play_batch <- function(vector_env, batch, policy, history, max_steps, keep_steps
       going <- which(!ended & batch$episodes[playing] <= history$wanted)
       playing <- playing[going]
       returns <- returns[going]
-      observation <- sub_env_rows(vector_env$observation_space, observation, going)
+      observation <- batch_rows(vector_env$observation_space, observation, going)
     }
   }
 }

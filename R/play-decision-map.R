@@ -196,7 +196,7 @@ decide_value <- function(place, values, outputs, action, call) {
   space <- place$action_space
   n <- prod(space$shape)
   check_count(action, max = n, call = call)
-  numbers <- sub_env_numbers(policy_actions(place, values, outputs))
+  numbers <- number_rows(policy_actions(place, values, outputs))
   limits <- c(space$low[[action]], space$high[[action]])
   list(
     kind = "value", values = as.numeric(numbers[, action]),

@@ -25,7 +25,7 @@ steps_table <- function(history, episodes, vector_env) {
     lapply(batch$steps, function(step) c(list(episode = batch$episodes[step$sub_env]), step))
   }))
   column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
-  values <- function(name, space) bind_sub_envs(space, lapply(steps, function(step) step[[name]]))
+  values <- function(name, space) bind_batches(space, lapply(steps, function(step) step[[name]]))
   observed <- vector_env$observation_space
   observations <- value_columns(observed, values("observation", observed), "obs")
   if (is_stackable(observed)) {
@@ -56,7 +56,7 @@ steps_table <- function(history, episodes, vector_env) {
 #'
 #' Numbers have a column each, in row-major order; so have the parts of Tuple and
 #' Dict. Values that may hold any number of parts have one column that is a list.
-#' @param values The values, as [sub_envs_from()] puts them together.
+#' @param values The values, as [batch_of()] puts them together.
 #' @param name What they are, such as `"action"`.
 #' @return A named list of columns.
 #' @noRd
@@ -67,7 +67,7 @@ value_columns.default <- function(space, values, name) stats::setNames(list(I(va
 
 #' @exportS3Method
 value_columns.gym_space_array <- function(space, values, name) {
-  numbers <- sub_env_numbers(values)
+  numbers <- number_rows(values)
   n <- ncol(numbers)
   each <- lapply(seq_len(n), function(i) numbers[, i])
   stats::setNames(each, if (n == 1L) name else paste0(name, "_", seq_len(n), recycle0 = TRUE))

@@ -131,10 +131,10 @@ single_env <- function(env, call) {
   list(
     observation_space = observed, action_space = actions, batch_size = 1L,
     draw_seeds = function() draw_environment_seeds(1L),
-    reset = function(seeds) sub_envs_from(observed, list(env$reset(seed = seeds))),
+    reset = function(seeds) batch_of(observed, list(env$reset(seed = seeds))),
     step = function(action, playing) {
-      out <- take_step(env, 1L, call, sub_env_value(actions, action, 1L))
-      out$observation <- sub_envs_from(observed, list(out$observation))
+      out <- take_step(env, 1L, call, batch_value(actions, action, 1L))
+      out$observation <- batch_of(observed, list(out$observation))
       out
     }
   )
@@ -179,9 +179,9 @@ joint_sub_envs <- function(env, call) {
       # Those that have ended repeat the action of the first that is playing.
       row <- rep(1L, n)
       row[playing] <- seq_along(playing)
-      out <- take_step(env, n, call, sub_env_rows(actions, action, row))
+      out <- take_step(env, n, call, batch_rows(actions, action, row))
       list(
-        observation = sub_env_rows(observed, out$observation, playing),
+        observation = batch_rows(observed, out$observation, playing),
         reward = out$reward[playing],
         terminated = out$terminated[playing],
         truncated = out$truncated[playing]

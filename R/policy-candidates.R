@@ -23,7 +23,7 @@ candidates_of <- function(policies, candidate) {
 #' @exportS3Method
 act_batch.gym_policy_candidates <- function(policy, observation, playing, vector_env) {
   network <- policy$policy
-  signal <- network_inputs(network$observation_space, sub_env_numbers(observation))
+  signal <- network_inputs(network$observation_space, number_rows(observation))
   all_play <- length(playing) == nrow(policy$layers[[1L]])
   for (layer in seq_along(policy$layers)) {
     weights <- policy$layers[[layer]]

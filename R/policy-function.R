@@ -25,7 +25,7 @@ ask_beforehand <- function(policy, observation, playing, vector_env) {
   if (!is.function(policy) || length(playing) == 1L) {
     return(invisible())
   }
-  one <- sub_env_rows(vector_env$observation_space, observation, 1L)
+  one <- batch_rows(vector_env$observation_space, observation, 1L)
   tryCatch(
     keep_random_state(act_batch(policy, one, playing[[1L]], vector_env)),
     gym_error = function(cnd) rlang::cnd_signal(cnd),
@@ -53,7 +53,7 @@ ask_beforehand <- function(policy, observation, playing, vector_env) {
 #' @noRd
 batch_actions <- function(actions, n, vector_env) {
   actions <- as_batch(vector_env$action_space, actions)
-  count <- sub_envs_given(vector_env$action_space, actions)
+  count <- batch_length(vector_env$action_space, actions)
   if (is.na(count) || count != n) {
     abort_action_count(actions, count, n, vector_env)
   }

@@ -67,13 +67,13 @@ act.gym_policy_random <- function(policy, observation, ...) {
   if (is.null(observed) || observed$one) {
     space_sample(space)
   } else {
-    sample_sub_envs(space, nrow(observed$values))
+    sample_batch(space, nrow(observed$values))
   }
 }
 
 #' @exportS3Method
 act_batch.gym_policy_random <- function(policy, observation, playing, vector_env) {
-  sample_sub_envs(policy$action_space, length(playing))
+  sample_batch(policy$action_space, length(playing))
 }
 
 #' @exportS3Method

@@ -78,7 +78,7 @@ fake_vector_env <- function(num_envs, mode = "sync",
   env$sub_env_steps <- 0L
   env$closed <- 0L
   observe <- function(sub_envs) {
-    sub_envs_from(observation_space, lapply(sub_envs, function(i) {
+    batch_of(observation_space, lapply(sub_envs, function(i) {
       fake_observation(observation_space, env$seed[[i]], env$at[[i]])
     }))
   }
@@ -94,11 +94,11 @@ fake_vector_env <- function(num_envs, mode = "sync",
     stopifnot(is.null(which) || mode == "sync")
     sub_envs <- which %||% seq_len(num_envs)
     stopifnot(autoreset != "Disabled" || !any(env$done[sub_envs]))
-    stopifnot(sub_envs_given(action_space, action) == length(sub_envs))
+    stopifnot(batch_length(action_space, action) == length(sub_envs))
     env$sub_env_steps <- env$sub_env_steps + length(sub_envs)
     again <- env$done[sub_envs]
     env$at[sub_envs] <- ifelse(again, 0L, env$at[sub_envs] + 1L)
-    actions <- lapply(seq_along(sub_envs), sub_env_value, space = action_space, sub_envs = action)
+    actions <- lapply(seq_along(sub_envs), batch_value, space = action_space, batch = action)
     each <- function(f) mapply(f, env$seed[sub_envs], env$at[sub_envs], actions)
     ended <- each(ends) & !again
     env$done[sub_envs] <- ended

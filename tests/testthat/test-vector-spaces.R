@@ -26,7 +26,7 @@ play_sub_envs <- function(env, values, tensors) {
   }
   # Only some of them, the last step of an episode.
   sub_envs <- which(seq_len(n) != 2L)
-  some <- env$step(sub_env_rows(env$single_action_space, observation, sub_envs), which = sub_envs)
+  some <- env$step(batch_rows(env$single_action_space, observation, sub_envs), which = sub_envs)
   expect_identical(some$terminated, rep(TRUE, length(sub_envs)))
   list(seen = c(seen, list(some$observation)), problems = c(problems, some$info$problem))
 }
@@ -65,7 +65,7 @@ test_that("values of random spaces reach Python in the sub-environment that they
     for (sub_env in 1:3) {
       # As text: an integer is a double where other sub-environments need one.
       expect_identical(
-        write_value(space, sub_env_value(space, by_json$seen[[1L]], sub_env)),
+        write_value(space, batch_value(space, by_json$seen[[1L]], sub_env)),
         write_value(space, single$reset(seed = sub_env)), info = number
       )
     }
@@ -93,16 +93,16 @@ test_that("the last observation of a sub-environment is kept for every kind of s
     first <- env$reset(seed = 0:1)
     second <- env$step(first)$observation
     # The first sub-environment ends, the second does not step.
-    out <- env$step(sub_env_rows(space, second, 1L), which = 1)
+    out <- env$step(batch_rows(space, second, 1L), which = 1)
     expect_length(out$info$final_obs, 1)
     # After its last value a mirror shows its first again.
-    expect_identical(out$info$final_obs[[1L]], sub_env_value(space, first, 1L), info = number)
-    out <- env$step(sub_envs_from(space, list(
-      sub_env_value(space, out$observation, 1L), sub_env_value(space, second, 2L)
+    expect_identical(out$info$final_obs[[1L]], batch_value(space, first, 1L), info = number)
+    out <- env$step(batch_of(space, list(
+      batch_value(space, out$observation, 1L), batch_value(space, second, 2L)
     )))
     expect_identical(out$terminated, c(FALSE, TRUE))
     expect_null(out$info$final_obs[[1L]])
-    expect_identical(out$info$final_obs[[2L]], sub_env_value(space, first, 2L), info = number)
+    expect_identical(out$info$final_obs[[2L]], batch_value(space, first, 2L), info = number)
     env$close()
   }
 })
