@@ -20,7 +20,7 @@ help:
 	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
 	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
-	@echo 'make lint      lintr and the layers of R/; ruff, import-linter and mypy for Python'
+	@echo 'make lint      lintr and the order of the files for R; ruff, import-linter and mypy for Python'
 	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
 	@echo 'make clean     remove everything that these made'
 	@echo

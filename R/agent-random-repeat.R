@@ -1,6 +1,6 @@
 #' Repeat a random search with many seeds
 #'
-#' One search says little about how long searches take: its round is luck.
+#' One search says little about how long searches take, as its round is a matter of chance.
 #' `search_repeat()` plays [search_random()] once with each of many seeds, in an environment
 #' that is made once, and keeps in one row what came of each. Plotted, the rounds that
 #' the searches needed stand beside the geometric distribution that they follow.
@@ -15,8 +15,8 @@
 #' Each round draws its weights anew, so that all have the same chance to reach the target,
 #' and how many it takes is geometrically distributed. The chance is estimated by maximum
 #' likelihood: the searches that were solved divided by all rounds that were played, in
-#' searches that were given up after `rounds` rounds too (they are censored, and leaving
-#' them out would make luck look better than it is).
+#' searches that were not solved within `rounds` rounds, too (they are censored, and leaving
+#' them out would make the chance look better than it is).
 #'
 #' # When it ends early
 #'
@@ -114,40 +114,41 @@ check_target <- function(settings, call) {
 
 #' Play a search with each seed
 #'
-#' An interrupt ends them early, an error does too and carries what was played.
+#' An interrupt ends them early; so does an error, which carries the searches that were finished.
 #' @return As [search_repeat()].
 #' @noRd
 play_searches <- function(vector_env, template, settings, seeds, progress, call) {
   started <- proc.time()[["elapsed"]]
-  show <- if (progress) searches_bar(length(seeds)) else function(finished, solved) NULL
+  show <- if (progress) progress_bar(length(seeds), "Search", "0 solved, ") else function(...) NULL
   rows <- list()
-  finish <- function(interrupted = FALSE) new_searches(rows, settings, started, interrupted)
-  interrupted <- FALSE
-  tryCatch(
+  play <- function() {
     for (seed in seeds) {
-      search <- play_search(vector_env, template, settings, seed, call)
+      search <- play_seed(vector_env, template, settings, seed, call)
       if (search$interrupted) {
         rlang::interrupt()
       }
-      rows <- c(rows, list(search_row(search)))
-      show(length(rows), sum(vapply(rows, function(row) row$solved, NA)))
-    },
-    interrupt = function(cnd) {
-      interrupted <<- TRUE
-      inform_searches_interrupted(length(rows), length(seeds))
-    },
+      rows <<- c(rows, list(search_row(search)))
+      show(length(rows), paste0(sum(vapply(rows, function(row) row$solved, NA)), " solved, "))
+    }
+  }
+  interrupted <- tryCatch(
+    until_interrupted(
+      play(), "Interrupted after {finished} of {total} seed{?s}; what was finished is returned.",
+      function() length(rows), length(seeds)
+    ),
     error = function(cnd) {
-      abort_search(cnd$parent %||% cnd, finish(), call, count_of(length(rows), "seed"))
+      result <- new_searches(rows, settings, started, interrupted = FALSE)
+      abort_search(cnd$parent %||% cnd, result, call, count_of(length(rows), "seed"))
     }
   )
-  finish(interrupted)
+  new_searches(rows, settings, started, interrupted)
 }
 
-# What is lost of a search that is interrupted is said once, for all of them.
-play_search <- function(vector_env, template, settings, seed, call) {
+# An interrupt of one search ends all of them. The message comes once, for all.
+play_seed <- function(vector_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
-    with_random_seed(seed, play_rounds(vector_env, template, settings, progress = FALSE, call)),
+    with_random_seed(seed, play_search(vector_env, template, settings, progress = FALSE, call)),
     gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd)
   )
 }
@@ -180,7 +181,7 @@ new_searches <- function(rows, settings, started, interrupted) {
   )
 }
 
-#' Estimate the chance of a round, as ?search_repeat tells
+#' Estimate the chance of a round, as `?search_repeat` describes
 #' @noRd
 round_chance <- function(searches) {
   solved <- sum(searches$solved)
@@ -190,31 +191,7 @@ round_chance <- function(searches) {
   list(chance = chance, se = se)
 }
 
-searches_bar <- function(seeds, frame = parent.frame()) {
-  bar <- cli::cli_progress_bar(
-    total = seeds,
-    format = paste(
-      "Search {cli::pb_current} of {cli::pb_total} {cli::pb_bar}",
-      "{cli::pb_extra$solved} solved, {cli::pb_eta_str}"
-    ),
-    extra = list(solved = 0L),
-    .envir = frame
-  )
-  function(finished, solved) {
-    cli::cli_progress_update(
-      id = bar, set = finished, extra = list(solved = solved), .envir = frame
-    )
-  }
-}
-
-inform_searches_interrupted <- function(finished, seeds) {
-  cli::cli_inform(
-    c("!" = "Interrupted after {finished} of {seeds} seed{?s}; what was finished is returned."),
-    class = "gym_message_interrupted"
-  )
-}
-
-# What it says of itself ------------------------------------------------------------
+# Printing and summarising ---------------------------------------------------------
 
 #' @export
 as.data.frame.gym_searches <- function(x, row.names = NULL, optional = FALSE, ...) x$searches

@@ -9,8 +9,8 @@
 #' # What is drawn
 #'
 #' The weights of each round and the seeds of its episodes are drawn from R's generator, so
-#' that [set.seed()] alone fixes the whole search. The policy that is given tells only the sizes
-#' and activations: its own weights are not played, in the first round either, and drawing
+#' that [set.seed()] alone fixes the whole search. Of the policy that is given only the sizes and
+#' activations matter: its own weights are not played, in the first round either, and drawing
 #' them in the call (as the default does) leaves the generator alone.
 #'
 #' # Rounds side by side
@@ -41,13 +41,13 @@
 #'
 #' # To go on after a kill
 #'
-#' With a `checkpoint` the search keeps what it has played in a file, after each block of
-#' episodes (with a single environment made by [gym_make()], where a block is one episode and
+#' With a `checkpoint` the search keeps what it has played in a file, after each batch of
+#' episodes (with a single environment made by [gym_make()], where a batch is one episode and
 #' may be over in milliseconds, as often as takes a tenth of the time at most). The file is
-#' replaced by a rename, so that it is whole whenever R, the server or the machine's queue ends
+#' replaced by a rename, so that it is complete whenever R, the server or the machine's queue ends
 #' the search. The same call then goes on where the file has it, and comes to the result that an
 #' undisturbed search comes to, the generator's state afterwards included: in a script that
-#' is submitted to a cluster again and again, that one line is enough. The block that was under
+#' is submitted to a cluster again and again, that one line is enough. The batch that was under
 #' way is played again. `elapsed` adds up.
 #'
 #' ```r
@@ -105,8 +105,7 @@
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{env}{The environment when an object was given, otherwise `NULL`.}
 #'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
-#'     where
-#'       each episode has a seed of its own. [rollout()] tells how to begin one again.}
+#'       where each episode has a seed of its own. [rollout()] says how to begin one again.}
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps, seed}{`policy`, `rounds`, `max_steps` and `seed` as
 #'       given.}
@@ -142,129 +141,15 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
   settings["env"] <- list(if (!is.character(env)) env)
   settings["seed"] <- list(seed)
-  kept <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
-  if (isTRUE(kept$saved$finished)) {
+  file <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
+  if (isTRUE(file$saved$finished)) {
     client <- if (is_playable(env)) env$client else client
-    return(finished_search(kept$saved, settings, client, kept$path))
+    return(finished_search(file$saved, settings, client, file$path))
   }
   with_vector_env(env, as.numeric(rounds) * episodes, client, function(vector_env) {
     warn_of_own_limit(max_steps, vector_env, call)
     settings <- settings_in(vector_env, settings)
     bound <- policy_bind(policy, vector_env, call = call)
-    with_random_seed(seed, play_rounds(vector_env, bound, settings, progress, call, kept))
+    with_random_seed(seed, play_search(vector_env, bound, settings, progress, call, file))
   })
-}
-
-#' Check what a search is to do
-#'
-#' `policy` must not have been forced: whatever drawing it draws is put back.
-#' @return A list, as [play_rounds()] takes it, but for what the environment says of itself.
-#' @noRd
-search_settings <- function(env, policy, rounds, episodes, target, max_steps,
-                            call = rlang::caller_env()) {
-  check_environment(env, call = call)
-  check_count(rounds, call = call)
-  check_count(episodes, call = call)
-  check_number(target, allow_null = TRUE, call = call)
-  check_count(max_steps, allow_null = TRUE, call = call)
-  keep_random_state(policy_resample(check_policy(policy, call = call), call = call))
-  list(
-    policy = policy, rounds = as.integer(rounds), episodes = as.integer(episodes),
-    target = target, max_steps = max_steps
-  )
-}
-
-settings_in <- function(vector_env, settings) {
-  settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
-  settings["num_envs"] <- list(vector_env$num_envs)
-  settings["client"] <- list(vector_env$client)
-  settings$env_id <- environment_label(vector_env)
-  settings
-}
-
-#' Play rounds until one reaches the target
-#'
-#' An interrupt ends them early, an error does too and carries what was played.
-#' @param checkpoint As [open_checkpoint()] returns it, or `NULL`.
-#' @return A search, as [new_search()] makes it.
-#' @noRd
-play_rounds <- function(vector_env, template, settings, progress, call, checkpoint = NULL) {
-  started <- proc.time()[["elapsed"]]
-  show <- if (progress) progress_bar(settings$rounds) else function(finished, best) NULL
-  record <- new_rounds(settings$rounds, settings$episodes, settings$target, show)
-  if (!is.null(checkpoint)) {
-    saved <- checkpoint$saved
-    if (!is.null(saved)) {
-      settings$policy <- saved$template
-      started <- started - saved$elapsed
-      resume_rounds(record, saved, vector_env, settings, checkpoint$path, call)
-    }
-    keep_rounds(record, checkpoint, vector_env, settings, started, call)
-  }
-  interrupted <- FALSE
-  begin <- function(block, episodes) {
-    list(seeds = vector_env$draw_seeds(), policy = draw_policies(record, template, episodes))
-  }
-  tryCatch(
-    play_episodes(vector_env, record, begin, settings$max_steps),
-    interrupt = function(cnd) {
-      interrupted <<- TRUE
-      inform_interrupted(count_finished(record), settings$rounds)
-    },
-    error = function(cnd) {
-      abort_search(
-        cnd, new_search(record, settings, started), call, checkpoint = checkpoint$path
-      )
-    }
-  )
-  new_search(record, settings, started, interrupted)
-}
-
-progress_bar <- function(rounds, frame = parent.frame()) {
-  bar <- cli::cli_progress_bar(
-    total = rounds,
-    format = paste(
-      "Round {cli::pb_current} of {cli::pb_total} {cli::pb_bar}",
-      "best mean return {cli::pb_extra$best}, {cli::pb_eta_str}"
-    ),
-    extra = list(best = "-"),
-    .envir = frame
-  )
-  function(finished, best) {
-    cli::cli_progress_update(
-      id = bar, set = finished, extra = list(best = number_text(best)), .envir = frame
-    )
-  }
-}
-
-inform_interrupted <- function(finished, rounds) {
-  cli::cli_inform(
-    c("!" = "The search was interrupted after {finished} of {rounds} round{?s};
-             it returns what it has so far."),
-    class = "gym_message_interrupted"
-  )
-}
-
-# Of the error in the middle it keeps classes and fields, so that whoever waits for
-# a lost connection need not know that it was lost in a search.
-abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds), "round"),
-                         checkpoint = NULL) {
-  own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
-           "use_cli_format")
-  fields <- unclass(cnd)[setdiff(names(cnd), own)]
-  rlang::exec(
-    gym_abort,
-    c(
-      paste0("The search ended early, after ", played, "."),
-      i = "What was played is the element `result` of this condition.",
-      i = if (!is.null(checkpoint)) {
-        paste0("The same call goes on from \"", checkpoint, "\" when what is wrong is mended.")
-      }
-    ),
-    class = c("gym_error_search", grep("^gym_error_", class(cnd), value = TRUE)),
-    result = result,
-    !!!fields,
-    parent = cnd,
-    call = call
-  )
 }

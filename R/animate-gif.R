@@ -1,5 +1,5 @@
-# A GIF file, put together picture by picture: of each only the part that differs from
-# the one before. ImageMagick can write a whole animation, too, but takes all of its
+# Writes a GIF file picture by picture: of each only the part that differs from the one before.
+# ImageMagick can write a whole animation, too, but takes all of its
 # pictures unpacked for that: a gigabyte for an episode of CartPole, half a minute, and
 # more than many systems allow it.
 #
@@ -58,7 +58,7 @@ crop_image <- function(image, part) {
   )
 }
 
-# The size of the whole, no colours of its own, and to be repeated forever.
+# The size of the pictures, no colour table for all of them, and the instruction to repeat forever.
 gif_header <- function(size) {
   c(
     charToRaw("GIF89a"), two_bytes(size), as.raw(c(0x70, 0, 0)),
@@ -67,8 +67,8 @@ gif_header <- function(size) {
 }
 
 #' Make one picture of an animation
-#' @param image What changed.
-#' @param part Where it belongs.
+#' @param image The part of the picture that changed.
+#' @param part Where it belongs, as [changed_part()] returns it.
 #' @return A raw vector: how long it is shown (over the pictures before, which stay), its
 #'   place, its colours, its pixels.
 #' @noRd
@@ -87,7 +87,7 @@ gif_picture <- function(image, part, delay) {
 #' @noRd
 gif_parts <- function(gif) {
   number <- function(at) as.integer(gif[[at]])
-  # A flag, and the binary logarithm of the length less one.
+  # The flags say whether there is a table, and the binary logarithm of its length minus one.
   table_at <- function(flags, at) {
     if (number(flags) >= 0x80) seq(at, length.out = 3 * 2^(number(flags) %% 8 + 1))
   }
@@ -104,7 +104,7 @@ gif_parts <- function(gif) {
   )
 }
 
-# Blocks begin with their length; one without any is the last.
+# In a GIF file, data are blocks that begin with their length; a block of length 0 is the last.
 end_of_blocks <- function(number, at) {
   while (number(at) > 0L) at <- at + number(at) + 1L
   at + 1L

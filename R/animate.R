@@ -86,7 +86,27 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
 #' @export
 animate.function <- animate.gym_policy
 
-# All that can be wrong is known before an episode is played.
+# gganimate has a generic function of the same name. Whichever of the two packages was attached
+# last, `animate()` finds these methods. They are registered when gganimate is loaded, so that it
+# need not be installed.
+register_with_gganimate <- function() {
+  if (isNamespaceLoaded("gganimate")) {
+    register_animate(asNamespace("gganimate"))
+  }
+  setHook(
+    packageEvent("gganimate", "onLoad"),
+    function(...) register_animate(asNamespace("gganimate"))
+  )
+}
+
+# `home`: the environment of the generic function.
+register_animate <- function(home) {
+  registerS3method("animate", "gym_rollout", animate.gym_rollout, envir = home)
+  registerS3method("animate", "gym_search", animate.gym_search, envir = home)
+  registerS3method("animate", "gym_policy", animate.gym_policy, envir = home)
+}
+
+# Everything that can be wrong is checked before an episode is played.
 check_animation <- function(file, fps, width, every, call = rlang::caller_env()) {
   check_number(fps, min = 0.1, allow_null = TRUE, call = call)
   check_count(width, max = 65535, allow_null = TRUE, call = call)
@@ -118,16 +138,16 @@ episode_frames <- function(x, episode, call = rlang::caller_env()) {
 
 new_animation <- function(frames, file, fps, width, every) {
   plan <- animation_plan(length(frames), fps %||% frame_rate(frames), every)
-  # Whoever interrupts it keeps the file that was there before.
-  made <- tempfile(fileext = ".gif")
-  write_gif(unclass(frames)[plan$steps + 1L], made, plan$delays, width)
-  size <- gif_size(made)
+  # An interrupt leaves a file that was there before as it was.
+  written <- tempfile(fileext = ".gif")
+  write_gif(unclass(frames)[plan$steps + 1L], written, plan$delays, width)
+  size <- gif_size(written)
   if (!is.null(file)) {
-    copy_animation(made, file)
+    move_animation(written, file)
   }
   structure(
     list(
-      file = file %||% made,
+      file = file %||% written,
       steps = plan$steps,
       delays = plan$delays,
       size = size,
@@ -137,7 +157,7 @@ new_animation <- function(frames, file, fps, width, every) {
   )
 }
 
-# What an environment says of itself may be anything.
+# The environment's own metadata, which may be anything, says how many frames make a second.
 frame_rate <- function(frames) {
   fps <- attr(frames, "fps")
   if (is_number(fps) && fps > 0) fps else 30
@@ -146,7 +166,7 @@ frame_rate <- function(frames) {
 #' Plan which frames to show, and for how long
 #' @param n How many frames there are.
 #' @return A list: `steps`, after which the frames were taken, and `delays`, in hundredths of
-#'   a second. Their rounding does not add up.
+#'   a second, rounded so that their errors do not add up.
 #' @noRd
 animation_plan <- function(n, fps, every = NULL) {
   every <- shown_every(every, fps)
@@ -155,10 +175,10 @@ animation_plan <- function(n, fps, every = NULL) {
   list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest_fps), 65535)))
 }
 
-# Browsers slow down what is faster.
+# Browsers slow down animations with more frames a second.
 fastest_fps <- 50
 
-# At least so many that the pace can be kept.
+# Every how many frames one is shown: at least so many that the pace can be kept.
 shown_every <- function(every, fps) {
   least <- max(1, ceiling(fps / fastest_fps))
   if (!is.null(every) && every < least) {
@@ -172,11 +192,11 @@ shown_every <- function(every, fps) {
   max(every, least)
 }
 
-copy_animation <- function(made, file, call = rlang::caller_env(2)) {
-  if (!suppressWarnings(file.copy(made, file, overwrite = TRUE))) {
+move_animation <- function(written, file, call = rlang::caller_env(2)) {
+  if (!suppressWarnings(file.copy(written, file, overwrite = TRUE))) {
     abort_argument(file, "a file that can be written", "file", call)
   }
-  unlink(made)
+  unlink(written)
 }
 
 gif_size <- function(file) {
@@ -196,7 +216,7 @@ print.gym_animation <- function(x, ...) {
   invisible(x)
 }
 
-# RStudio's viewer shows no others.
+# RStudio's viewer shows only files below the session's temporary directory.
 among_temporary_files <- function(file) {
   folders <- paste0(normalizePath(c(dirname(file), tempdir()), "/"), "/")
   if (startsWith(folders[[1L]], folders[[2L]])) {
@@ -219,7 +239,8 @@ format.gym_animation <- function(x, ...) {
   )
 }
 
-# knitr's name for the file, in the folder of the document's figures. LaTeX knows no GIF.
+# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show a
+# GIF, so there it is a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
   hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)

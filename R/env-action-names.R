@@ -27,7 +27,7 @@ action_meaning <- function(env_id, n = NULL) {
   if (is.null(n) || length(meaning) == n) meaning
 }
 
-# CartPole of CartPole-v1.
+# "CartPole" for "CartPole-v1".
 environment_family <- function(env_id) sub("-v[0-9]+$", "", env_id %||% "")
 
 #' Name the actions of an environment

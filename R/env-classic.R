@@ -1,4 +1,4 @@
-# The classic calls, one a route of the server.
+# The classic calls: one function for each route of the server.
 
 #' Create an environment on a server
 #'
@@ -10,18 +10,18 @@
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
 #'   [gym_wrap()] made of one. [env_registry()] lists the ids.
 #' @param seed Seed of the first reset that is given none, and of the sampling
-#'   of actions: a whole number of at least 0, `NULL` for a random one. For an
-#'   environment with sub-environments also one for each of them, see [env_reset()].
+#'   of actions: a whole number of at least 0, `NULL` for a random one. For a vector
+#'   environment also one for each sub-environment, see [env_reset()].
 #' @param render_mode `"rgb_array"` for pictures, or `"human"` for an environment that
 #'   people want to see: the same pictures, and its page opens, on which it moves in real
 #'   time, see [env_watch()]. `NULL`, the default, takes pictures where the environment
 #'   can draw them. They are drawn only when [env_render()] asks for them or while
 #'   somebody watches.
-#' @param num_envs How many sub-environments the environment is to have, a whole number of at
-#'   least 1: copies that are reset and stepped together, each with a row of its own
-#'   in observations and actions, also when there is but one. The server sets a limit,
-#'   16,384 unless it was started with another. `NULL`, the default, makes a single
-#'   environment, without sub-environments.
+#' @param num_envs Makes a vector environment with so many sub-environments, a whole number of
+#'   at least 1: copies of the environment that are reset and stepped together, each with a row
+#'   of its own in observations and actions, also when there is only one. The server sets a
+#'   limit, 16,384 unless it was started with another. `NULL`, the default, makes a single
+#'   environment.
 #' @param kwargs A named list of further arguments for the environment, such as
 #'   `list(gravity = -5)` for LunarLander or `list(map_name = "8x8")` for
 #'   FrozenLake. `list(max_episode_steps = 1000)` sets another limit of steps for any
@@ -60,8 +60,8 @@
 #'   (code `call_too_long`);
 #'   `gym_error_argument`; `gym_error_connection`.
 #'
-#'   The server gives an environment up on which a call takes too long, and closes one
-#'   that nobody has used or watched for a day, unless it was started with other limits
+#'   The server evicts an environment on which a call takes too long, and one that nobody
+#'   has used or watched for a day, unless it was started with other limits
 #'   (`max_call_seconds` and `idle_minutes` of [gym_server_start()]). Every later call
 #'   then says so: `gym_error_http_504` with code `call_too_long`, `gym_error_http_410`
 #'   with code `instance_idle_closed`.
@@ -73,16 +73,16 @@
 #' env_close(client, instance_id)
 #'
 #' # Three poles at once, each with its seed.
-#' sub-environments <- env_create(client, "CartPole-v1", seed = 1:3, num_envs = 3)
-#' env_reset(client, sub-environments)
-#' env_step(client, sub-environments, c(1, 0, 1))$reward
-#' env_close(client, sub-environments)
+#' three <- env_create(client, "CartPole-v1", seed = 1:3, num_envs = 3)
+#' env_reset(client, three)
+#' env_step(client, three, c(1, 0, 1))$reward
+#' env_close(client, three)
 env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NULL,
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
                        autoreset_mode = NULL, name = NULL) {
   check_client(x)
   check_named_list(kwargs)
-  create_instance(
+  create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
     name
   )
@@ -90,7 +90,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
 
 #' List the environments running on a server
 #'
-#' [env_list()] tells more of each; [env_registry()] lists those that could be made.
+#' [env_list()] says more of each; [env_registry()] lists those that could be made.
 #'
 #' @inheritParams env_create
 #' @return A named list: instance id to environment id, both strings. It holds
@@ -114,31 +114,30 @@ env_list_all <- function(x) {
 #' @inheritParams env_create
 #' @param instance_id An instance's id, as [env_create()] returns it.
 #' @param seed Seed of the environment and of the sampling of actions: a whole
-#'   number of at least 0; `NULL` goes on with the generator as it is. With sub-environments
-#'   one number is for all: each sub-environment gets it plus the number of sub-environments before
-#'   it, or where the environment's own implementation has one generator for all sub-environments,
-#'   that gets it. Or one number for each sub-environment, `NA` for a sub-environment whose
-#'   generator goes on as it is.
+#'   number of at least 0; `NULL` goes on with the generator as it is. In a vector environment
+#'   one number is for all: the first sub-environment gets it, the second gets it plus 1, and so
+#'   on; where the environment's own implementation has one generator for all of them, that gets
+#'   it. Or give one number for each sub-environment, `NA` where its generator goes on as it is.
 #' @param options A named list of options for the environment's reset, such as
 #'   `list(low = -0.1, high = 0.1)` for CartPole.
-#' @param return_info Whether to return what the environment tells besides, too:
-#'   `TRUE` or `FALSE`, the default.
-#' @param mask For an environment with sub-environments: which of them to reset, a logical
-#'   vector with an element for each sub-environment, at least one of them `TRUE`. `NULL`, the
-#'   default, resets all. An environment's own vector implementation knows no masks:
-#'   make it with `vectorization_mode = "sync"`.
+#' @param return_info Whether to return the environment's info, too: `TRUE` or `FALSE`, the
+#'   default.
+#' @param mask For a vector environment: which sub-environments to reset, a logical vector with
+#'   an element for each of them, at least one of them `TRUE`. `NULL`, the default, resets all.
+#'   An environment's own vector implementation takes no mask: make it with
+#'   `vectorization_mode = "sync"`.
 #' @return The first observation, in the form of the observation space: a
 #'   numeric vector for a Box of one dimension, an array for one of more, an
 #'   integer for Discrete; [space_sample()] lists all kinds. With
 #'   `return_info = TRUE` a list of `observation` and `info`.
 #'
-#'   With sub-environments, the observations of all sub-environments, the sub-environment first: a
-#'   matrix with a row a sub-environment for a Box of one dimension, an array with the
-#'   sub-environment as its first dimension for one of more, a vector with an element a
-#'   sub-environment for Discrete and Text, for Tuple and Dict a list in which each part has this
-#'   form, and for Sequence, Graph and OneOf a list with an element a sub-environment. Numbers are
-#'   integer where those of all sub-environments fit. In an info each element has an entry a
-#'   sub-environment in the same way, `NA` (in a list `NULL`) for a sub-environment that told none.
+#'   In a vector environment the observations of all sub-environments together: for a Box of one
+#'   dimension a matrix with a row for each sub-environment, for a Box of more an array whose first
+#'   dimension counts the sub-environments, for Discrete and Text a vector with an element for
+#'   each, for Tuple and Dict a list in which each part has this form, and for Sequence, Graph and
+#'   OneOf a list with an element for each. Numbers are integer where those of all sub-environments
+#'   fit. In the info, too, each element has an entry for each sub-environment, `NA` (in a list
+#'   `NULL`) for one that has no value.
 #'
 #'   An `info` is a list with names. It travels without types: an array of plain
 #'   values of one kind becomes a vector, an array of equally long arrays a matrix
@@ -149,8 +148,8 @@ env_list_all <- function(x) {
 #'   `not_supported` for a `mask` or a seed for each sub-environment where the environment's own
 #'   implementation cannot do that (`"sync"` can); `gym_error_http_500` for an error
 #'   inside the environment; `gym_error_argument`, also for a `mask` or `seed` whose
-#'   length is not the number of sub-environments; `gym_error_connection`. No sub-environment has
-#'   moved, except perhaps after an error inside an environment.
+#'   length is not the number of sub-environments; `gym_error_connection`. Nothing has moved,
+#'   except perhaps after an error inside an environment.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -170,43 +169,45 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' last step of an episode the environment wants [env_reset()]; stepping on is
 #' left to the environment and warned of once an episode.
 #'
-#' With sub-environments it takes an action for each of them, and moves each on. What becomes of
-#' a sub-environment whose episode has ended is a matter of `autoreset_mode`, see [env_create()]: by
+#' In a vector environment it takes an action for each sub-environment, and moves each on. What
+#' becomes of one whose episode has ended depends on `autoreset_mode`, see [env_create()]: by
 #' default, `"NextStep"`, this step resets it, takes no action in it and returns its new first
 #' observation, the reward 0 and neither `terminated` nor `truncated`.
 #'
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete, a
 #'   numeric vector or array for Box; [space_sample()] has the table of all kinds.
-#'   With sub-environments one for each, in the form in which [env_reset()] gives observations:
-#'   a vector for Discrete, a matrix with a row a sub-environment for a Box of one dimension.
+#'   In a vector environment one for each sub-environment, in the form in which [env_reset()]
+#'   returns observations: a vector for Discrete, for a Box of one dimension a matrix with a row
+#'   for each.
 #' @param render Whether people want to see it: `TRUE` or `FALSE`, the default. The first
 #'   `TRUE` opens the environment's page, see [env_watch()], and while somebody watches
 #'   there each such step waits for real time. [env_render()] fetches a picture.
-#' @param which For an environment with sub-environments: the numbers of those that are
-#'   to step, counted from 1 and in increasing order; `action` and what is returned then have
-#'   rows for these alone. `NULL`, the default, steps all. Needs `"sync"`.
+#' @param which For a vector environment: the numbers of the sub-environments that are to step,
+#'   counted from 1 and in increasing order; `action` and what is returned then have rows for
+#'   these alone. `NULL`, the default, steps all. Needs `vectorization_mode = "sync"`.
 #' @return A list of
 #'   * `observation`, as from [env_reset()],
 #'   * `reward`, a number,
 #'   * `done`, whether the episode has ended: `terminated || truncated`,
-#'   * `info`, a list of what the environment tells besides, see [env_reset()],
+#'   * `info`, a list of further information from the environment, see [env_reset()],
 #'   * `terminated`, whether the episode ended by the environment's own rules,
 #'   * `truncated`, whether it was cut off, such as by its limit of steps.
 #'
-#'   With sub-environments, `reward` is a numeric vector and `done`, `terminated` and `truncated`
+#'   In a vector environment `reward` is a numeric vector and `done`, `terminated` and `truncated`
 #'   are logical vectors, with an element for each sub-environment that stepped. With autoreset
-#'   mode `"SameStep"` the info has, when a sub-environment has ended, `final_obs`: a list with
-#'   the last observation of each sub-environment that ended, `NULL` for the others.
+#'   mode `"SameStep"` the info has, when an episode has ended, `final_obs`: a list with the last
+#'   observation of each sub-environment whose episode ended, `NULL` for the others.
 #' @section Errors: `gym_error_space` for an action that does not fit the action
 #'   space, the environment has not moved then; a Box action outside of the bounds goes to
-#'   the environment, as in Gymnasium, and most clip it. With sub-environments also for a wrong
+#'   the environment, as in Gymnasium, and most clip it. In a vector environment also for a wrong
 #'   number of actions, and the message names the sub-environment whose action does not fit: by its
 #'   number from 1, or where the server refuses it by its index from 0, such as `[2]` for the
-#'   third. `gym_error_argument` for `which` that are none. `gym_error_http_400` with
-#'   code `reset_needed` before the first reset, or when a sub-environment that is to step has
-#'   ended and `autoreset_mode` is `"Disabled"` (the message counts sub-environments from 0), and
-#'   with code `not_supported` for `which` where only all can step;
+#'   third. `gym_error_argument` for a `which` that picks no sub-environments. `gym_error_http_400`
+#'   with code `reset_needed` before the first reset, or when the episode of a sub-environment that
+#'   is to step has ended and `autoreset_mode` is `"Disabled"` (the message counts
+#'   sub-environments from 0), and with code `not_supported` for `which` where all must step
+#'   together;
 #'   `gym_error_http_500` for an error inside the environment; `gym_error_connection`.
 #' @section Warnings: `gym_warning_step_after_done`.
 #' @export
@@ -217,117 +218,18 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' str(env_step(client, instance_id, 1))
 #' env_close(client, instance_id)
 #'
-#' sub-environments <- env_create(client, "CartPole-v1", num_envs = 3, vectorization_mode = "sync")
-#' env_reset(client, sub-environments, seed = 1)
-#' str(env_step(client, sub-environments, c(1, 0, 1)))
-#' env_step(client, sub-environments, c(0, 1), sub-environments = c(1, 3))$observation
-#' env_close(client, sub-environments)
+#' three <- env_create(client, "CartPole-v1", num_envs = 3, vectorization_mode = "sync")
+#' env_reset(client, three, seed = 1)
+#' str(env_step(client, three, c(1, 0, 1)))
+#' env_step(client, three, c(0, 1), which = c(1, 3))$observation
+#' env_close(client, three)
 env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
   check_flag(render)
-  step_instance(x, known_instance(x, instance_id), action, render, which)
-}
-
-#' Ask for an environment's spaces
-#'
-#' `env_action_space_info()` tells which actions an environment takes,
-#' `env_observation_space_info()` which observations it gives.
-#'
-#' @inheritParams env_reset
-#' @return A space: a list with the element `name` and, for Discrete, `n` (the
-#'   number of values) and `start` (the first of them), for Box, `shape`,
-#'   `dtype`, `low` and `high`, the bounds row by row, which may be infinite;
-#'   for the other kinds see [space_sample()]. With sub-environments it is the space of the values
-#'   of all sub-environments, the sub-environment as the first dimension: a Box of shape 4 becomes
-#'   one of shape `c(n, 4)`, Discrete a MultiDiscrete of shape `n`, Tuple and Dict have such
-#'   parts, and the others become a Tuple with a space for each sub-environment.
-#' @section Errors: `gym_error_http_400` for an unknown instance,
-#'   `gym_error_connection`.
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' client <- gym_client()
-#' instance_id <- env_create(client, "CartPole-v1")
-#' env_action_space_info(client, instance_id)
-#' env_observation_space_info(client, instance_id)$high
-#' env_close(client, instance_id)
-env_action_space_info <- function(x, instance_id) {
-  instance_space(known_instance(x, instance_id), "action_space")
-}
-
-#' @rdname env_action_space_info
-#' @export
-env_observation_space_info <- function(x, instance_id) {
-  instance_space(known_instance(x, instance_id), "observation_space")
-}
-
-#' Draw a random action
-#'
-#' Draws from the environment's action space on the server, whose generator is
-#' seeded together with the environment.
-#'
-#' @inheritParams env_reset
-#' @return An action that [env_step()] takes: a whole number for Discrete, a numeric
-#'   vector or array for Box; [space_sample()] has the table of all kinds. With sub-environments
-#'   an action for each.
-#' @inheritSection env_action_space_info Errors
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' client <- gym_client()
-#' instance_id <- env_create(client, "CartPole-v1", seed = 1)
-#' env_action_space_sample(client, instance_id)
-#' env_close(client, instance_id)
-env_action_space_sample <- function(x, instance_id) {
   instance <- known_instance(x, instance_id)
-  answer <- get_answer(x, paste0(instance$route, "action_space/sample"))
-  read_values(decode_sample(instance, answer$action), "Its `action`")
-}
-
-#' Ask whether a value belongs to a space
-#'
-#' @inheritParams env_reset
-#' @param action,observation The value to look at: anything that could be an
-#'   action or an observation.
-#' @return `TRUE` or `FALSE`.
-#' @inheritSection env_action_space_info Errors
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' client <- gym_client()
-#' instance_id <- env_create(client, "CartPole-v1")
-#' env_action_space_contains(client, instance_id, 1)
-#' env_action_space_contains(client, instance_id, 2)
-#' env_observation_space_contains(client, instance_id, c(0, 0, 0, 0))
-#' env_close(client, instance_id)
-env_action_space_contains <- function(x, instance_id, action) {
-  instance_contains(x, instance_id, "action_space", action)
-}
-
-#' @rdname env_action_space_contains
-#' @export
-env_observation_space_contains <- function(x, instance_id, observation) {
-  instance_contains(x, instance_id, "observation_space", observation)
-}
-
-instance_contains <- function(x, instance_id, which, value, call = rlang::caller_env()) {
-  instance <- known_instance(x, instance_id, call = call)
-  single <- instance[[paste0("single_", which)]]
-  num_envs <- instance$num_envs
-  space <- sub_envs_space(single, num_envs)
-  if (instance$classic) {
-    return(fits_space(space, value, bounds = TRUE))
+  if (render && !instance$classic) {
+    watch_once(x, instance)
   }
-  if (!fits_space(space, value)) {
-    return(FALSE)
-  }
-  json <- if (is.null(num_envs)) {
-    write_value(space, value)
-  } else {
-    write_sub_envs(single, value, num_envs)
-  }
-  fields <- c(value = json)
-  answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
-  if (!is_flag(answer$member)) {
-    refuse_field(answer$member, "member", "true or false")
-  }
-  answer$member
+  step_instance(x, instance, action, render, which)
 }
 
 #' Close an environment
@@ -390,7 +292,7 @@ upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
 shutdown_server <- function(x) {
   check_client(x)
   response <- send(x, "/v1/shutdown/", character())
-  # The original server says so in words, not in JSON.
+  # The original server answers with plain text instead of JSON.
   if (response$status_code != 200L) {
     read_answer(response, "POST")
   }

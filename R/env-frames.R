@@ -1,5 +1,5 @@
-# The frames of an episode, as rollout(frames = TRUE) keeps them: PNG files, as a frame
-# of CartPole takes 3 MB as numbers and 3 kB so.
+# The frames of an episode, as rollout(frames = TRUE) keeps them: as PNG files, because a frame of
+# CartPole takes 3 MB as numbers and 3 kB as a PNG file.
 
 #' Make the frames of an episode
 #' @param files A list of PNG files, each a raw vector.
@@ -9,10 +9,6 @@
 #' @noRd
 new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
-}
-
-frames_of <- function(record, vector_env) {
-  lapply(record$blocks, function(block) new_frames(block$frames, vector_env$spec$render_fps))
 }
 
 #' @export
@@ -37,7 +33,7 @@ format.gym_frames <- function(x, ...) {
 
 # Pictures from the server --------------------------------------------------------
 
-# Whether it can is known before anything is played.
+# Checks before anything is played whether the environment can be drawn.
 check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {

@@ -1,6 +1,6 @@
-# The environments on a server, as a client knows them.
+# The instances of environments on a server, as a client knows them.
 
-create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
+create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
                             call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
@@ -11,8 +11,8 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
-  check_sub_env_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
-  check_sub_env_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_vector_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
+  check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
@@ -25,60 +25,57 @@ create_instance <- function(x, env_id, seed, render_mode, kwargs, wrappers, num_
     wrappers = if (length(wrappers)) wrappers_json(wrappers),
     name = if (!is.null(name)) json_string(name)
   )
-  for_eyes <- identical(render_mode, "human")
-  if (for_eyes) {
+  if (identical(render_mode, "human")) {
     check_viewer(call)
   }
-  close_queued(x)
-  instance_id <- create_on_server(x, fields, call)
-  if (isTRUE(client_state(x)$classic)) {
+  close_queued(client)
+  instance_id <- create_on_server(client, fields, call)
+  if (isTRUE(client_state(client)$classic)) {
     withCallingHandlers(
-      check_classic_fields(x, fields, c("env_id", "seed"), call),
-      gym_error = function(cnd) close_if_there(x, instance_id, call)
+      check_classic_fields(client, fields, c("env_id", "seed"), call),
+      gym_error = function(cnd) close_if_there(client, instance_id, call)
     )
-  }
-  if (for_eyes) {
-    show_instance(x, known_instance(x, instance_id, call), call)
   }
   instance_id
 }
 
-close_instance <- function(x, instance_id, call = rlang::caller_env()) {
-  post_once(x, paste0(instance_route(instance_id), "close/"), call = call)
-  forget_instance(instance_place(x, instance_id))
-  instances <- client_state(x)$instances
+close_instance <- function(client, instance_id, call = rlang::caller_env()) {
+  post_once(client, paste0(instance_route(instance_id), "close/"), call = call)
+  forget_instance(instance_place(client, instance_id))
+  instances <- client_state(client)$instances
   if (!is.null(instances[[instance_id]])) {
     rm(list = instance_id, envir = instances)
   }
 }
 
-# As close_instance(), for an instance that may be gone already.
-close_if_there <- function(x, instance_id, call = rlang::caller_env()) {
+# Closes an instance that may be gone already.
+close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
   tryCatch(
-    close_instance(x, instance_id, call),
+    close_instance(client, instance_id, call),
     gym_error_http = function(cnd) {
       if (!isTRUE(cnd$code %in% gone_codes)) rlang::cnd_signal(cnd)
-      forget_instance(instance_place(x, instance_id))
+      forget_instance(instance_place(client, instance_id))
     }
   )
 }
 
-# By which the server says that an instance is gone, be it by its owner's doing or not.
+# The codes of errors that say that an instance is gone, whether it was closed or evicted.
 gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "environment_died")
 
-# What the client knows of an instance; asked of the server once.
-known_instance <- function(x, instance_id, call = rlang::caller_env()) {
-  check_client(x, call = call)
+# What the client knows of an instance. The server is asked once.
+known_instance <- function(client, instance_id, call = rlang::caller_env()) {
+  check_client(client, "x", call)
   check_string(instance_id, call = call)
-  instances <- client_state(x)$instances
-  instances[[instance_id]] %||% (instances[[instance_id]] <- ask_instance(x, instance_id, call))
+  instances <- client_state(client)$instances
+  instances[[instance_id]] %||%
+    (instances[[instance_id]] <- ask_instance(client, instance_id, call))
 }
 
-ask_instance <- function(x, instance_id, call) {
+ask_instance <- function(client, instance_id, call) {
   route <- instance_route(instance_id)
   answer <- tryCatch(
-    get_answer(x, route, call = call),
-    gym_error_http_404 = function(cnd) classic_description(x, instance_id, cnd, call)
+    get_answer(client, route, call = call),
+    gym_error_http_404 = function(cnd) classic_description(client, instance_id, cnd, call)
   )
   check_about(answer)
   instance <- new.env(parent = emptyenv())
@@ -95,8 +92,8 @@ ask_instance <- function(x, instance_id, call) {
   instance$single_observation_space <- read_values(
     space_of(answer$observation_space), "Its `observation_space`"
   )
-  instance$actions <- sub_envs_space(instance$single_action_space, answer$num_envs)
-  instance$observations <- sub_envs_space(instance$single_observation_space, answer$num_envs)
+  instance$actions <- sent_space(instance$single_action_space, answer$num_envs)
+  instance$observations <- sent_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
   instance$takes_tensors <- as_tensors(instance$single_observation_space)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
@@ -106,7 +103,7 @@ ask_instance <- function(x, instance_id, call) {
       number_from(answer$reward_threshold, "reward_threshold")
     },
     max_episode_steps = answer$max_episode_steps,
-    # An environment's own word, which may be anything.
+    # The environment's own metadata may be anything.
     render_fps = if (is_number(answer$render_fps)) answer$render_fps
   )
   instance$draws <- !is.null(answer$render_mode)
@@ -114,7 +111,8 @@ ask_instance <- function(x, instance_id, call) {
   instance
 }
 
-# Made only for those who ask: the bounds of thousands of pictures take their space.
+# The space of all sub-environments together is made only when it is asked for: the bounds of
+# thousands of pictures take much memory.
 instance_space <- function(instance, which = c("action_space", "observation_space")) {
   if (is.null(instance$num_envs)) {
     return(instance[[paste0("single_", which)]])
@@ -126,20 +124,20 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
   )
 }
 
-reset_instance <- function(x, instance, seed, options, return_info = FALSE, mask = NULL,
+reset_instance <- function(client, instance, seed, options, return_info = FALSE, mask = NULL,
                            call = rlang::caller_env()) {
   check_mask(mask, instance, call)
-  close_queued(x)
+  close_queued(client)
   fields <- c(
     seed = encode_seed(seed, instance$num_envs, call),
     options = encode_options(options, call),
     reset_mask = if (!is.null(mask)) to_json(I(mask))
   )
   if (instance$classic) {
-    check_classic_fields(x, fields, NULL, call)
+    check_classic_fields(client, fields, NULL, call)
   }
   answer <- post_once(
-    x, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
+    client, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
   )
   instance$done <- FALSE
   check_answer_info(answer)
@@ -170,19 +168,17 @@ info_from <- function(instance, answer) {
   }
 }
 
-step_instance <- function(x, instance, action, render, which = NULL, call = rlang::caller_env()) {
-  if (render && !instance$classic) {
-    show_instance(x, instance, call)
-  }
+step_instance <- function(client, instance, action, render, which = NULL,
+                          call = rlang::caller_env()) {
   fields <- c(render = if (render) "true" else "false")
   if (!is.null(which) || !is.null(instance$num_envs)) {
-    return(step_sub_envs(x, instance, action, fields, which, call))
+    return(step_vector_env(client, instance, action, fields, which, call))
   }
   space <- instance$actions
-  # A classic server says no more of a wrong action than that something went wrong.
+  # A classic server's error does not say that an action was wrong, so bounds are checked here.
   bounds <- instance$classic && inherits(space, "gym_space_discrete")
   check_value(space, action, "", call, bounds)
-  answer <- send_action(x, instance, space, action, write_value(space, action), fields, call)
+  answer <- send_action(client, instance, space, action, write_value(space, action), fields, call)
   if (!is.null(answer$tensors)) {
     answer[c("reward", "terminated", "truncated")] <-
       answer$tensors[c("reward", "terminated", "truncated")]
@@ -208,12 +204,12 @@ step_instance <- function(x, instance, action, render, which = NULL, call = rlan
   )
 }
 
-# `json` is the action as JSON, written only if it travels so.
-send_action <- function(x, instance, space, action, json, fields, call) {
+# `json` is the action as JSON, a promise that is evaluated only if the action is sent so.
+send_action <- function(client, instance, space, action, json, fields, call) {
   route <- instance$step_route
   if (!instance$sends_tensors) {
     fields <- c(action = json, fields)
-    return(post_once(x, route, fields, take_tensors = instance$takes_tensors, call = call))
+    return(post_once(client, route, fields, take_tensors = instance$takes_tensors, call = call))
   }
   tensors <- to_tensors(space, action, "action", call)
   texts <- vapply(tensors, is.character, NA)
@@ -221,11 +217,11 @@ send_action <- function(x, instance, space, action, json, fields, call) {
     fields <- c(fields, texts = to_json(tensors[texts]))
     tensors <- tensors[!texts]
   }
-  post_once(x, route, fields, tensors = tensors, take_tensors = TRUE, call = call)
+  post_once(client, route, fields, tensors = tensors, take_tensors = TRUE, call = call)
 }
 
 warn_step_after_done <- function(instance, call) {
-  # NA: done, and said so.
+  # NA: the episode is over, and the warning has been given.
   instance$done <- NA
   rlang::warn(
     c(
@@ -238,8 +234,7 @@ warn_step_after_done <- function(instance, call) {
   )
 }
 
-# One for all, or for a vector environment one for each sub-environment, NA for a sub-environment
-# without.
+# One seed for all, or in a vector environment one for each sub-environment, NA for none.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)

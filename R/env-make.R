@@ -1,5 +1,3 @@
-# Environments as objects.
-
 #' Make an environment
 #'
 #' Makes an environment that is played with `$reset()` and `$step()`, as
@@ -10,11 +8,11 @@
 #' thrown away, or at the session's end: keep the object for as long as the environment is
 #' played.
 #'
-#' With `num_envs` it has sub-environments: copies of the environment that are reset and stepped
-#' together, with one call for all of them. Observations then have a row a sub-environment, and so
-#' have actions; [env_reset()] and [env_step()] tell the forms of all kinds. An
-#' environment's own implementation of sub-environments may be another game than the single one
-#' in details, such as the size of the Atari games' pictures.
+#' With `num_envs` it is a vector environment: it has sub-environments, copies of the environment
+#' that are reset and stepped together, with one call for all of them. Observations and actions then
+#' have a row for each sub-environment; [env_reset()] and [env_step()] describe their forms. An
+#' environment's own vector implementation may differ from the single environment in details, such
+#' as the size of the Atari games' pictures.
 #'
 #' # After an episode's end
 #'
@@ -22,7 +20,7 @@
 #' `num_envs` `autoreset_mode` says what becomes of a sub-environment that has ended while the
 #' others play on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken,
 #' its observation is the first of the new episode, its reward is 0, and neither `terminated` nor
-#' `truncated` is set. Whoever sums rewards or counts steps leaves that step out, as [rollout()]
+#' `truncated` is set. Leave that step out when you sum rewards or count steps, as [rollout()]
 #' does. With `"SameStep"` the step that ends an episode already returns the first observation of
 #' the next one, with `"Disabled"` `$reset(mask = )` does it.
 #'
@@ -42,10 +40,10 @@
 #'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
 #'   * `$action_space`, `$observation_space`: the spaces, as
 #'     [env_action_space_info()],
-#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; without
-#'     sub-environments the same,
+#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
+#'     single environment the same,
 #'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many sub-environments there are
-#'     and what was chosen for them, see [env_create()]; `NULL` without sub-environments,
+#'     and what was chosen for them, see [env_create()]; `NULL` in a single environment,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
 #'     the latter three `NULL` where the environment has none,
@@ -88,14 +86,14 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
-  # No interrupt comes between the instance and its name.
   create <- function(call) {
-    create_instance(
+    create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
-      autoreset_mode, name, call
+      autoreset_mode, name, call = call
     )
   }
   call <- rlang::current_env()
+  # No interrupt may come between creating the instance and keeping its id.
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create(call),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
@@ -104,7 +102,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   env
 }
 
-# In R's words, where the environment has been given an argument that it does not have.
+# Explains in R's terms an error about an argument that the environment does not have.
 explain_unknown_argument <- function(cnd, given, call) {
   pattern <- "unexpected keyword argument '([^']+)'"
   name <- regmatches(cnd$message, regexec(pattern, cnd$message))[[1L]][2L]
@@ -193,7 +191,7 @@ gym_env <- R6Class(
   ),
   private = list(
     instance = NULL,
-    # The client; each step asks for it, and `private$` costs less than `self$`.
+    # The client. Each step reads it, and `private$` costs less than `self$`.
     connected = NULL,
     pid = NULL,
     closed = FALSE,
@@ -207,9 +205,9 @@ gym_env <- R6Class(
   )
 )
 
-# A name that is none is an error: R's own `$` gives NULL, and "attempt to apply non-function" if
-# that is called. `[[` asks without an error. Every step comes through here: no call that is not
-# needed.
+# A name that an environment does not have is an error. (R's own `$` gives NULL, and calling that
+# fails with "attempt to apply non-function".) `[[` gives NULL. Every step calls this method, so it
+# makes no call that is not needed.
 #' @export
 `$.gym_env` <- function(x, name) {
   member <- .subset2(x, name)
@@ -232,7 +230,7 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
   )
 }
 
-# R6's own asks for `x$format`, which there is not.
+# R6's own method reads `x$format`, which an environment does not have.
 #' @export
 format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
 

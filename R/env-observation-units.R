@@ -3,7 +3,7 @@
 # documentation of each environment (https://gymnasium.farama.org/environments/) and,
 # where that is silent, from the code it documents: CartPole computes in metres, kilograms
 # and seconds (gravity 9.8), Pendulum's docs define theta in radians. Parts whose unit
-# neither tells, such as LunarLander's coordinates, have none.
+# neither has, such as LunarLander's coordinates, have none.
 
 observation_units <- list(
   Acrobot = c(angular_velocity_theta1 = "rad/s", angular_velocity_theta2 = "rad/s"),
@@ -48,5 +48,5 @@ observation_labels <- function(env_id, names) {
   words
 }
 
-# Of actions that are one number: Pendulum's documentation says "torque in N m".
+# The units of actions that are one number. Pendulum's documentation has "torque in N m".
 action_units <- list(Pendulum = "N m")

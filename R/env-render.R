@@ -3,13 +3,12 @@
 #' Asks the server for a picture of the environment as it is now.
 #'
 #' @inheritParams env_reset
-#' @param which Which sub-environment to draw where the environment has sub-environments,
-#'   a number from 1, the default. An implementation of an environment's own
-#'   (`"vector_entry_point"`) draws all sub-environments at once, and the server lets it have 16 at
-#'   most for that.
+#' @param which For a vector environment: the number of the sub-environment to draw, 1, the default,
+#'   for the first. An environment's own vector implementation (`"vector_entry_point"`) draws all of
+#'   them at once, which the server allows for 16 at most.
 #' @return An object of class `gym_frame`: an integer array of height x width x
-#'   3 (red, green, blue, each 0 to 255), where the environment draws such also x 1 (grey)
-#'   or x 4 (the last how opaque). [plot()] shows it, [as.raster()] makes it a raster image.
+#'   3 (red, green, blue, each 0 to 255), or x 1 (grey) or x 4 (the last how opaque) where the
+#'   environment draws such. [plot()] shows it, [as.raster()] makes it a raster image.
 #' @section Errors: `gym_error_http_400` for an unknown instance, one that has
 #'   not been reset yet (code `reset_needed`) or that cannot be drawn (code
 #'   `cannot_render`); `gym_error_connection`.

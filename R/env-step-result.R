@@ -1,9 +1,11 @@
-# What a step of an environment returns that somebody has written in R: it plays by the same
-# rules as those of the server, but nothing has checked that it does.
+# Checks what a step returns of an environment that a user has written in R. It must keep to the
+# same rules as the server's environments, which the server checks.
 
-#' Take a step, and check what comes of it if the environment is of the user's own making
-#' @param n For how many sub-environments it steps.
-#' @param ... As `env$step()` takes them.
+flags <- c("terminated", "truncated")
+
+#' Take a step, and check what it returns where a user has written the environment
+#' @param n How many sub-environments step.
+#' @param ... The arguments of `env$step()`.
 #' @noRd
 take_step <- function(env, n, call, ...) {
   out <- env$step(...)

@@ -1,10 +1,10 @@
-# What a vector environment tells besides, by sub-environment.
+# The info of a vector environment.
 
 #' Turn the info of several sub-environments into R values
 #'
 #' For each key Gymnasium has an array with an entry for each sub-environment, and beside it, under
-#' the key with `_` before it, a mask of those that have said something. Here the entries
-#' of the others are `NA`, or `NULL` in a list, and there are no masks.
+#' the key with `_` before it, a mask of those that have a value. Here the entries of the others are
+#' `NA`, or `NULL` in a list, and there are no masks.
 #' @noRd
 info_by_sub_env <- function(json, n) {
   if (!length(json)) {
@@ -12,8 +12,8 @@ info_by_sub_env <- function(json, n) {
   }
   masks <- paste0("_", names(json))
   keys <- names(json)[!names(json) %in% masks]
-  told <- Map(info_of_sub_envs, json[keys], json[paste0("_", keys)], n)
-  stats::setNames(told, keys)
+  values <- Map(info_of_sub_envs, json[keys], json[paste0("_", keys)], n)
+  stats::setNames(values, keys)
 }
 
 info_of_sub_envs <- function(json, mask, n) {
@@ -24,9 +24,9 @@ info_of_sub_envs <- function(json, mask, n) {
   if (length(mask) != n || length(json) != n) {
     return(info_from_json(json))
   }
-  # Only what was told decides the type: elsewhere stands a zero or nothing.
-  told <- info_from_json(json[mask])
+  # Only the values that the mask picks decide the type: the others are zero or nothing.
+  values <- info_from_json(json[mask])
   entry <- rep(NA_integer_, n)
   entry[mask] <- seq_len(sum(mask))
-  rows_of(told, entry)
+  rows_of(values, entry)
 }

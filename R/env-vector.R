@@ -1,15 +1,16 @@
-# What a vector environment takes and gives beyond a single one: sub-environments, by number or by
-# mask, how they are made and begun again, and what each of them tells.
+# Vector environments: how their sub-environments are picked by number or by mask, how they are
+# stepped, and what is checked of both.
 
 vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
-# The space of what is sent and received: a batch where there are sub-environments.
-sub_envs_space <- function(space, num_envs) {
+# The space of what is sent and received: for a vector environment that of a batch.
+sent_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Sub-environments always do where they can. A file must have a tensor, though.
+# Whether values are sent as tensors. Those of a vector environment always are where that is
+# possible; but a safetensors file needs at least one number.
 travels_as_tensors <- function(space, num_envs) {
   if (is.null(num_envs)) {
     tensors_pay(space)
@@ -20,8 +21,8 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_sub_envs <- function(x, instance, action, fields, which, call) {
-  check_step_sub_envs(which, instance, call)
+step_vector_env <- function(client, instance, action, fields, which, call) {
+  check_which(which, instance, call)
   n <- instance$num_envs
   actions <- instance$actions
   observations <- instance$observations
@@ -33,11 +34,11 @@ step_sub_envs <- function(x, instance, action, fields, which, call) {
     observations <- batch_space(instance$single_observation_space, n)
   }
   single <- instance$single_action_space
-  check_sub_envs(single, actions, action, n, call, which)
+  check_batch(single, actions, action, n, call, which)
   answer <- send_action(
-    x, instance, actions, action, write_sub_envs(single, action, n), fields, call
+    client, instance, actions, action, write_batch(single, action, n), fields, call
   )
-  result <- read_values(numbers_by_sub_env(answer), "Its `reward`")
+  result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
   info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
@@ -54,7 +55,7 @@ step_sub_envs <- function(x, instance, action, fields, which, call) {
   )
 }
 
-numbers_by_sub_env <- function(answer) {
+results_by_sub_env <- function(answer) {
   answer$tensors %||% list(
     reward = as.numeric(numbers_from_json(answer$reward)),
     terminated = unlist(answer$terminated),
@@ -70,24 +71,24 @@ final_observations <- function(instance, answer, n) {
   space <- instance$single_observation_space
   values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
   final <- vector("list", n)
-  final[ended] <- lapply(seq_along(ended), function(i) sub_env_value(space, values, i))
+  final[ended] <- lapply(seq_along(ended), function(i) batch_value(space, values, i))
   final
 }
 
-# The server draws sub-environment by sub-environment.
+# The server draws an action for each sub-environment.
 decode_sample <- function(instance, json) {
   single <- instance$single_action_space
   if (is.null(instance$num_envs)) {
     decode_value(single, json)
   } else {
     check_list(json, instance$num_envs, "all sub-environments")
-    sub_envs_from(single, lapply(json, decode_value, space = single))
+    batch_of(single, lapply(json, decode_value, space = single))
   }
 }
 
 # Checks --------------------------------------------------------------------------------
 
-check_sub_env_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
+check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
   if (is.null(x)) {
     return(invisible())
   }
@@ -118,7 +119,7 @@ check_mask <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(invisible())
   }
-  check_has_sub_envs(instance, mask, "mask", call)
+  check_is_vector_env(instance, mask, "mask", call)
   n <- instance$num_envs
   if (!is.logical(mask) || length(mask) != n || anyNA(mask) || !any(mask)) {
     must <- paste0(
@@ -128,11 +129,11 @@ check_mask <- function(mask, instance, call) {
   }
 }
 
-check_step_sub_envs <- function(which, instance, call) {
+check_which <- function(which, instance, call) {
   if (is.null(which)) {
     return(invisible())
   }
-  check_has_sub_envs(instance, which, "which", call)
+  check_is_vector_env(instance, which, "which", call)
   n <- instance$num_envs
   if (!are_whole(which, 1, n) || length(which) == 0L || is.unsorted(which, strictly = TRUE)) {
     must <- paste0("numbers of sub-environments from 1 to ", n, ", in increasing order")
@@ -140,7 +141,7 @@ check_step_sub_envs <- function(which, instance, call) {
   }
 }
 
-check_has_sub_envs <- function(instance, x, arg, call) {
+check_is_vector_env <- function(instance, x, arg, call) {
   if (is.null(instance$num_envs)) {
     gym_abort(
       c(

@@ -31,16 +31,16 @@
 #' `withCallingHandlers(..., gym_message_watch = function(m) invokeRestart("muffleMessage"))`
 #' or [suppressMessages()] keeps it away.
 #'
-#' `options(gym.viewer = )` has it otherwise, in scripts too: a function, such as
+#' `options(gym.viewer = )` changes that, in scripts too: a function, such as
 #' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
 #' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
-#' until the page is there, at most 5 seconds, so that nobody misses the beginning. If it has
+#' until the page is there, at most 5 seconds, so that the beginning is not missed. If it has
 #' not come by then, as when there is no browser, the address is printed as in a script.
 #'
 #' # Who can open it
 #'
-#' Whoever reaches the server, unless it asks for a token. Then the address holds a key, which
-#' opens this environment's page and nothing else. It is good until nobody has used it for 10
+#' Everybody who can reach the server, unless it asks for a token. Then the address holds a key,
+#' which opens this environment's page and nothing else. It is good until nobody has used it for 10
 #' minutes; each call makes a new one.
 #'
 #' @inheritParams env_reset
@@ -60,19 +60,28 @@ env_watch <- function(x, instance_id) {
   open_watch(x, known_instance(x, instance_id))
 }
 
-# For an environment that people want to see, when they see it for the first time.
-show_instance <- function(x, instance, call = rlang::caller_env()) {
+# Creates an instance, and opens its page where people want to see it.
+create_and_watch <- function(client, env_id, seed, render_mode, ..., call = rlang::caller_env()) {
+  instance_id <- create_instance(client, env_id, seed, render_mode, ..., call = call)
+  if (identical(render_mode, "human")) {
+    watch_once(client, known_instance(client, instance_id, call), call)
+  }
+  instance_id
+}
+
+# Opens the page unless it was opened before.
+watch_once <- function(client, instance, call = rlang::caller_env()) {
   if (is.null(instance$shown)) {
-    open_watch(x, instance, call)
+    open_watch(client, instance, call)
   }
 }
 
-open_watch <- function(x, instance, call = rlang::caller_env()) {
+open_watch <- function(client, instance, call = rlang::caller_env()) {
   viewer <- check_viewer(call)
-  address <- paste0(x$remote_base, instance$route, "watch/", watch_key(x, instance, call))
-  # A viewer that fails does so once.
+  address <- paste0(client$remote_base, instance$route, "watch/", watch_key(client, instance, call))
+  # Before the page is opened, so that a viewer that fails does so only once.
   instance$shown <- TRUE
-  comes <- open_address(address, viewer) && await_watcher(x, instance)
+  comes <- open_address(address, viewer) && await_watcher(client, instance)
   if (!comes && !isFALSE(viewer)) {
     rlang::inform(
       paste0("Watch ", instance$spec$id, " at ", address), class = "gym_message_watch"
@@ -81,9 +90,9 @@ open_watch <- function(x, instance, call = rlang::caller_env()) {
   invisible(address)
 }
 
-# A browser has no token: where the server asks for one, the link holds a key in its place.
-watch_key <- function(x, instance, call) {
-  key <- post_answer(x, paste0(instance$route, "watch/key/"), call = call)$key
+# A browser sends no token. Where the server asks for one, the link has a key in its place.
+watch_key <- function(client, instance, call) {
+  key <- post_answer(client, paste0(instance$route, "watch/key/"), call = call)$key
   if (!is.null(key) && !(rlang::is_string(key) && grepl("^[A-Za-z0-9_-]{1,200}$", key))) {
     refuse_field(key, "key", "a string of letters and digits")
   }
@@ -94,12 +103,12 @@ watch_key <- function(x, instance, call) {
 #'
 #' A browser takes a moment to start, and a fast environment would be past all that there is to
 #' see.
-#' @return Whether somebody does, logical: what opens a browser may do nothing, and say nothing.
+#' @return Whether somebody does, logical: opening a browser may fail without an error.
 #' @noRd
-await_watcher <- function(x, instance) {
-  deadline <- Sys.time() + watcher_patience
+await_watcher <- function(client, instance) {
+  deadline <- Sys.time() + watcher_timeout
   repeat {
-    if (isTRUE(get_answer(x, instance$route)$watched)) {
+    if (isTRUE(get_answer(client, instance$route)$watched)) {
       return(TRUE)
     }
     if (Sys.time() >= deadline) {
@@ -109,4 +118,5 @@ await_watcher <- function(x, instance) {
   }
 }
 
-watcher_patience <- 5
+# In seconds.
+watcher_timeout <- 5

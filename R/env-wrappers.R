@@ -67,7 +67,7 @@ check_wrappers <- function(wrappers, call = rlang::caller_env()) {
   }
 }
 
-# A name first, then arguments with names.
+# A wrapper is a list of its name and its arguments, which have names.
 is_wrapper <- function(x) {
   is.list(x) && length(x) > 0L && rlang::is_string(x[[1L]]) &&
     (length(x) == 1L || rlang::is_named(x[-1L]))

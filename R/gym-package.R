@@ -66,4 +66,5 @@
   the_session$pid <- Sys.getpid()
   the_session$prompt_for_server <- prompt_for_server
   reg.finalizer(the_session, end_session, onexit = TRUE)
+  register_with_gganimate()
 }

@@ -14,16 +14,11 @@ fetch <- function(client, connection, handle, route, key, repeatable, call) {
       return(response)
     }
     reason <- conditionMessage(response)
-    if (state$too_large) {
-      abort_too_large(base = client$remote_base, call = call)
-    }
-    if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
-      rlang::interrupt()
-    }
+    raise_own_stop(client, reason, call)
     reached <- reached | curl::handle_data(handle)$times[["pretransfer"]] > 0
     left <- timeout_of(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
     again <- repeatable && attempt < max_attempts && left > 0 && connection_broke(reason)
-    if (!again && !reached && prompted_server_starts(client, call)) {
+    if (!again && prompted_server_starts(client, reached, call)) {
       return(fetch(client, connection, handle, route, key, repeatable, call))
     }
     if (!again) {
@@ -37,12 +32,22 @@ fetch <- function(client, connection, handle, route, key, repeatable, call) {
   }
 }
 
-# Whether somebody was asked, at the first request of a client that found nobody listening, and had
-# a server started there. Only clients of create_GymClient() ask. What asks belongs to an upper
-# floor: .onLoad() registers it.
-prompted_server_starts <- function(client, call) {
+# Raises what ended an attempt from this side: the answer was too large, or the user interrupted.
+raise_own_stop <- function(client, reason, call) {
+  if (client$state$too_large) {
+    abort_too_large(base = client$remote_base, call = call)
+  }
+  if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
+    rlang::interrupt()
+  }
+}
+
+# Whether the user was asked and had a server started, at the first request of a client that found
+# nothing listening at its address. Only clients of create_GymClient() ask. The function that asks
+# belongs to an upper floor and is registered by .onLoad().
+prompted_server_starts <- function(client, reached, call) {
   state <- client$state
-  prompts <- isTRUE(state$may_prompt)
+  prompts <- !reached && isTRUE(state$may_prompt)
   state$may_prompt <- FALSE
   prompts && the_session$prompt_for_server(client, call)
 }

@@ -7,8 +7,15 @@ closing_time <- 2
 
 #' Create an instance on the server, and remember it
 #'
-#' Creations have idempotency keys of their own, so that one whose answer was lost can be repeated
-#' later: the answer to the repeat has the id of the instance.
+#' An instance may be created although its answer is lost, and then nobody knows its id. So
+#' creations have idempotency keys of their own:
+#'
+#' 1. The request is remembered with its key and body before it is sent.
+#' 2. The server creates the instance; an interrupt or a lost connection comes before the answer.
+#' 3. `outcome` is still "lost": the request is queued for closing, see [end_creation()].
+#' 4. When the next instance is created or reset, or instances are listed, or the session ends, the
+#'    request is repeated. The server does not create another instance; it answers with the id, and
+#'    the instance is closed.
 #' @return The instance's id.
 #' @noRd
 create_on_server <- function(client, fields, call) {

@@ -1,5 +1,5 @@
-# What of an observation a decision map shows: its axes, their ranges, where the other parts
-# are held, and the path of an episode.
+# What a decision map shows of an observation: its axes, their ranges, the values at which the other
+# parts are held, and the path of an episode.
 
 # A list: the names of the numbers of an observation, their bounds and usual ranges.
 mapped_observation <- function(place, call = rlang::caller_env()) {
@@ -9,7 +9,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
       c(paste0("A decision map shows two numbers of an observation, but what is observed ",
                if (!is.null(place$env_id)) paste0("in ", place$env_id, " "), "is of ",
                format(space), "."),
-        i = "`act(policy, )` tells the action for each single observation."),
+        i = "`act(policy, )` gives the action for each single observation."),
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }
@@ -28,8 +28,8 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   )
 }
 
-# From the middle to either side: to where an episode ends, and as fast as it gets. `NULL` where
-# that is not known of all parts.
+# How far each part goes from the middle to either side: a position to where an episode ends, a
+# speed as fast as it gets. NULL where that is not known of all parts.
 usual_ranges <- function(env_id, names) {
   family <- environment_family(env_id)
   limits <- lapply(episode_limits[[family, exact = TRUE]], function(limit) max(limit$at))
@@ -37,8 +37,8 @@ usual_ranges <- function(env_id, names) {
   if (all(names %in% names(usual))) usual
 }
 
-# They hold 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes of 60
-# random networks.
+# These ranges contain 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes
+# of 60 random networks.
 usual_speeds <- list(CartPole = list(cart_velocity = 2, pole_angular_velocity = 2.5))
 
 #' Find the two numbers of an observation to map
@@ -134,7 +134,7 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
 
 # An episode's path ---------------------------------------------------------------
 
-play_path <- function(policy, env, place, seed, client, call = rlang::caller_env()) {
+play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
   if (is.null(env)) {
     gym_abort(
       c("`path = TRUE` plays an episode, for which the environment is needed.",

@@ -1,8 +1,7 @@
 #' Map what a policy does
 #'
 #' Asks a policy what it does on a grid over two parts of the observation, the others held
-#' where they are put. [plot()][plot.gym_decision_map()] shows it, which
-#' `plot(policy, env, x = , y = )` does in one call. Nothing is played, unless
+#' where they are put. [plot()][plot.gym_decision_map()] shows it. Nothing is played, unless
 #' `path = TRUE`.
 #'
 #' # What is shown
@@ -20,12 +19,12 @@
 #' parts have their bounds in the observation space, and those without bounds need a path,
 #' whose range is taken.
 #'
-#' @param policy The policy: a network, made by [policy_network()] or found by a search, or a
-#'   function of many observations as for [rollout()].
 #' @param env The environment, by which observations have names and actions a meaning: an id,
 #'   such as `"CartPole-v1"`, what [gym_wrap()] returns, or an environment made by
 #'   [gym_make()], which is not touched. `NULL`, the default, for a network that was played
 #'   already, or whose inputs may be named `obs_1`, `obs_2`, ...
+#' @param policy The policy: a network, made by [policy_network()] or found by a search, or a
+#'   function of many observations as for [rollout()].
 #' @param x,y The two parts of the observation to map: their names, such as
 #'   `"pole_angle"`, or numbers, the first being 1. Needed unless there are just two.
 #' @param at Where the other parts are held: a numeric vector with their names, such as
@@ -69,17 +68,17 @@
 #' @export
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
-#' map <- decision_map(follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3))
+#' map <- decision_map(policy = follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3))
 #' map
 #' plot(map)
 #'
 #' @examplesIf gym:::can_start_server()
 #' policy <- search_random("CartPole-v0", seed = 1)$policy
-#' plot(policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity")
-#' map <- decision_map(policy, "CartPole-v0", "pole_angle", "pole_angular_velocity",
+#' map <- decision_map("CartPole-v0", policy, "pole_angle", "pole_angular_velocity",
 #'                     path = TRUE, seed = 1)
+#' plot(map)
 #' head(as.data.frame(map))
-decision_map <- function(policy, env = NULL, x = NULL, y = NULL, at = NULL, path = NULL,
+decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path = NULL,
                          xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
                          client = gym_client()) {
   check_policy(policy)
@@ -89,11 +88,11 @@ decision_map <- function(policy, env = NULL, x = NULL, y = NULL, at = NULL, path
   check_count(action)
   check_count(size, min = 2)
   check_seed(seed)
-  place <- mapped_place(policy, env, client)
+  place <- mapped_place(env, policy, client)
   observed <- mapped_observation(place)
   axes <- mapped_axes(observed, x, y)
   if (isTRUE(path)) {
-    path <- play_path(policy, env, place, seed, client)
+    path <- play_path(env, policy, seed, client)
   }
   way <- if (!is.null(path)) path_points(path, observed$names[axes])
   xlim <- xlim %||% mapped_range(observed, axes[[1L]], way$x, "xlim")
@@ -135,13 +134,13 @@ check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   }
 }
 
-# Where it is mapped --------------------------------------------------------------
+# The environment ------------------------------------------------------------------
 
 #' Find out where a policy decides
 #' @return A list: `policy`, bound where that is possible, `observation_space`,
 #'   `action_space`, `env_id`, each `NULL` where it is unknown.
 #' @noRd
-mapped_place <- function(policy, env, client, call = rlang::caller_env()) {
+mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
   if (!is.null(env)) {
     known <- known_spaces(env, client, call)
     policy <- policy_bind(policy, known, call = call)
@@ -154,18 +153,18 @@ mapped_place <- function(policy, env, client, call = rlang::caller_env()) {
     gym_abort(
       c(paste0("What is observed and done is known of networks that were played, not of ",
                policy_text(policy), "."),
-        i = "Name the environment, as in `plot(policy, \"CartPole-v1\", x = , y = )`."),
+        i = "Name the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y = )`."),
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
   c(list(policy = policy), policy[c("observation_space", "action_space", "env_id")])
 }
 
-# What is done --------------------------------------------------------------------
+# The actions ----------------------------------------------------------------------
 
-#' Ask what is done on each of many observations
+#' Ask a policy for its decisions on many observations
 #' @param values A matrix with an observation in each row.
-#' @return A list: `kind`, `values`, `actions`, `limits`, as [decision_map()] tells.
+#' @return A list: `kind`, `values`, `actions`, `limits`, as [decision_map()] describes them.
 #' @noRd
 decide <- function(place, values, action, call = rlang::caller_env()) {
   space <- place$action_space
@@ -197,7 +196,7 @@ decide_value <- function(place, values, outputs, action, call) {
   space <- place$action_space
   n <- prod(space$shape)
   check_count(action, max = n, call = call)
-  numbers <- sub_env_numbers(policy_actions(place, values, outputs))
+  numbers <- number_rows(policy_actions(place, values, outputs))
   limits <- c(space$low[[action]], space$high[[action]])
   list(
     kind = "value", values = as.numeric(numbers[, action]),
@@ -206,7 +205,7 @@ decide_value <- function(place, values, outputs, action, call) {
   )
 }
 
-# A function is asked as while it plays.
+# A function is called as it is while it plays.
 policy_actions <- function(place, values, outputs) {
   if (!is.null(outputs)) {
     return(network_action(place$action_space, outputs, place$policy, one = FALSE))
@@ -215,10 +214,10 @@ policy_actions <- function(place, values, outputs) {
   observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))
   vector_env <- place[c("observation_space", "action_space")]
   vector_env$call <- rlang::caller_env()
-  act_sub_envs(place$policy, observation, seq_len(nrow(values)), vector_env)
+  act_batch(place$policy, observation, seq_len(nrow(values)), vector_env)
 }
 
-# What it says of itself ------------------------------------------------------------
+# Printing -------------------------------------------------------------------------
 
 #' @export
 as.data.frame.gym_decision_map <- function(x, row.names = NULL, optional = FALSE, ...) x$grid

@@ -12,25 +12,26 @@
 #'
 #' # Episodes side by side
 #'
-#' Where the environment is named by its id, or was made with `num_envs`, many episodes
-#' are played at once, each in a sub-environment of its own: 256 where the environment has a vector
-#' implementation of its own (CartPole has), elsewhere 16. They are played in blocks:
-#' all sub-environments begin an episode together, and the next block begins when all have ended, so
-#' that short episodes are not favoured. The policy is asked about the episodes that still play:
-#' as they end, what a function is given has fewer and fewer rows, and it returns as many actions
-#' as there are. A row is not the same episode throughout.
+#' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
+#' at once, each in a sub-environment of its own: 256 where the environment has a vector
+#' implementation of its own (CartPole has), elsewhere 16. They are played in batches: all
+#' sub-environments begin an episode together, and the next batch begins when all have ended, so
+#' that short episodes are not favoured. The policy is asked for actions in the episodes that have
+#' not ended: as they end, a function is given fewer and fewer rows, and it returns as many
+#' actions. A row is not the same episode throughout.
 #'
 #' Only with `frames = TRUE` one episode is played after the other, in an environment without
-#' sub-environments: other episodes, in CartPole, than the same seed plays side by side, as they are
-#' seeded otherwise there; elsewhere the same ones, if the policy draws nothing.
+#' sub-environments. In CartPole these are other episodes than the same seed plays side by side,
+#' because its vector implementation uses seeds in another way; elsewhere they are the same ones, if
+#' the policy draws nothing.
 #'
 #' # To begin an episode again
 #'
 #' A seed of the table begins the same episode again, by `env$reset(seed = )` of an
 #' environment made by [gym_make()]. A vector implementation of an environment's own has
-#' a single seed for all of its sub-environments; there `num_envs` of the result tells how many
-#' sub-environments it takes to begin the episode again, and `sub_env` of the table in which of them
-#' it is (see the examples).
+#' a single seed for all of its sub-environments: to begin the episode again it takes an environment
+#' with `num_envs` of the result sub-environments, and the episode is in the one whose number is
+#' `sub_env` of the table (see the examples).
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
@@ -125,46 +126,31 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     play <- function(vector_env) {
       warn_of_own_limit(max_steps, vector_env, call)
       policy <- policy_bind(policy, vector_env, call = call)
-      record <- new_record(episodes)
-      seeds <- draw_block_seeds(vector_env, episodes)
-      begin <- function(block, episodes) list(seeds = seeds[[block]], policy = policy)
-      play_episodes(vector_env, record, begin, max_steps, keep_steps = steps)
-      new_rollout(record, policy, vector_env, seed, steps)
+      history <- new_history(episodes)
+      # The seeds of all batches are drawn before the first episode, so that a policy that draws is
+      # played in the same episodes as one that does not.
+      batches <- ceiling(episodes / vector_env$batch_size)
+      seeds <- replicate(batches, vector_env$draw_seeds(), simplify = FALSE)
+      begin <- function(batch, episodes) list(seeds = seeds[[batch]], policy = policy)
+      play_episodes(vector_env, history, begin, max_steps, keep_steps = steps)
+      new_rollout(history, policy, vector_env, seed, steps)
     }
     with_vector_env(env, episodes, client, play, frames)
   })
 }
 
-# Environments --------------------------------------------------------------------
-
-check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
-  if (!named && !is_playable(x) && !inherits(x, "gym_wrapped")) {
-    must <- "the id of an environment or an environment made by `gym_make()`"
-    abort_argument(x, must, arg, call)
-  }
-  invisible(x)
-}
-
-is_playable <- function(x) {
-  (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
-}
-
-# All beforehand, so that policies which draw are played in the same episodes as those
-# which do not.
-draw_block_seeds <- function(vector_env, episodes) {
-  replicate(ceiling(episodes / vector_env$block), vector_env$draw_seeds(), simplify = FALSE)
-}
-
 # Tables --------------------------------------------------------------------------
 
-new_rollout <- function(record, policy, vector_env, seed, keep_steps) {
-  episodes <- episodes_table(record)
+new_rollout <- function(history, policy, vector_env, seed, keep_steps) {
+  episodes <- episodes_table(history)
+  fps <- vector_env$spec$render_fps
   structure(
     list(
       episodes = episodes,
-      steps = if (keep_steps) steps_table(record, episodes, vector_env),
-      frames = if (!is.null(vector_env$frame)) frames_of(record, vector_env),
+      steps = if (keep_steps) steps_table(history, episodes, vector_env),
+      frames = if (!is.null(vector_env$frame)) {
+        lapply(history$batches, function(batch) new_frames(batch$frames, fps))
+      },
       policy = policy,
       env_id = environment_label(vector_env),
       num_envs = vector_env$num_envs,
@@ -179,7 +165,16 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
   x$steps %||% x$episodes
 }
 
-# What it says of itself ------------------------------------------------------------
+#' @rdname rollout
+#' @param object What `rollout()` returned.
+#' @param newdata,type,... As for [predict()][predict.gym_policy()] of a policy.
+#' @export
+predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  predict_policy(object$policy, newdata, type, object$env_id)
+}
+
+# Printing and summarising ---------------------------------------------------------
 
 #' @export
 print.gym_rollout <- function(x, ...) {
@@ -261,5 +256,5 @@ quartiles <- function(x) {
     `3rd Qu.` = five[[4L]], Max. = five[[5L]])
 }
 
-# Of a single episode there is no standard error.
+# NA for a single episode, which has no standard error.
 standard_error <- function(x) stats::sd(x) / sqrt(length(x))

@@ -85,8 +85,8 @@ autoplot_trajectory <- function(x, episode, data) {
                   subtitle = trajectory_subtitle(x, episode, data))
 }
 
-# The values with the kind of their panel, and which number of the action they are where it
-# has several.
+# The values with the kind of their panel and, where an action has several numbers, with the number
+# of it that they are.
 autoplot_values <- function(data) {
   values <- data$values
   values$kind <- data$panels$kind[match(values$panel, data$panels$panel)]
@@ -127,15 +127,15 @@ trajectory_layers <- function(values, data) {
   layers
 }
 
-# Whole numbers where some fit, as actions are.
+# The marks of an axis: all whole numbers where there are only a few, because actions are whole.
 few_breaks <- function(limits) {
   from <- ceiling(limits[[1L]])
   to <- floor(limits[[2L]])
   if (from < to && to - from < 7) from:to else pretty(limits)
 }
 
-# In a panel of a constant its value alone. ggplot2 tells only what the panel shows: around a
-# constant that is 0.05 to either side.
+# The axis of a panel in which a value is constant has a mark at this value alone. ggplot2 passes
+# only the limits of a panel: around a constant that is 0.05 to either side.
 trajectory_breaks <- function(values) {
   shown <- values[values$kind != "choice" & is.finite(values$value), ]
   each <- split(shown$value, shown$panel)
@@ -155,7 +155,7 @@ near_rows <- function(data) {
   data$limits[keep, ]
 }
 
-# Facets have no axis of their own words: the title tells what the numbers mean.
+# Facets have no axis labels of their own: their titles explain what the numbers mean.
 facet_labels <- function(data) {
   labels <- data$panels$panel
   text <- vapply(labels, function(label) {

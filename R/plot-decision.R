@@ -9,7 +9,7 @@
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
 #' @param x,object What [decision_map()] returned.
-#' @param main The title; `NULL`, the default, tells the environment and the policy.
+#' @param main The title; `NULL`, the default, names the environment and the policy.
 #' @param xlab,ylab The axes' labels; the default are the names of the parts, with their units
 #'   where Gymnasium's documentation has them.
 #' @param ... Further arguments of [plot()][graphics::plot.default()]; not used by
@@ -18,7 +18,7 @@
 #' @export
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
-#' plot(decision_map(follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3)))
+#' plot(decision_map(policy = follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3)))
 plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
                                   ylab = decision_label(x, x$y), ...) {
   data <- decision_plot_data(x)
@@ -41,36 +41,6 @@ plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
 
 decision_label <- function(x, name) observation_labels(x$env_id, name)
 
-# What plot() and autoplot() of a policy do with the names of two observations.
-plot_decision <- function(policy, env = NULL, x = NULL, y = NULL, ..., main = NULL) {
-  arguments <- list(...)
-  own <- names(arguments) %in% names(formals(decision_map))
-  map <- do.call(decision_map, c(list(policy, env, x, y), arguments[own]))
-  do.call(graphics::plot, c(list(map, main = main), arguments[!own]))
-}
-
-autoplot_decision <- function(policy, env = NULL, x = NULL, y = NULL, ...) {
-  autoplot.gym_decision_map(decision_map(policy, env, x, y, ...))
-}
-
-# In `plot(policy, env, x = "pole_angle", y = "pole_angular_velocity")` it is the string
-# that plot() dispatches on, by the name of its own first argument. Other strings are
-# plotted as ever.
-#' @export
-plot.character <- function(x, y = NULL, ...) {
-  if (inherits(y, "gym_policy")) {
-    # plot(policy, x = "pole_angle"): decision_map() says what is missing.
-    return(plot_decision(y, ..., x = x))
-  }
-  name <- names(substitute(list(...)))[2L]
-  # What has another name belongs to plot.default(), and may be meant to be evaluated late.
-  first <- if (...length() && (name %||% "") %in% c("", "policy")) ..1
-  if (inherits(first, "gym_policy") || is.function(first)) {
-    return(plot_decision(..., x = x, y = y))
-  }
-  NextMethod()
-}
-
 # Data ----------------------------------------------------------------------------
 
 #' Compute what a plot of a decision map shows
@@ -91,7 +61,8 @@ decision_plot_data <- function(x) {
   data
 }
 
-# As far to either side of one half as outputs go: small weights make small differences.
+# The colours reach as far from one half as the outputs do, because small weights make small
+# differences.
 output_colours <- function(x, data) {
   palette <- diverging_colours()
   reach <- max(abs(data$z - 0.5), 0.01)
@@ -106,7 +77,7 @@ output_colours <- function(x, data) {
 value_colours <- function(x, data) {
   palette <- diverging_colours()
   limits <- x$limits %||% range(data$z)
-  # Of one colour where there is but one value.
+  # One colour where there is only one value.
   zlim <- if (diff(limits) > 0) limits else limits + c(-1, 1)
   list(
     zlim = zlim, palette = palette, border = mean(zlim), regions = NULL,
@@ -131,7 +102,7 @@ diverging_colours <- function() {
   grDevices::colorRampPalette(c("#EFB549", "#FAF7F0", "#4797C8"))(101L)
 }
 
-# Lighter than the colours of lines, for names and paths to be read on them.
+# Lighter than the colours of lines, so that names and paths can be read on them.
 choice_palette <- function(n) {
   strong <- c(okabe_ito$orange, okabe_ito$sky_blue, okabe_ito$green, okabe_ito$purple,
               okabe_ito$yellow, okabe_ito$vermillion, okabe_ito$blue)
@@ -144,7 +115,7 @@ choice_palette <- function(n) {
   grDevices::rgb(t(mixed), maxColorValue = 255)
 }
 
-#' Find places for the names of regions
+#' Find where the names of regions stand
 #'
 #' The name stands at the point of the region that is farthest from others, where there
 #' is room for it.
@@ -158,8 +129,8 @@ region_labels <- function(data, region, labels) {
   data.frame(x = data$x[at[, 1L]], y = data$y[at[, 2L]], label = labels[found[share > 0.02]])
 }
 
-# By peeling off what borders on the outside until nothing is left: what was last there
-# lies in the middle.
+# Points at the border are removed again and again, until none is left: those that are removed last
+# lie in the middle.
 region_middle <- function(inside) {
   repeat {
     n <- nrow(inside)

@@ -1,6 +1,6 @@
-# What the plots share.
+# What all plots use.
 
-# An empty plot with this package's defaults, over which what the caller says wins.
+# An empty plot with this package's defaults, which the caller's arguments override.
 open_plot <- function(frame, chosen) {
   las <- number_direction(pretty(frame$y))
   frame <- c(frame, list(type = "n", las = las, bty = "l"))
@@ -10,7 +10,7 @@ open_plot <- function(frame, chosen) {
 # Upright numbers read best, but long ones would run into the axis's label.
 number_direction <- function(at) if (max(nchar(at)) > 3L) 0L else 1L
 
-# A title that tells environment and policy, the latter up to the first detail: "random" or
+# A title that names the environment and the policy, the latter up to the first detail: "random" or
 # "network 4-2-1".
 played_title <- function(x) {
   policy <- sub("(,| over).*", "", policy_text(x$policy))
@@ -29,13 +29,14 @@ okabe_ito <- list(
   blue = "#0072B2", vermillion = "#D55E00", purple = "#CC79A7"
 )
 
-# Of trajectories: the limits of an episode, its end, and lines that share a panel.
+# Colours in plots of trajectories: of the limits of an episode, its end, and lines that share a
+# panel.
 limit_colours <- c(failure = okabe_ito$vermillion, goal = okabe_ito$green)
 ending_colours <- c(terminated = okabe_ito$vermillion, truncated = "grey50")
 line_colours <- unlist(okabe_ito[c("blue", "orange", "green", "purple", "sky_blue", "vermillion")],
                        use.names = FALSE)
 
-# A field of colours over the plot, with the lines of levels where there are any.
+# Fills the plot with a field of colours, and draws the lines of levels where there are any.
 draw_field <- function(data) {
   graphics::image(data$x, data$y, data$z, zlim = data$zlim, col = data$palette, add = TRUE,
                   useRaster = TRUE)
@@ -47,13 +48,13 @@ draw_field <- function(data) {
   }
 }
 
-# A legend in one line above the plot, where no data are; smaller where the plot is
-# narrow. graphics::legend() gives each entry the width of the longest. Laid out in
-# inches, so that logarithmic axes do not matter.
+# A legend in one line above the plot, where there are no data; smaller where the plot is narrow.
+# (graphics::legend() gives each entry the width of the longest.) It is laid out in inches, so that
+# logarithmic axes do not matter.
 legend_above <- function(labels, col, pch, lty, cex = 0.9) {
   width <- function(cex) sum(legend_widths(labels, cex)) - legend_gap(cex)
   sides <- graphics::grconvertX(0:1, "npc", "inches")
-  # Not by the ratio of the widths, as devices round the sizes of their letters.
+  # The ratio of the widths does not give the size, because devices round the sizes of letters.
   while (width(cex) > diff(sides) && cex > 0.3) cex <- 0.95 * cex
   starts <- mean(sides) - width(cex) / 2 + cumsum(c(0, legend_widths(labels, cex)))
   left <- starts[seq_along(labels)]

@@ -64,8 +64,8 @@ busy_span <- function(busy) {
   seq(max(1, min(which(busy)) - around), min(length(busy), max(which(busy)) + around))
 }
 
-# Devices that draw pixels leave out most of a large picture, and thin lines with it; there it
-# is made smaller beforehand, by this factor.
+# Devices that draw pixels leave out most pixels of a large picture, and thin lines with them. For
+# these it is made smaller beforehand, by this factor.
 device_shrinkage <- function(picture, inches) {
   if (names(grDevices::dev.cur()) %in% c("pdf", "postscript", "svg", "cairo_pdf", "cairo_ps")) {
     return(1L)
@@ -122,10 +122,10 @@ arrange_stills <- function(n, aspect, inches) {
   )
 }
 
-# As high as suits the picture, but never too small to read.
+# The height of the label above a picture: a part of the picture's, but never too small to read.
 label_room <- function(height) min(max(0.2 * height, 0.13), 0.22)
 
-# For paper: as wide as a page's text.
+# The size of a filmstrip on paper: as wide as the text of a page.
 filmstrip_size <- function(stills, width = 6.5) {
   picture <- crop_blank(lapply(stills$frames, unclass))[[1L]]
   n <- length(stills$steps)

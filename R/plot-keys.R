@@ -1,14 +1,14 @@
-# What stands above and on plots beside legend_above(): titles that fit, bars of colours,
+# Text and keys above and in plots, beside legend_above(): titles that fit, bars of colours,
 # remarks.
 
-# A title above the legend's line, smaller where the plot is narrow.
+# Draws a title above the line of the legend, smaller where the plot is narrow.
 title_above <- function(main) {
   if (!length(main) || !nzchar(main[[1L]])) {
     return(invisible())
   }
   cex <- graphics::par("cex.main")
   wide <- max(graphics::strwidth(main, "inches", cex = cex, font = 2L))
-  # It is centred over the plot, which is not the middle of the figure.
+  # The title is centred over the plot, whose middle is not that of the figure.
   middle <- mean(graphics::grconvertX(0:1, "npc", "inches"))
   room <- 2 * min(abs(graphics::grconvertX(0:1, "nfc", "inches") - middle))
   graphics::title(main = main, line = 2.5, cex.main = cex * min(1, 0.98 * room / wide))
@@ -32,16 +32,16 @@ colour_key_above <- function(key, cex = 0.9) {
   height <- graphics::grconvertY(1, "npc", "inches") + 0.9 * graphics::par("csi")
   x <- function(inches) graphics::grconvertX(inches, "inches", "user")
   y <- function(inches) graphics::grconvertY(inches, "inches", "user")
-  say <- function(inches, text) {
+  write <- function(inches, text) {
     graphics::text(x(inches), y(height), text, adj = c(0, 0.4), cex = cex, xpd = NA)
   }
-  say(left, key$label)
-  say(label, key$ends[[1L]])
+  write(left, key$label)
+  write(label, key$ends[[1L]])
   half <- 0.3 * graphics::par("csi")
   graphics::rasterImage(t(key$palette), x(bar), y(height - half), x(bar + long), y(height + half),
                         xpd = NA, interpolate = FALSE)
   graphics::rect(x(bar), y(height - half), x(bar + long), y(height + half), xpd = NA, lwd = 0.5)
-  say(bar + long + 0.6 * em, key$ends[[2L]])
+  write(bar + long + 0.6 * em, key$ends[[2L]])
   invisible(list(left = left, right = left + long + texts))
 }
 

@@ -7,7 +7,7 @@
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
 #' @param x,object What [search_landscape()] returned.
-#' @param main The title; `NULL`, the default, tells the environment.
+#' @param main The title; `NULL`, the default, names the environment.
 #' @param xlab,ylab The axes' labels.
 #' @param ... Further arguments of [plot()][graphics::plot.default()]; not used by
 #'   `autoplot()`.
@@ -35,7 +35,7 @@ plot.gym_landscape <- function(x, main = NULL, xlab = "first direction",
 
 landscape_title <- function(x) paste0(x$env_id, ": around the best policy")
 
-# What plot() of a search does.
+# plot() of a search with type = "landscape".
 plot_landscape <- function(search, ..., main = NULL) {
   arguments <- list(...)
   own <- names(arguments) %in% names(formals(search_landscape))
@@ -71,7 +71,7 @@ landscape_plot_data <- function(x, call = rlang::caller_env()) {
   )
 }
 
-# White on the dark, where low networks are.
+# The lines are white, because colours are dark where mean returns are low.
 draw_heights <- function(data) {
   if (length(data$levels)) {
     graphics::contour(data$x, data$y, data$z, levels = data$levels, add = TRUE, labcex = 0.7,

@@ -29,7 +29,8 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   )
 }
 
-# Of too many all but the last places are for the first, one is left for the dots.
+# Where there are too many neurons to draw, the first ones and the last one are drawn, with a place
+# for dots between them.
 place_neurons <- function(size, layer, most) {
   shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
   y <- 1 - (seq_along(shown) - 0.5) / length(shown)
@@ -68,8 +69,8 @@ place_weights <- function(policy, neurons, digits) {
   weights
 }
 
-# How far along its line a weight's number stands, from 0 to 1: the same for all of a layer,
-# as near to the middle as the lines are about as far apart there as they ever are.
+# How far along its line a weight's number stands, from 0 to 1. It is the same for all of a layer:
+# as near to the middle as possible, where the lines are at least 85 % as far apart as anywhere.
 label_places <- function(weights) {
   apart <- function(layer, along) {
     heights <- sort(layer$y + along * (layer$yend - layer$y))

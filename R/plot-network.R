@@ -3,18 +3,14 @@
 #' Draws the diagram of a network: its layers from left to right, neurons as circles,
 #' weights as lines that are the wider the further from 0, blue where they are positive,
 #' vermillion and dashed where they are negative. Few weights are written on the
-#' lines as numbers; of a layer with many neurons some are left out, which the dots say.
+#' lines as numbers; of a layer with many neurons some are left out, which dots show.
 #'
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
-#' policy knows its environment: because it was played there, or because `env` says it.
-#'
-#' With `x` and `y` the names of two parts of an observation it is a [decision_map()] that
-#' is drawn instead: `plot(policy, env, x = "pole_angle", y = "pole_angular_velocity")`.
+#' policy knows its environment: because it was played there, or because it is given as `env`.
 #'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
-#' @param x,object A network, as [policy_network()] makes it. In a call that names two
-#'   observations as `x` and `y` the network comes first and has no name.
+#' @param x,object A network, as [policy_network()] makes it.
 #' @param env The environment: an id, such as `"CartPole-v1"` or what [gym_wrap()] returns, or
 #'   an environment made by [gym_make()]. `NULL`, the default, is that in which the policy
 #'   was played.
@@ -22,15 +18,14 @@
 #'   the default is 12.
 #' @param digits With how many digits to write weights on their lines. `NULL`, the
 #'   default, is 2 for up to 24 lines and none for more; 0 writes none.
-#' @param main The title; `NULL`, the default, tells the sizes.
+#' @param main The title; `NULL`, the default, gives the sizes.
 #' @param client The client of the server that is asked about an environment named by its id;
 #'   the default is the session's own, [gym_client()].
-#' @param ... For a decision map: the arguments of [decision_map()], `x` and `y` first, and
-#'   of its [plot()][plot.gym_decision_map()].
-#' @return `x`, invisibly, for a decision map what [decision_map()] returns; `autoplot()` a
-#'   ggplot.
+#' @param ... Not used.
+#' @return `x`, invisibly; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when the network does not fit the environment, and
 #'   for a policy that has no weights to draw, such as [policy_random()].
+#' @seealso [decision_map()] shows what a network does.
 #' @export
 #' @examples
 #' set.seed(1)
@@ -39,13 +34,10 @@
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
 #' plot(search$policy)
-#' plot(search$policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity")
 plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = NULL,
                                     main = NULL, client = gym_client()) {
-  if (...length()) {
-    return(plot_decision(x, env, ..., main = main, client = client))
-  }
-  policy <- bind_named(x, env, client)
+  check_dots_empty(...)
+  policy <- bind_to(x, env, client)
   data <- network_plot_data(policy, neurons, digits)
   old <- graphics::par(mar = c(2.5, 1, 4, 1))
   on.exit(graphics::par(old))
@@ -58,6 +50,12 @@ plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = N
     col = weight_colours(), pch = NA, lty = weight_types
   )
   invisible(x)
+}
+
+# The policy with the spaces of `env`, whose names the diagram shows; without `env` it keeps those
+# of the environment in which it was played.
+bind_to <- function(policy, env, client, call = rlang::caller_env()) {
+  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
 }
 
 network_title <- function(x) {
@@ -140,7 +138,7 @@ draw_neurons <- function(data, room) {
   draw_layer_names(data$layers, room)
 }
 
-# Where neurons are left out.
+# Three dots where neurons are left out.
 draw_dots <- function(dots) {
   for (i in seq_len(nrow(dots))) {
     graphics::points(rep(dots$x[[i]], 3L), dots$y[[i]] + c(-0.5, 0, 0.5) * graphics::strheight("M"),
@@ -148,7 +146,7 @@ draw_dots <- function(dots) {
   }
 }
 
-# Under the layers, small enough for their neighbours.
+# The layers' names below them, small enough not to overlap.
 draw_layer_names <- function(layers, room) {
   cex <- min(room$cex, 0.95 * room$gap / max(graphics::strwidth(layers$label, "inches", font = 3L)))
   graphics::mtext(layers$label, 1L, line = 0.5, at = layers$x, cex = cex * graphics::par("cex"),
@@ -161,10 +159,8 @@ draw_layer_names <- function(layers, room) {
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
                                         client = gym_client()) {
-  if (...length()) {
-    return(autoplot_decision(object, env, ..., client = client))
-  }
-  policy <- bind_named(object, env, client)
+  check_dots_empty(...)
+  policy <- bind_to(object, env, client)
   data <- network_plot_data(policy, neurons, digits)
   weights <- data$weights[order(data$weights$width), ]
   widest <- if (nrow(weights) > 60L) 1.5 else 3

@@ -9,7 +9,7 @@
 #' at most 3, or at most 10 that come twice on average.
 #'
 #' `"trajectory"` shows an episode's observations, each in a panel of its own, and below them its
-#' actions, against the number of steps taken. Where Gymnasium's documentation tells units and what
+#' actions, against the number of steps taken. Where Gymnasium's documentation has units and what
 #' actions mean, the labels do, too. Dashed lines are limits at which the documentation says that
 #' an episode ends (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn where
 #' the episode comes near; a solid line is its end. The observations are those that the actions were
@@ -23,7 +23,7 @@
 #'
 #' @param x What [rollout()] returned.
 #' @param type `"returns"`, the default, `"trajectory"` or `"filmstrip"`.
-#' @param main The title; `NULL`, the default, tells the environment and the policy, in a
+#' @param main The title; `NULL`, the default, names the environment and the policy, in a
 #'   filmstrip nothing.
 #' @param xlab,ylab The axes' labels, for `"returns"`.
 #' @param episode Which episode to show, a whole number; the default is the first.
@@ -89,7 +89,7 @@ returns_label <- "return (reward summed over an episode)"
 
 returns_measure <- function(data) if (is.null(data$bars)) "density" else "episodes"
 
-# Of few different returns a density would show values that no episode had.
+# With few different returns a density would show values that no episode had, so there are bars.
 most_bars <- 10L
 
 #' Compute what a plot of a rollout shows
@@ -117,7 +117,7 @@ rollout_plot_data <- function(x) {
   )
 }
 
-# As wide as the nearest two values leave room for, and never too narrow to be seen.
+# Bars are as wide as the two nearest values allow, and never too narrow to be seen.
 return_bars <- function(returns, values) {
   half <- if (length(values) == 1L) {
     0.2 * around(values)
@@ -135,7 +135,7 @@ bars_range <- function(bars) {
   if (alone) bars$value + c(-1, 1) * around(bars$value) else range(bars$xmin, bars$xmax)
 }
 
-# What there is to see to either side of a value that stands alone.
+# How far the axis reaches to either side of a value that stands alone.
 around <- function(value) max(1, abs(value) / 10)
 
 draw_bars <- function(bars, axes) {
@@ -154,12 +154,12 @@ draw_bars <- function(bars, axes) {
   }
 }
 
-# Those that the caller has not chosen something else for.
+# The axes for which the caller has not given an argument.
 own_axes <- function(chosen) {
   if (!"axes" %in% names(chosen)) setdiff(c("xaxt", "yaxt"), names(chosen))
 }
 
-# The values themselves, unless two are too near each other for their numbers.
+# Marks at the values of bars; NULL where two of them are too near for their numbers to fit.
 bar_marks <- function(bars) {
   if (nrow(bars) == 1L || min(diff(bars$value)) > diff(range(bars$value)) / 12) bars$value
 }
@@ -177,7 +177,8 @@ draw_median <- function(data) {
   graphics::segments(
     data$median, 0, data$median, 0.92 * top, col = okabe_ito$vermillion, lwd = 2, lty = "dashed"
   )
-  # Centred in the middle of the plot, the nearer a side the further towards the middle.
+  # In the middle of the plot the label is centred at the median; the nearer to a side the median
+  # is, the further the label goes towards the middle.
   place <- (data$median - data$xlim[[1L]]) / diff(data$xlim)
   graphics::text(data$median, 0.96 * top, median_label(data), adj = c(place, 0.5), xpd = NA,
                  col = okabe_ito$vermillion)

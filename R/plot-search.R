@@ -12,7 +12,7 @@
 #' @param x,object A search, as [search_random()] returns it.
 #' @param type What to show: `"returns"`, the default; `"network"`, the best policy, as
 #'   [plot.gym_policy_network()]; or `"landscape"`, which plays [search_landscape()].
-#' @param main The title; the default says what was searched and what came of it.
+#' @param main The title; the default describes what was searched and what came of it.
 #' @param xlab,ylab The axes' labels.
 #' @param ... For the returns further arguments of [plot()][graphics::plot.default()], such as
 #'   `ylim`; for the others the arguments of these functions and their plots, such as
@@ -87,8 +87,8 @@ search_plot_data <- function(x, call = rlang::caller_env()) {
   )
 }
 
-# Offsets that put returns of one round which are closer than `near` side by side.
-# Not drawn at random: a plot leaves R's generator alone.
+# Offsets that put returns of one round which are closer than `near` side by side. They are not
+# drawn at random, because a plot leaves R's generator alone.
 spread <- function(round, value, near) {
   bin <- if (near > 0) round(value / near) else value * 0
   group <- interaction(round, bin, drop = TRUE)

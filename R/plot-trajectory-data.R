@@ -1,8 +1,7 @@
-# What a picture of an episode's trajectory shows: the same data for base graphics and
-# ggplot2.
+# The data of a plot of an episode's trajectory, the same for base graphics and ggplot2.
 
 most_panels <- 8L
-# As many as there are colours to tell them apart.
+# There are as many colours for lines.
 most_actions <- 6L
 
 #' Compute what a trajectory shows
@@ -100,14 +99,14 @@ text_list <- function(names, most = 10L) {
 
 # Actions ---------------------------------------------------------------------------
 
-# Of one whole number out of few; as an environment's documentation names them, where it
-# does.
+# The possible actions, where an action is one of few whole numbers, with the names of the
+# environment's documentation where it has some. NULL for other actions.
 action_choices <- function(x, actions) {
   value <- if (length(actions) == 1L) as.numeric(actions[[1L]])
   if (is.null(value) || !all_whole(value)) {
     return(NULL)
   }
-  # A function knows of no space.
+  # A function has no action space.
   space <- if (!is.function(x$policy)) x$policy$action_space
   meaning <- action_meaning(x$env_id, space$n)
   possible <- (space$start %||% 0L) + seq_along(meaning) - 1L
@@ -151,7 +150,8 @@ trajectory_limits <- function(env_id, observed, labels) {
   do.call(rbind, c(list(none), rows))
 }
 
-# A limit far from what happened would press it flat: of the room, a tenth must remain.
+# The limits that are near the values. Showing one far away would make the values a flat line: they
+# keep at least about a tenth of the height.
 near_limits <- function(at, value) {
   if (!any(is.finite(value))) {
     return(numeric())

@@ -4,7 +4,7 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
   data <- trajectory_plot_data(x, episode, variables, call)
   n <- nrow(data$panels)
   grid <- arrange_panels(n)
-  # Set by layout(), too, so asked for beforehand.
+  # layout() sets some of these, too, so they are read before it.
   old <- graphics::par("mfrow", "mar", "oma", "mgp", "tcl", "cex", "las", "xpd")
   on.exit({
     graphics::layout(1)
@@ -13,7 +13,8 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
   cex <- panel_cex(grid)
   graphics::par(cex = cex)
   left <- left_margins(data, grid)
-  graphics::layout(grid, widths = column_widths(left, cex))
+  # So that the plots of all columns are equally wide.
+  graphics::layout(grid, widths = (left + 0.8) * line_inches(cex) + plot_width(left, cex))
   graphics::par(cex = cex, oma = c(2.8, 0, 3.2, 0), mgp = c(3, 0.5, 0), tcl = -0.25, las = 1,
                 xpd = FALSE)
   title_cex <- panel_title_cex(data$panels$panel, left)
@@ -28,8 +29,7 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
   graphics::mtext("steps taken", side = 1L, line = 1.6, outer = TRUE, cex = cex)
 }
 
-# Two columns where there are more than two panels; the last one, of the actions, fills its
-# row.
+# Two columns where there are more than two panels; the last panel, of the actions, fills its row.
 arrange_panels <- function(n) {
   if (n <= 2L) {
     return(matrix(seq_len(n), ncol = 1L))
@@ -37,7 +37,7 @@ arrange_panels <- function(n) {
   matrix(c(seq_len(n), if (n %% 2L) n), ncol = 2L, byrow = TRUE)
 }
 
-# In lines: room for numbers, and in the column of the actions for what they are called.
+# The left margins in lines: room for numbers, and in the column of the actions for their names.
 left_margins <- function(data, grid) {
   left <- rep(3.6, ncol(grid))
   line <- line_inches(graphics::par("cex"))
@@ -47,21 +47,16 @@ left_margins <- function(data, grid) {
   left
 }
 
-# All columns' plots are equally wide.
-column_widths <- function(left, cex) {
-  (left + 0.8) * line_inches(cex) + plot_width(left, cex)
-}
-
 plot_width <- function(left, cex) {
   margins <- (left + 0.8) * line_inches(cex)
   max(graphics::par("din")[[1L]] - sum(margins), 0.1) / length(left)
 }
 
-# The height of a line of the margins.
+# The height of a line of the margins, in inches.
 line_inches <- function(cex) graphics::par("cin")[[2L]] * cex
 
-# One for all panels, so that the longest title fits. Not by the ratio of the widths, as
-# devices round the sizes of their letters.
+# One size of titles for all panels, with which the longest fits. The ratio of the widths does not
+# give it, because devices round the sizes of letters.
 panel_title_cex <- function(titles, left) {
   room <- plot_width(left, graphics::par("cex"))
   cex <- 1
@@ -71,7 +66,7 @@ panel_title_cex <- function(titles, left) {
   cex
 }
 
-# Letters that leave room for the picture on small devices.
+# A size of letters that leaves room for the picture on small devices.
 panel_cex <- function(grid) {
   inches <- graphics::par("din") / rev(dim(grid))
   max(0.4, min(0.85, inches[[1L]] / 2.8, 0.75 * inches[[2L]]))
@@ -137,7 +132,7 @@ draw_choices <- function(values, choices) {
                  gap.axis = 0)
 }
 
-# What is told beside the title is left out where it does not fit.
+# The notes beside the title are left out where they do not fit.
 draw_panel_title <- function(title, limits, parts, cex) {
   width <- function(text, ...) graphics::strwidth(text, "inches", cex = cex, ...)
   write <- function(text, ...) {

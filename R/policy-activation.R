@@ -1,4 +1,4 @@
-# What the layers of a network apply to their sums.
+# The activation functions of a network's layers.
 
 base_activations <- c("tanh", "logistic")
 sigmoid_activations <- c("Gompertz", "ReLU", "leakyReLU")
@@ -50,9 +50,7 @@ activate <- function(x, activation) {
   )
 }
 
-# Brings outputs to the range from 0 to 1, where they have a range.
+# Scales outputs that have a range to the range from 0 to 1.
 unit_outputs <- function(outputs, activation) {
   if (activation == "tanh") (outputs + 1) / 2 else outputs
 }
-
-has_range <- function(activation) activation %in% c("tanh", "logistic", "Gompertz")

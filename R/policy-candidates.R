@@ -1,10 +1,10 @@
-# Networks of the same sizes that play side by side, each in sub-environments of its own.
+# Candidates: networks of the same sizes with different weights, which play in the same batch.
 
-#' Let several networks play in the same sub-environments
+#' Make one policy of several candidates
 #'
 #' @param policies A list of networks that differ only in their weights.
-#' @param candidate Which of them plays in each sub-environment, its place in the list.
-#' @return What [act_sub_envs()] asks for actions: the network itself where it is one.
+#' @param candidate For each sub-environment the place in the list of the network that plays there.
+#' @return A policy for [act_batch()]: the network itself where there is only one.
 #' @noRd
 candidates_of <- function(policies, candidate) {
   if (length(policies) == 1L) {
@@ -21,13 +21,13 @@ candidates_of <- function(policies, candidate) {
 }
 
 #' @exportS3Method
-act_sub_envs.gym_policy_candidates <- function(policy, observation, playing, vector_env) {
+act_batch.gym_policy_candidates <- function(policy, observation, playing, vector_env) {
   network <- policy$policy
-  signal <- network_inputs(network$observation_space, sub_env_numbers(observation))
-  everyone <- length(playing) == nrow(policy$layers[[1L]])
+  signal <- network_inputs(network$observation_space, number_rows(observation))
+  all_play <- length(playing) == nrow(policy$layers[[1L]])
   for (layer in seq_along(policy$layers)) {
     weights <- policy$layers[[layer]]
-    if (!everyone) {
+    if (!all_play) {
       weights <- weights[playing, , drop = FALSE]
     }
     signal <- activate(sum_weighted(signal, weights), network$activation[[layer]])

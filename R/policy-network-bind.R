@@ -1,5 +1,5 @@
-# Fitting a network to an environment: as many inputs as it shows numbers, as many outputs as
-# it takes.
+# Fitting a network to an environment: it needs as many inputs as an observation has numbers, and as
+# many outputs as there are actions or numbers of an action.
 
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
@@ -93,8 +93,8 @@ fitting_sizes <- function(policy, env) {
   paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
 }
 
-# How many inputs a network needs for what is observed there, or outputs for what
-# is done. NULL where a network has no use for the space.
+# How many inputs a network needs for an observation of this space, or outputs for an action of it.
+# NULL for a space that a network cannot observe or choose from.
 space_width <- function(space) {
   if (inherits(space, "gym_space_discrete")) {
     space$n

@@ -99,8 +99,8 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
   }
 }
 
-# In the order of the tutorial: first the matrix of the hidden layer, then the
-# weights of the output.
+# The weights are drawn in the order of the tutorial: first the matrix of the hidden layer, then
+# the weights of the output.
 draw_weights <- function(sizes) {
   Map(
     function(inputs, outputs) {
@@ -145,16 +145,16 @@ check_weights <- function(weights, sizes, name = "weights", call = rlang::caller
 
 #' @export
 act.gym_policy_network <- function(policy, observation, ...) {
-  # They may have been changed by hand.
+  # The weights may have been changed by hand.
   check_weights(policy$weights, policy$sizes, "policy$weights")
-  vector_env <- observation_sub_envs(observation, policy$observation_space)
-  outputs <- network_outputs(policy, vector_env$values)
-  network_action(policy$action_space, outputs, policy, vector_env$one)
+  rows <- observation_rows(observation, policy$observation_space)
+  outputs <- network_outputs(policy, rows$values)
+  network_action(policy$action_space, outputs, policy, rows$one)
 }
 
 #' @exportS3Method
-act_sub_envs.gym_policy_network <- function(policy, observation, playing, vector_env) {
-  outputs <- network_outputs(policy, sub_env_numbers(observation))
+act_batch.gym_policy_network <- function(policy, observation, playing, vector_env) {
+  outputs <- network_outputs(policy, number_rows(observation))
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
 
@@ -224,8 +224,8 @@ box_action <- function(space, outputs, policy, one) {
   rows <- nrow(outputs)
   low <- rep(space$low, each = rows)
   high <- rep(space$high, each = rows)
-  # Two products, as high - low may be beyond the largest number; and never past
-  # a bound by rounding, which the environment would refuse.
+  # The sum of two products, because high - low may be beyond the largest number. Rounding must not
+  # bring a value past a bound, which the environment would refuse.
   values <- pmin(pmax(low * (1 - share) + high * share, low), high)
   if (space$dtype %in% integer_dtypes) {
     values <- round(values)
@@ -238,7 +238,7 @@ output_activation <- function(policy) policy$activation[[length(policy$activatio
 
 check_range <- function(policy, call = rlang::caller_env()) {
   activation <- output_activation(policy)
-  if (!has_range(activation)) {
+  if (!activation %in% c("tanh", "logistic", "Gompertz")) {
     gym_abort(
       c(
         paste0("The output's activation \"", activation, "\" has no upper end, so that the ",
@@ -250,7 +250,7 @@ check_range <- function(policy, call = rlang::caller_env()) {
   }
 }
 
-# Another draw, and what it says of itself ----------------------------------------
+# Drawing again, and printing ------------------------------------------------------
 
 #' @exportS3Method
 policy_resample.gym_policy_network <- function(policy, call = rlang::caller_env()) {

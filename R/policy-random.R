@@ -57,26 +57,23 @@ act.gym_policy_random <- function(policy, observation, ...) {
       value = policy
     )
   }
-  # What is observed matters only for how many there are, and observations that
-  # are lists (of an environment with several parts) come one at a time.
-  observed <- if (counts_sub_envs(observation, policy$observation_space)) {
-    observation_sub_envs(observation, policy$observation_space)
+  # An observation matters only in that each one needs an action. How many there are is known only
+  # where they are numbers; observations that are lists, of an environment with several parts, are
+  # given one at a time.
+  seen_in <- policy$observation_space
+  observed <- if (!is.list(observation) && (is.null(seen_in) || is_stackable(seen_in))) {
+    observation_rows(observation, seen_in)
   }
   if (is.null(observed) || observed$one) {
     space_sample(space)
   } else {
-    sample_sub_envs(space, nrow(observed$values))
+    sample_batch(space, nrow(observed$values))
   }
 }
 
 #' @exportS3Method
-act_sub_envs.gym_policy_random <- function(policy, observation, playing, vector_env) {
-  sample_sub_envs(policy$action_space, length(playing))
-}
-
-# Only of numbers can it be said how many observations there are.
-counts_sub_envs <- function(observation, space) {
-  !is.list(observation) && (is.null(space) || is_stackable(space))
+act_batch.gym_policy_random <- function(policy, observation, playing, vector_env) {
+  sample_batch(policy$action_space, length(playing))
 }
 
 #' @exportS3Method
@@ -100,7 +97,7 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy
 }
 
-# Is each value of a space, as far as kind and shape tell, one of the other's?
+# Whether each value of one space is a value of the other, judged by their kinds and shapes.
 space_within <- function(inner, outer) {
   if (inherits(inner, "gym_space_discrete") && inherits(outer, "gym_space_discrete")) {
     inner$start >= outer$start && inner$start + inner$n <= outer$start + outer$n

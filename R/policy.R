@@ -22,6 +22,9 @@
 #' row, an array, or a list of these for the parts. [rollout()] asks it about a single one
 #' before the first step, so that a function which cannot answer that fails at once.
 #'
+#' `predict()` gives the same actions, or the outputs that they follow from, for observations in a
+#' data frame, too. It never touches R's generator.
+#'
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
 #' @param observation What is observed. For the usual environments a numeric
@@ -34,10 +37,12 @@
 #' @return For one observation one action: a whole number for a discrete action
 #'   space, a numeric vector (or array) in the shape of the space for a Box. For
 #'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
-#'   (an array with `n` as its first dimension).
+#'   (an array with `n` as its first dimension). `predict()` returns the same, and with
+#'   `type = "output"` a numeric vector of length `n` (a matrix with `n` rows where the network has
+#'   several outputs).
 #' @section Errors: `gym_error_argument` when `policy` is no policy, the observation
 #'   does not have as many numbers as the policy takes, or a function does not return one
-#'   action for one observation.
+#'   action for one observation; from `predict()` also when the policy is no network.
 #' @export
 #' @examples
 #' policy <- policy_network(sizes = c(4, 2, 1))
@@ -50,6 +55,9 @@
 #' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
 #' act(follow_pole, c(0.01, -0.2, 0.03, 0.4))
 #' act(follow_pole, observations)
+#'
+#' predict(policy, observations)
+#' predict(policy, observations, type = "output")
 act <- function(policy, observation, ...) UseMethod("act")
 
 #' @export
@@ -70,9 +78,9 @@ act.function <- function(policy, observation, ...) {
   if (is.list(action)) {
     return(action)
   }
-  given <- stack_length(action)
-  if (given != 1L) {
-    abort_action_count(action, given, 1L, list(call = rlang::caller_env()))
+  count <- stack_length(action)
+  if (count != 1L) {
+    abort_action_count(action, count, 1L, list(call = rlang::caller_env()))
   }
   shape <- dim(action)
   dim(action) <- if (length(shape) > 2L) shape[-1L]
@@ -132,7 +140,7 @@ policy_text <- function(policy) {
   if (inherits(policy, "gym_policy")) format(policy) else describe_argument(policy)
 }
 
-# Questions that whoever plays or searches asks of a policy ------------------
+# What rollouts and searches ask of a policy ------------------------------------
 
 #' Fit a policy to an environment
 #'
@@ -143,11 +151,6 @@ policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("poli
 
 #' @exportS3Method
 policy_bind.default <- function(policy, env, call = rlang::caller_env()) policy
-
-# For what is drawn, an environment may be left out.
-bind_named <- function(policy, env, client, call = rlang::caller_env()) {
-  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
-}
 
 #' Draw another policy of the same kind
 #' @noRd
@@ -168,21 +171,21 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
   )
 }
 
-#' Choose an action for each sub-environment that plays
+#' Choose an action for each sub-environment that is playing
 #'
-#' @param policy A policy that is bound to the sub-environments.
-#' @param observation What is observed, one row for each of the sub-environments `playing`.
+#' @param policy A policy that is bound to the environment.
+#' @param observation A batch of observations, one for each of the sub-environments `playing`.
 #' @param playing The numbers of these sub-environments.
-#' @param sub-environments As [vector_env_of()] returns them.
-#' @return The actions, in the form in which sub-environments take them.
+#' @param vector_env As [vector_env_of()] returns it.
+#' @return A batch of actions, one for each of these sub-environments.
 #' @noRd
-act_sub_envs <- function(policy, observation, playing, vector_env) UseMethod("act_sub_envs")
+act_batch <- function(policy, observation, playing, vector_env) UseMethod("act_batch")
 
 #' @exportS3Method
-act_sub_envs.default <- function(policy, observation, playing, vector_env) {
+act_batch.default <- function(policy, observation, playing, vector_env) {
   plain <- is.function(policy) && !has_act_method(policy)
   actions <- if (plain) policy(observation) else act(policy, observation)
-  sub_env_actions(actions, length(playing), vector_env)
+  batch_actions(actions, length(playing), vector_env)
 }
 
 # Observations as rows of numbers -------------------------------------------------
@@ -191,13 +194,14 @@ act_sub_envs.default <- function(policy, observation, playing, vector_env) {
 #'
 #' @param space The observation space, `NULL` for a policy that knows none and
 #'   takes a vector for one observation and a matrix for many.
-#' @return A list: `values`, the matrix, in each row the numbers of an observation
-#'   in row-major order, as Gymnasium flattens them; `one`, whether what came was
-#'   a single observation rather than a number of them.
+#' @return A list: `values`, a matrix with an observation in each row, its numbers in row-major
+#'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation
+#'   rather than a batch.
 #' @noRd
-observation_sub_envs <- function(observation, space) {
+observation_rows <- function(observation, space) {
   axes <- dim(observation)
-  rank <- observation_rank(space)
+  # How many dimensions an observation has: none in a discrete space, which has no shape.
+  rank <- if (is.null(space)) 1L else length(space$shape)
   if (is.null(axes) && rank == 1L) {
     return(list(values = matrix(observation, nrow = 1L), one = TRUE))
   }
@@ -212,9 +216,4 @@ observation_sub_envs <- function(observation, space) {
   } else {
     list(values = t(matrix(row_major(observation), ncol = axes[[1L]])), one = FALSE)
   }
-}
-
-# A discrete space has no shape: its values are single numbers.
-observation_rank <- function(space) {
-  if (is.null(space)) 1L else length(space$shape)
 }

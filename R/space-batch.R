@@ -147,7 +147,7 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
   stats::setNames(as.list(enc2utf8(as.character(value))), part_names(space, name))
 }
 
-# Sub-environments -------------------------------------------------------------------------------
+# Values of a batch -------------------------------------------------------------------
 
 #' Check a value for each sub-environment
 #'
@@ -156,11 +156,11 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 #' @param space The space of one sub-environment, `batch` that of all `n`.
 #' @param sub_envs Their numbers; `NULL` for 1 to `n`.
 #' @noRd
-check_sub_envs <- function(space, batch, values, n, call, sub_envs = NULL) {
+check_batch <- function(space, batch, values, n, call, sub_envs = NULL) {
   if (fits_space(batch, values)) {
     return(invisible())
   }
-  given <- sub_envs_given(space, values)
+  given <- batch_length(space, values)
   if (!is.na(given) && given != n) {
     problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
     abort_space(batch, values, problem, call)
@@ -168,13 +168,13 @@ check_sub_envs <- function(space, batch, values, n, call, sub_envs = NULL) {
   if (!is.na(given)) {
     for (i in seq_len(n)) {
       sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
-      check_sub_env(space, sub_env_value(space, values, i), sub_env, call)
+      check_batch_value(space, batch_value(space, values, i), sub_env, call)
     }
   }
   check_value(batch, values, "", call)
 }
 
-check_sub_env <- function(space, value, sub_env, call) {
+check_batch_value <- function(space, value, sub_env, call) {
   tryCatch(
     check_value(space, value, "", call),
     gym_error_space = function(cnd) {
@@ -185,34 +185,34 @@ check_sub_env <- function(space, value, sub_env, call) {
   )
 }
 
-#' Count the sub-environments in what was given for all of them
+#' Count the values of a batch
 #' @return A number; `NA` for anything that does not have the form of several values of the space.
 #' @noRd
-sub_envs_given <- function(space, values) UseMethod("sub_envs_given")
+batch_length <- function(space, values) UseMethod("batch_length")
 
 #' @exportS3Method
-sub_envs_given.default <- function(space, values) {
+batch_length.default <- function(space, values) {
   if (is.list(values)) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-sub_envs_given.gym_space_text <- function(space, values) {
+batch_length.gym_space_text <- function(space, values) {
   if (is.character(values) || is.list(values)) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-sub_envs_given.gym_space_discrete <- function(space, values) {
+batch_length.gym_space_discrete <- function(space, values) {
   if (is.atomic(values) && is.null(dim(values))) length(values) else NA_integer_
 }
 
 #' @exportS3Method
-sub_envs_given.gym_space_array <- function(space, values) {
+batch_length.gym_space_array <- function(space, values) {
   shape <- if (is.atomic(values)) value_shape(values, batch_space(space, 1L))
   if (identical(shape[-1L], space$shape)) shape[[1L]] else NA_integer_
 }
 
 #' @exportS3Method
-sub_envs_given.gym_space_tuple <- function(space, values) {
+batch_length.gym_space_tuple <- function(space, values) {
   keys <- names(space$spaces) %||% seq_along(space$spaces)
   if (!is.list(values) || length(values) != length(keys)) {
     return(NA_integer_)
@@ -220,15 +220,15 @@ sub_envs_given.gym_space_tuple <- function(space, values) {
   if (is.character(keys)) {
     values <- values[match(keys, enc2utf8(as.character(names(values))))]
   }
-  counts <- unique(unlist(Map(sub_envs_given, unname(space$spaces), unname(values))))
+  counts <- unique(unlist(Map(batch_length, unname(space$spaces), unname(values))))
   if (length(counts) == 1L) counts else NA_integer_
 }
 
 #' @exportS3Method
-sub_envs_given.gym_space_dict <- sub_envs_given.gym_space_tuple
+batch_length.gym_space_dict <- batch_length.gym_space_tuple
 
 # JSON has the values one sub-environment after the other, whatever the space.
-write_sub_envs <- function(space, values, n) {
-  sub_envs <- lapply(seq_len(n), function(sub_env) sub_env_value(space, values, sub_env))
+write_batch <- function(space, values, n) {
+  sub_envs <- lapply(seq_len(n), function(sub_env) batch_value(space, values, sub_env))
   json_array(vapply(sub_envs, write_value, "", space = space))
 }

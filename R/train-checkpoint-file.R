@@ -1,10 +1,11 @@
-# The file of a search's checkpoint: read whole or not at all, written whole or not at all.
+# The file of a search's checkpoint: it is read completely or not at all, and written completely or
+# not at all.
 
-# Of the file's form. Files of another are refused.
-checkpoint_format <- 1L
+# The version of the file's format. Files with another version are refused.
+checkpoint_format <- 2L
 
 #' Read the file of a search
-#' @return What [keep_search()] wrote, `NULL` where there is no file.
+#' @return What [keep_history()] wrote, `NULL` where there is no file.
 #' @noRd
 read_checkpoint <- function(path, call) {
   if (!file.exists(path)) {
@@ -28,7 +29,8 @@ read_checkpoint <- function(path, call) {
   unserialize(file$state)
 }
 
-# What a kill in the middle of writing has left. A young one may be another process's.
+# Removes what a process that was killed while writing has left. A file of the last ten minutes may
+# be one that another process is writing.
 remove_parts <- function(path) {
   files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
   parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
@@ -37,7 +39,7 @@ remove_parts <- function(path) {
 
 #' Write the file of a search
 #'
-#' Beside the one that is there, which it then replaces in one move.
+#' It is written beside the file that is there, and then replaces it by a rename.
 #' @noRd
 write_checkpoint <- function(path, state) {
   state <- serialize(state, NULL)
@@ -48,13 +50,13 @@ write_checkpoint <- function(path, state) {
     ),
     class = "gym_checkpoint"
   )
-  # A name of its own: another process may have been given the same checkpoint.
+  # The name is this process's own, because another process may write the same checkpoint.
   part <- tempfile(paste0(basename(path), "-", Sys.getpid(), "-"), dirname(path), ".part")
   on.exit(unlink(part))
   bytes <- serialize(file, NULL)
-  # The warning knows more than the error.
+  # The warning says more than the error that follows.
   tryCatch(writeBin(bytes, part), warning = function(cnd) stop(conditionMessage(cnd)))
-  # A disk that is full is not always told when a file is closed.
+  # Closing a file does not always fail when the disk is full.
   if (!identical(file.size(part), as.numeric(length(bytes)))) {
     stop("not all of it could be written")
   }

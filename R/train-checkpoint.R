@@ -1,7 +1,7 @@
-# The file in which a search keeps what it has played, so that it can go on after whatever
-# ended it.
+# A search keeps what it has played in a file, the checkpoint, from which it can go on after it was
+# ended.
 
-#' Make ready to keep a search in a file
+#' Prepare to keep a search in a file
 #'
 #' @param path The file.
 #' @param settings As [search_settings()] returns them, with `env` and `seed`.
@@ -10,7 +10,7 @@
 #'   and `saved`, what the file has, `NULL` where there is none to go on with.
 #' @noRd
 open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_env()) {
-  # The working directory may be another when the next block has ended.
+  # The working directory may have changed when the next batch has ended.
   path <- normalizePath(path, mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
     problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
@@ -25,8 +25,8 @@ open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_en
   list(path = path, arguments = arguments, saved = saved)
 }
 
-# What two runs have in common that are the same search. Of a policy what is drawn counts,
-# and not what it was given.
+# What must be the same in two runs of one search. Policies are compared by what is drawn from them,
+# not by the weights that they have.
 search_arguments <- function(env, settings) {
   double <- function(x) if (!is.null(x)) as.numeric(x)
   list(
@@ -86,17 +86,17 @@ argument_text <- function(name, value) {
   )
 }
 
-# The server may offer other sub-environments than it did, and with them other episodes.
-check_same_sub_envs <- function(path, told, now, call) {
-  differ <- Filter(function(name) !is_same(told[[name]], now[[name]]), names(now))
+# Another server may run the sub-environments in another way, and with it play other episodes.
+check_same_server <- function(path, there, now, call) {
+  differ <- Filter(function(name) !is_same(there[[name]], now[[name]]), names(now))
   if (length(differ)) {
     lines <- vapply(differ, function(name) {
       what <- switch(
         name, target = "the environment's reward threshold", env_id = "the environment",
-        block = "how many episodes are played at once",
+        batch_size = "how many episodes are played at once",
         num_envs = "how many sub-environments share a seed"
       )
-      paste0("There ", what, " is ", describe_value(told[[name]]), ", and ",
+      paste0("There ", what, " is ", describe_value(there[[name]]), ", and ",
              describe_value(now[[name]]), " on this server.")
     }, "")
     abort_checkpoint(path, "is from a server that played otherwise", lines, call)
@@ -118,49 +118,46 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
   )
 }
 
-# Going on -------------------------------------------------------------------------
+# Resuming -------------------------------------------------------------------------
 
-#' Go on with a search where its file has it
+#' Go on with a search from its file
 #'
-#' R's generator too.
+#' R's generator goes on from where the file has it, too.
 #' @noRd
-resume_rounds <- function(record, saved, vector_env, settings, path, call) {
-  check_same_sub_envs(path, saved$told, told_by_sub_envs(vector_env, settings), call)
-  restore_rounds(record, saved)
-  finished <- count_finished(record)
+resume_history <- function(history, saved, vector_env, settings, path, call) {
+  check_same_server(path, saved$server, settings_of_server(vector_env, settings), call)
+  restore_history(history, saved)
+  finished <- count_finished(history)
   inform_resumed("Going on from {.path {path}}, with {finished} of {settings$rounds} round{?s}.")
-  # NULL in a session that had drawn nothing, of a search that had not begun.
+  # The state is NULL if the session had drawn nothing and the search had not begun.
   if (!is.null(saved$generator)) {
     restore_random_state(saved$generator)
   }
 }
 
-# What the environment itself adds to the arguments.
-told_by_sub_envs <- function(vector_env, settings) {
+# Settings that the server decides, beside the arguments.
+settings_of_server <- function(vector_env, settings) {
   list(
     target = settings$target, env_id = settings$env_id, num_envs = settings$num_envs,
-    block = vector_env$block
+    batch_size = vector_env$batch_size
   )
 }
 
-#' Put a search back to where its file has it
-#' @param record As [new_rounds()] returns it.
-#' @return The record, with what was played.
+#' Put the history of a search back to where its file has it
+#' @param history As [new_candidates()] returns it.
+#' @return The history, with what was played.
 #' @noRd
-restore_rounds <- function(record, saved) {
-  kept <- saved$record
-  for (name in c("wanted", "begun", "policies", "returns", "means", "open")) {
-    record[[name]] <- kept[[name]]
+restore_history <- function(history, saved) {
+  there <- saved$history
+  for (name in c("wanted", "begun", "policies", "returns", "means", "unfinished")) {
+    history[[name]] <- there[[name]]
   }
-  record$blocks <- list(list2env(kept$episodes, parent = emptyenv()))
-  finished <- count_finished(record)
-  if (finished > 0) {
-    record$on_round(finished, max(-Inf, record$means[seq_len(finished)], na.rm = TRUE))
-  }
-  record
+  history$batches <- list(list2env(there$episodes, parent = emptyenv()))
+  report_finished(history)
+  history
 }
 
-# So that nobody takes what an earlier run has left for what this one has played.
+# Says that a part of the result comes from an earlier run.
 inform_resumed <- function(text, .envir = parent.frame()) {
   cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
 }
@@ -171,45 +168,45 @@ finished_search <- function(saved, settings, client, path) {
   inform_resumed(
     "This search had ended: {.path {path}} has its result. {.code resume = FALSE} plays it anew."
   )
-  told <- saved$told
-  settings[names(told)] <- told
+  settings[names(saved$server)] <- saved$server
   settings["client"] <- list(client)
   settings$policy <- saved$template
   if (is.null(settings$seed)) {
-    # As the search left it.
+    # The generator's state after the search.
     restore_random_state(saved$generator)
   }
-  record <- new_rounds(settings$rounds, settings$episodes, settings$target, function(...) NULL)
-  restore_rounds(record, saved)
-  new_search(record, settings, proc.time()[["elapsed"]] - saved$elapsed)
+  history <- new_candidates(settings$rounds, settings$episodes, settings$target, function(...) NULL)
+  restore_history(history, saved)
+  new_search(history, settings, proc.time()[["elapsed"]] - saved$elapsed)
 }
 
 # Writing --------------------------------------------------------------------------
 
-# So that writing takes a tenth of the time at most, where a block is a single episode.
+# Where a batch is a single episode, the file is next written after nine times as long as writing it
+# took last: so writing takes a tenth of the time at most.
 rest_per_writing <- 9
 
 #' Keep a search in its file from now on
 #'
-#' After each block of episodes the file is written anew. What it holds grows, and where a
-#' block is a single episode, writing might take longer than playing: then some blocks pass
-#' without, and would be played again.
-#' @param record As [new_rounds()] returns it.
-#' @param started When the search began, less what it took before.
+#' The file is written anew after each batch of episodes. It grows, and where a batch is a single
+#' episode, writing might take longer than playing: then it is not written after each batch, and
+#' the episodes since the last time would be played again.
+#' @param history As [new_candidates()] returns it.
+#' @param started When the search began, minus the time that it took before.
 #' @noRd
-keep_rounds <- function(record, checkpoint, vector_env, settings, started, call) {
-  write <- function(record) {
+keep_history <- function(history, checkpoint, vector_env, settings, started, call) {
+  write <- function(history) {
     state <- list(
-      arguments = checkpoint$arguments, told = told_by_sub_envs(vector_env, settings),
-      template = settings$policy, record = kept_record(record),
+      arguments = checkpoint$arguments, server = settings_of_server(vector_env, settings),
+      template = settings$policy, history = saved_history(history),
       generator = globalenv()$.Random.seed, elapsed = proc.time()[["elapsed"]] - started,
-      finished = record$begun >= record$wanted
+      finished = history$begun >= history$wanted
     )
     write_checkpoint(checkpoint$path, state)
   }
   if (is.null(checkpoint$saved)) {
     tryCatch(
-      write(record),
+      write(history),
       error = function(cnd) {
         abort_checkpoint(checkpoint$path, "cannot be written", conditionMessage(cnd), call)
       }
@@ -217,16 +214,16 @@ keep_rounds <- function(record, checkpoint, vector_env, settings, started, call)
   }
   rest_until <- -Inf
   failed <- FALSE
-  record$after_block <- function(record) {
+  history$after_batch <- function(history) {
     began <- proc.time()[["elapsed"]]
-    if (vector_env$block == 1L && began < rest_until && record$begun < record$wanted) {
+    if (vector_env$batch_size == 1L && began < rest_until && history$begun < history$wanted) {
       return()
     }
     tryCatch(
-      write(record),
+      write(history),
       error = function(cnd) {
-        # A full disk must not end what has played for hours.
-        if (!failed) warn_not_kept(checkpoint$path, cnd)
+        # A full disk must not end a search that has played for hours.
+        if (!failed) warn_not_written(checkpoint$path, cnd)
         failed <<- TRUE
       }
     )
@@ -235,7 +232,7 @@ keep_rounds <- function(record, checkpoint, vector_env, settings, started, call)
   }
 }
 
-warn_not_kept <- function(path, cnd) {
+warn_not_written <- function(path, cnd) {
   rlang::warn(
     c(paste0("The checkpoint \"", path, "\" cannot be written; the search goes on without."),
       x = conditionMessage(cnd)),
@@ -243,19 +240,20 @@ warn_not_kept <- function(path, cnd) {
   )
 }
 
-# Between blocks: no episode is under way. Of the policies those are kept that the result
-# or the next block needs.
-kept_record <- function(record) {
-  finished <- count_finished(record)
-  policies <- record$policies
-  needless <- setdiff(seq_len(finished), which.max(record$means[seq_len(finished)]))
+# The file is written between batches, when no episode is under way. It has the policies that the
+# result or the next batch needs.
+saved_history <- function(history) {
+  finished <- count_finished(history)
+  policies <- history$policies
+  needless <- setdiff(seq_len(finished), which.max(history$means[seq_len(finished)]))
   policies[needless] <- list(NULL)
   columns <- c("seed", "sub_env", "return", "length", "terminated", "truncated")
   episodes <- lapply(stats::setNames(nm = columns), function(name) {
-    unlist(lapply(record$blocks, function(block) block[[name]]))
+    unlist(lapply(history$batches, function(batch) batch[[name]]))
   })
   list(
-    wanted = record$wanted, begun = record$begun, policies = policies,
-    returns = record$returns, means = record$means, open = record$open, episodes = episodes
+    wanted = history$wanted, begun = history$begun, policies = policies,
+    returns = history$returns, means = history$means,
+    unfinished = history$unfinished, episodes = episodes
   )
 }

@@ -18,10 +18,10 @@
 #' # The same episodes
 #'
 #' All networks play episodes of the same seeds, so that neighbours differ by their
-#' weights and not by luck. For that each sub-environment must have a seed of its own: an
+#' weights and not by chance. For that each sub-environment must have a seed of its own: an
 #' environment named by its id is made so. One that is given with sub-environments that share a seed
-#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) begins each block of
-#' episodes in the same way, but the networks of a block play different ones; the
+#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) begins each batch of
+#' episodes in the same way, but the networks of a batch play different ones; the
 #' element `common` of the result is `FALSE` then.
 #'
 #' @param search A search, as [search_random()] returns it. An environment that was given to it
@@ -40,7 +40,7 @@
 #' @return An object of class `gym_landscape`, which [print()], [as.data.frame()] and
 #'   [plot()][plot.gym_landscape()] know; a list with the elements
 #'   \describe{
-#'     \item{grid}{A data frame with one row for each point: `a`, `b` (doubles, the place)
+#'     \item{grid}{A data frame with one row for each point: `a`, `b` (doubles, its coordinates)
 #'       and `mean_return` (double, `NA` where an interrupt came first). `as.data.frame()`
 #'       gives it.}
 #'     \item{best}{The mean return of the best policy in these episodes, a double.}
@@ -84,7 +84,8 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
     })
   }
   with_vector_env(
-    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_vector_env, block = NULL
+    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_vector_env,
+    batch_size = NULL
   )
 }
 
@@ -113,7 +114,7 @@ draw_directions <- function(weights) {
   list(Map(as_long_as, first, weights), Map(as_long_as, second, weights))
 }
 
-# Neuron by neuron, which are the rows. In one dimension there is no right angle.
+# For each neuron, which is a row. Where a neuron has one input there is no perpendicular direction.
 perpendicular <- function(layer, to) {
   if (ncol(layer) < 2L) {
     return(layer)
@@ -125,10 +126,10 @@ as_long_as <- function(direction, layer) {
   direction * (sqrt(rowSums(layer^2)) / sqrt(rowSums(direction^2)))
 }
 
-# A list: `grid`, the places, and `policies`, the network at each of them.
+# A list: `grid`, the points, and `policies`, the network at each of them.
 new_plane <- function(policy, directions, size, span) {
   steps <- span * seq(-1, 1, length.out = size)
-  # Exactly the best policy, whatever rounding makes of the middle.
+  # The middle is exactly the best policy, without a rounding error.
   steps[(size + 1) / 2] <- 0
   grid <- expand.grid(a = steps, b = steps, KEEP.OUT.ATTRS = FALSE)
   move <- function(a, b) {
@@ -143,13 +144,14 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-# So many that playing takes seconds; more gain little, as each sub-environment is stepped alone.
+# With so many sub-environments playing takes seconds. More of them gain little, because the server
+# steps one after the other.
 landscape_sub_envs <- 128L
 
-# Each with seeds of its own, so that all networks can play the same episodes.
+# Each sub-environment has a seed of its own, so that all networks can play the same episodes.
 make_seeded_vector_env <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_sub_envs))
-  make_if_can(env_id, n, "sync", "Disabled", client) %||% gym_make(env_id, client = client)
+  make_if_supported(env_id, n, "sync", "Disabled", client) %||% gym_make(env_id, client = client)
 }
 
 #' Play the episodes of all points, side by side
@@ -158,33 +160,34 @@ make_seeded_vector_env <- function(env_id, episodes, client) {
 play_plane <- function(vector_env, plane, search, episodes, progress) {
   started <- proc.time()[["elapsed"]]
   points <- nrow(plane$grid)
-  show <- if (progress) plane_bar(points) else function(finished, best) NULL
-  record <- new_rounds(points, episodes, target = NULL, on_round = show)
-  record$open <- rep(episodes, points)
+  show <- function(finished, best) NULL
+  if (progress) {
+    bar <- progress_bar(points, "Network")
+    show <- function(finished, best) bar(finished)
+  }
+  history <- new_candidates(points, episodes, target = NULL, on_finished = show)
+  history$unfinished <- rep(episodes, points)
   common <- is.null(vector_env$num_envs)
   seeds <- if (common) draw_environment_seeds(episodes) else vector_env$draw_seeds()
-  begin <- function(block, numbers) {
-    point <- round_of(record, numbers)
+  begin <- function(batch, numbers) {
+    point <- candidate_of(history, numbers)
     list(
       seeds = if (common) {
-        rep_len(seeds[(numbers - 1L) %% episodes + 1L], vector_env$block)
+        rep_len(seeds[(numbers - 1L) %% episodes + 1L], vector_env$batch_size)
       } else {
         seeds
       },
       policy = candidates_of(plane$policies[unique(point)], match(point, unique(point)))
     )
   }
-  interrupted <- FALSE
-  tryCatch(
-    play_episodes(vector_env, record, begin, search$max_steps),
-    interrupt = function(cnd) {
-      interrupted <<- TRUE
-      inform_plane_interrupted(count_finished(record), points)
-    }
+  interrupted <- until_interrupted(
+    play_episodes(vector_env, history, begin, search$max_steps),
+    "Interrupted after {finished} of {total} network{?s}; the rest of the landscape is empty.",
+    function() count_finished(history), points
   )
-  finished <- seq_len(count_finished(record))
+  finished <- seq_len(count_finished(history))
   plane$grid$mean_return <- NA_real_
-  plane$grid$mean_return[finished] <- record$means[finished]
+  plane$grid$mean_return[finished] <- history$means[finished]
   structure(
     list(
       grid = plane$grid, best = plane$grid$mean_return[[(points + 1L) / 2L]],
@@ -196,24 +199,7 @@ play_plane <- function(vector_env, plane, search, episodes, progress) {
   )
 }
 
-plane_bar <- function(points, frame = parent.frame()) {
-  bar <- cli::cli_progress_bar(
-    total = points,
-    format = "Network {cli::pb_current} of {cli::pb_total} {cli::pb_bar} {cli::pb_eta_str}",
-    .envir = frame
-  )
-  function(finished, best) cli::cli_progress_update(id = bar, set = finished, .envir = frame)
-}
-
-inform_plane_interrupted <- function(finished, points) {
-  cli::cli_inform(
-    c("!" = "Interrupted after {finished} of {points} network{?s}; the rest of the landscape is
-             empty."),
-    class = "gym_message_interrupted"
-  )
-}
-
-# What it says of itself ------------------------------------------------------------
+# Printing -------------------------------------------------------------------------
 
 #' @export
 as.data.frame.gym_landscape <- function(x, row.names = NULL, optional = FALSE, ...) x$grid

@@ -1,19 +1,19 @@
-# What every search returns, whatever its method: class gym_search.
+# The result of a search, whatever its method: class gym_search.
 
 #' Make a result of a search
 #'
-#' @param record Its rounds, as [new_rounds()] keeps them. Only those count before which
+#' @param history Its candidates, as [new_candidates()] keeps them. Only those count before which
 #'   none is unfinished.
 #' @noRd
-new_search <- function(record, settings, started, interrupted = FALSE) {
-  n <- count_finished(record)
-  episodes <- search_episodes_table(record, n)
-  rounds <- rounds_table(record, episodes, n)
+new_search <- function(history, settings, started, interrupted = FALSE) {
+  n <- count_finished(history)
+  episodes <- search_episodes_table(history, n)
+  rounds <- rounds_table(history, episodes, n)
   best <- which.max(rounds$mean_return)
   found <- length(best) == 1L
   structure(
     list(
-      policy = if (found) record$policies[[best]],
+      policy = if (found) history$policies[[best]],
       solved = found && reaches(rounds$mean_return[[best]], settings$target),
       round = if (found) best else NA_integer_,
       rounds = rounds,
@@ -34,16 +34,16 @@ new_search <- function(record, settings, started, interrupted = FALSE) {
   )
 }
 
-search_episodes_table <- function(record, n) {
-  episodes <- episodes_table(record, n * record$size)
-  episodes$episode <- rep(seq_len(record$size), n)
-  data.frame(round = rep(seq_len(n), each = record$size), episodes)
+search_episodes_table <- function(history, n) {
+  episodes <- episodes_table(history, n * history$episodes_each)
+  episodes$episode <- rep(seq_len(history$episodes_each), n)
+  data.frame(round = rep(seq_len(n), each = history$episodes_each), episodes)
 }
 
-rounds_table <- function(record, episodes, n) {
+rounds_table <- function(history, episodes, n) {
   steps <- colSums(matrix(episodes$length, ncol = n))
   data.frame(
-    round = seq_len(n), mean_return = record$means[seq_len(n)], steps = as.integer(steps)
+    round = seq_len(n), mean_return = history$means[seq_len(n)], steps = as.integer(steps)
   )
 }
 
@@ -52,20 +52,16 @@ rounds_table <- function(record, episodes, n) {
 #' A search returns an object of class `gym_search`, which R's usual functions know:
 #' `print()` says in a few lines what came of it, `as.data.frame()` gives its episodes,
 #' `predict()` what the policy that was found does, and `summary()` plays that policy in
-#' fresh episodes to tell how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
+#' fresh episodes to estimate how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
 #' never touch R's generator.
 #'
 #' The best of many rounds of a few episodes has also been lucky, so its mean return in the
-#' search says too much. `summary()` therefore plays it again. Gym's own definition of solved
-#' is a mean return of at least the environment's threshold over 100 consecutive episodes.
+#' search is too high an estimate. `summary()` therefore plays it again. Gym's own definition of
+#' solved is a mean return of at least the environment's threshold over 100 consecutive episodes.
 #'
 #' @param x,object A search, as [search_random()] returns it.
 #' @param row.names,optional,... Not used.
-#' @param newdata Observations: a numeric vector for a single one, a matrix with one in each
-#'   row, or a data frame, such as the steps of a [rollout()], with a column for each number
-#'   of an observation under its name there.
-#' @param type `"action"`, the default, for the policy's actions, or `"output"` for the
-#'   outputs of the network that they follow from.
+#' @param newdata,type As for [predict()][predict.gym_policy()] of a policy.
 #' @param episodes How many fresh episodes to play, a whole number of at least 1; the
 #'   default is 100.
 #' @param seed A whole number that fixes the fresh episodes and leaves the session's
@@ -152,54 +148,6 @@ predict.gym_search <- function(object, newdata, type = c("action", "output"), ..
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
   check_found(object)
   predict_policy(object$policy, newdata, type, object$env_id)
-}
-
-#' @rdname rollout
-#' @param object What `rollout()` returned.
-#' @param newdata,type,... As for [predict()][predict.gym_search()] of a search.
-#' @export
-predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
-  type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object$policy, newdata, type, object$env_id)
-}
-
-predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
-  if (!inherits(policy, "gym_policy_network")) {
-    gym_abort(
-      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
-      class = "gym_error_argument", argument = "object", value = policy, call = call
-    )
-  }
-  observation <- observations_from(newdata, policy, env_id, call)
-  if (type == "action") {
-    return(act(policy, observation))
-  }
-  values <- observation_sub_envs(observation, policy$observation_space)$values
-  outputs <- network_outputs(policy, values, call)
-  if (ncol(outputs) == 1L) outputs[, 1L] else outputs
-}
-
-# Of a data frame, the columns with an observation's names; where it has none of
-# those it must consist of the observation alone.
-observations_from <- function(newdata, policy, env_id, call) {
-  if (!is.data.frame(newdata)) {
-    return(newdata)
-  }
-  discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  size <- if (discrete) 1L else policy$sizes[[1L]]
-  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
-  names <- observation_names(env_id, columns)
-  if (any(names %in% names(newdata))) {
-    absent <- setdiff(names, names(newdata))
-    if (length(absent)) {
-      gym_abort(
-        paste0("`newdata` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
-        class = "gym_error_argument", argument = "newdata", value = newdata, call = call
-      )
-    }
-    newdata <- newdata[names]
-  }
-  if (discrete) newdata[[1L]] else unname(as.matrix(newdata))
 }
 
 check_found <- function(object, call = rlang::caller_env()) {

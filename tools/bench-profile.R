@@ -13,7 +13,7 @@ steps <- 8L # With alternating actions no episode ends earlier.
 
 clock <- function() as.numeric(Sys.time()) * 1e6
 
-# Functions of the package whose part in a step is told, none of which calls another.
+# Functions of the package whose share of a step is measured, none of which calls another.
 watched <- c("check_value", "write_value", "json_object", "load_body", "parsed_body",
              "decode_observation", "info_from_json")
 

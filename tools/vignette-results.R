@@ -21,7 +21,7 @@ results$episode <- rollout(
 # A megabyte; tools/figures.R makes the moving picture of them.
 results$episode$frames <- NULL
 results$map <- decision_map(
-  results$search$policy, "CartPole-v0", "pole_angle", "pole_angular_velocity",
+  "CartPole-v0", results$search$policy, "pole_angle", "pole_angular_velocity",
   path = results$episode
 )
 results$landscape <- search_landscape(results$search, seed = 1)
@@ -49,7 +49,7 @@ results$versions <- c(
 )
 results$date <- format(Sys.Date())
 
-# A client belongs to the session that made it.
+# A client belongs to the session that created it.
 strip <- function(search) {
   search$client <- NULL
   search

@@ -1,4 +1,4 @@
-# Many environments at once: 1,000 carts whose poles are followed, in one call a step.
+# A vector environment: 1,000 carts follow their poles, and a single call steps all of them.
 
 library(gym)
 
@@ -13,13 +13,13 @@ while (any(alive)) {
   out <- env$step(observation[, 3] > 0)
   observation <- out$observation
   steps <- steps + sum(alive)
-  # A sub-environment whose episode has ended begins another one by itself; the first one counts.
+  # A sub-environment whose episode has ended begins another one by itself; only the first counts.
   alive <- alive & !out$done
 }
 env$close()
 
 cat("1,000 episodes of", steps / 1000, "steps on average\n")
 
-# rollout() does the same, with a table of what came of it.
+# rollout() does the same, and returns a table of the episodes.
 played <- rollout("CartPole-v1", function(observation) observation[, 3] > 0, episodes = 1000)
 print(summary(played))

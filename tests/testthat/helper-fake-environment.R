@@ -56,17 +56,17 @@ fake_observation <- function(space, seed, at) {
   if (length(space$shape) > 1L) array(values, space$shape) else values
 }
 
-# The same with sub-environments, strict as the server is: only with "sync" may some
-# sub-environments be stepped and each have a seed, a sub-environment that is done takes no step in
-# mode "Disabled", and starts again otherwise. With "vector_entry_point" a sub-environment's seed
-# follows from the only one and its number.
+# The same as a vector environment. It is as strict as the server: only with "sync" may `which` be
+# given, and a seed for each sub-environment; where an episode has ended, a sub-environment takes no
+# step in mode "Disabled", and begins again otherwise. With "vector_entry_point" the seed of a
+# sub-environment follows from the one seed and its number.
 fake_vector_env <- function(num_envs, mode = "sync",
-                       autoreset = if (mode == "sync") "Disabled" else "NextStep",
-                       reward = function(seed, step, action) 1,
-                       ends = function(seed, step, action) step == 3L,
-                       observation_space = box_space(rep(-1, 4), rep(1, 4)),
-                       action_space = discrete_space(2L),
-                       reward_threshold = NULL, id = "Fake-v0") {
+                            autoreset = if (mode == "sync") "Disabled" else "NextStep",
+                            reward = function(seed, step, action) 1,
+                            ends = function(seed, step, action) step == 3L,
+                            observation_space = box_space(rep(-1, 4), rep(1, 4)),
+                            action_space = discrete_space(2L),
+                            reward_threshold = NULL, id = "Fake-v0") {
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$num_envs <- as.integer(num_envs)
@@ -78,7 +78,7 @@ fake_vector_env <- function(num_envs, mode = "sync",
   env$sub_env_steps <- 0L
   env$closed <- 0L
   observe <- function(sub_envs) {
-    sub_envs_from(observation_space, lapply(sub_envs, function(i) {
+    batch_of(observation_space, lapply(sub_envs, function(i) {
       fake_observation(observation_space, env$seed[[i]], env$at[[i]])
     }))
   }
@@ -94,11 +94,11 @@ fake_vector_env <- function(num_envs, mode = "sync",
     stopifnot(is.null(which) || mode == "sync")
     sub_envs <- which %||% seq_len(num_envs)
     stopifnot(autoreset != "Disabled" || !any(env$done[sub_envs]))
-    stopifnot(sub_envs_given(action_space, action) == length(sub_envs))
+    stopifnot(batch_length(action_space, action) == length(sub_envs))
     env$sub_env_steps <- env$sub_env_steps + length(sub_envs)
     again <- env$done[sub_envs]
     env$at[sub_envs] <- ifelse(again, 0L, env$at[sub_envs] + 1L)
-    actions <- lapply(seq_along(sub_envs), sub_env_value, space = action_space, sub_envs = action)
+    actions <- lapply(seq_along(sub_envs), batch_value, space = action_space, batch = action)
     each <- function(f) mapply(f, env$seed[sub_envs], env$at[sub_envs], actions)
     ended <- each(ends) & !again
     env$done[sub_envs] <- ended
@@ -127,11 +127,11 @@ scripted_environment <- function(returns, ...) {
   )
 }
 
-# Sub-environments whose episodes have these returns and lengths, in the order in which they begin,
-# block after block. The return comes with the last step.
+# A vector environment whose episodes have these returns and lengths, in the order in which they
+# begin, batch after batch. The return comes with the last step.
 scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) {
-  block <- -1L
-  at <- function(seed) block * num_envs + match(seed, current)
+  batch <- -1L
+  at <- function(seed) batch * num_envs + match(seed, current)
   current <- NULL
   env <- fake_vector_env(
     num_envs, mode,
@@ -144,7 +144,7 @@ scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) 
   reset <- env$reset
   env$reset <- function(seed = NULL, options = NULL) {
     observation <- reset(seed, options)
-    block <<- block + 1L
+    batch <<- batch + 1L
     current <<- env$seed
     observation
   }

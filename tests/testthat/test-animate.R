@@ -204,3 +204,15 @@ test_that("a page of knitr has the animation, and LaTeX its filmstrip", {
   expect_match(paper$files, "[.]pdf$")
   expect_gt(file.size(paper$files), 1000)
 })
+
+test_that("gganimate's generic finds the methods, when it is loaded and later", {
+  hooks <- getHook(packageEvent("gganimate", "onLoad"))
+  ours <- Filter(function(hook) identical(topenv(environment(hook)), asNamespace("gym")), hooks)
+  expect_gt(length(ours), 0)
+  home <- new.env()
+  home$animate <- function(plot, ...) UseMethod("animate")
+  environment(home$animate) <- home
+  register_animate(home)
+  expect_error(home$animate(rollout(fake_environment(), policy_random())),
+               class = "gym_error_argument")
+})

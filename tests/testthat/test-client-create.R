@@ -377,7 +377,7 @@ test_that("calls leave R's generator alone", {
   expect_identical(.Random.seed, before)
 })
 
-test_that("the settings of httr's set_config() hold for clients, too, and their own take precedence", {
+test_that("httr's set_config() holds for clients, too, and their own settings take precedence", {
   withr::local_options(httr_config = httr::config(cainfo = "group.pem", proxy = "a.example.org"))
   expect_identical(create_GymClient("http://a")$config$options$cainfo, "group.pem")
   own <- create_GymClient("http://a", config = httr::config(cainfo = "own.pem"))

@@ -24,41 +24,6 @@ test_that("the classic calls play an episode", {
   expect_null(env_list_all(client)[[id]])
 })
 
-test_that("the classic calls tell the spaces", {
-  client <- test_client()
-  id <- env_create(client, "CartPole-v0")
-  withr::defer(env_close(client, id))
-  expect_equal(env_action_space_info(client, id)[["name"]], "Discrete")
-  expect_equal(env_action_space_info(client, id)[["n"]], 2)
-  space <- env_observation_space_info(client, id)
-  expect_equal(space$shape, 4)
-  # The limits of CartPole's observations, as float32 has them.
-  expect_equal(space$high, c(4.8, Inf, 0.41887903, Inf), tolerance = 1e-7)
-  expect_identical(space$low, -space$high)
-})
-
-test_that("what belongs to a space is told from what does not", {
-  env <- local_env()
-  member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
-  expect_true(member(0))
-  expect_true(member(1L))
-  for (value in list(2, -1, 0.5, "a", NULL, NA, c(0, 1))) {
-    expect_false(member(value))
-    expect_false(space_contains(env$action_space, value))
-  }
-  observed <- function(value) env_observation_space_contains(env$client, env$instance_id, value)
-  expect_true(observed(c(0, 1e30, 0, 0)))
-  expect_true(observed(env$reset()))
-  for (value in list(c(9, 0, 0, 0), 1:3, 0, "a", matrix(0, 1, 4))) expect_false(observed(value))
-})
-
-test_that("a Box of one number knows its members", {
-  env <- local_env("Pendulum-v1")
-  member <- function(value) env_action_space_contains(env$client, env$instance_id, value)
-  expect_true(member(1.5))
-  expect_false(member(2.5))
-})
-
 test_that("the same seed gives the same episode, seed 0 is a seed", {
   play <- function(...) {
     env <- local_env(...)
@@ -94,7 +59,7 @@ test_that("a seed that is none is refused before anything is sent", {
   }
 })
 
-test_that("a reset tells what the environment tells besides, when asked", {
+test_that("a reset returns the info, when asked", {
   client <- test_client()
   env <- local_env(seed = 1)
   both <- env$reset(seed = 3, return_info = TRUE)
@@ -128,55 +93,6 @@ test_that("options reach the environment's reset", {
   env <- local_env()
   expect_true(all(abs(env$reset(options = list(low = 0.2, high = 0.3))) >= 0.2))
   expect_error(env$reset(options = list(1)), "options", class = "gym_error_argument")
-})
-
-test_that("an environment is an object with Gymnasium's names", {
-  env <- local_env("CartPole-v1", seed = 1)
-  expect_output(print(env), "<gym_env: CartPole-v1>.*<Box float32 \\[4\\]>.*<Discrete 2>")
-  expect_equal(env$spec$reward_threshold, 475)
-  expect_equal(env$spec$max_episode_steps, 500)
-  expect_length(env$reset(), 4)
-  expect_identical(env$step(1)$truncated, FALSE)
-  # The classic calls see the same environment.
-  out <- env_step(env$client, env$instance_id, 0)
-  expect_equal(out$reward, 1)
-  expect_true(env$is_open)
-  env$close()
-  expect_false(env$is_open)
-  expect_output(print(env), "closed")
-  expect_error(env$close(), NA)
-  gone <- local_env()
-  env_close(gone$client, gone$instance_id)
-  expect_error(gone$close(), NA)
-  expect_error(env$step(1), "was closed", class = "gym_error_argument")
-  expect_error(env$reset(), "was closed", class = "gym_error_argument")
-})
-
-test_that("arguments by name go to the environment", {
-  env <- local_env("CartPole-v1", sutton_barto_reward = TRUE)
-  env$reset()
-  expect_equal(env$step(1)$reward, 0)
-  expect_error(local_env("CartPole-v1", wind = 3), "wind", class = "gym_error_http_400")
-  expect_error(gym_make("CartPole-v1", 3), class = "gym_error_argument")
-  expect_error(gym_make("CartPole-v1", gravity = 1, gravity = 2), "more than once",
-               class = "gym_error_argument")
-})
-
-test_that("an environment that was thrown away is closed by the next that is made", {
-  client <- create_GymClient(test_client()$remote_base)
-  before <- length(env_list_all(client))
-  env <- gym_make("CartPole-v1", client = client)
-  rm(env)
-  gc()
-  env <- local_env(client = client)
-  expect_length(env_list_all(client), before + 1)
-})
-
-test_that("an environment of which nothing could be learnt is closed again", {
-  server <- local_server()
-  client <- local_cut_client(server, "answered", "GET /v1/envs/", times = 100)
-  expect_error(gym_make("CartPole-v1", client = client), class = "gym_error_connection")
-  expect_length(env_list_all(server), 0)
 })
 
 test_that("an unknown instance is the classic error", {
@@ -260,7 +176,7 @@ test_that("a step after the end warns once an episode", {
   }
 })
 
-test_that("an exception inside an environment is told and touches no other", {
+test_that("an exception inside an environment is an error that leaves the others alone", {
   server <- local_odd_server()
   env <- make_odd("Failing", server)
   other <- make_odd("Image", server)
@@ -275,7 +191,7 @@ test_that("an exception inside an environment is told and touches no other", {
   expect_error(gone$close(), NA)
 })
 
-test_that("what an environment tells besides arrives", {
+test_that("the info of an environment arrives", {
   env <- make_odd("Telling", local_odd_server())
   env$reset()
   out <- env$step(0)

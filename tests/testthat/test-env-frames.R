@@ -81,7 +81,7 @@ test_that("an environment that cannot be drawn is refused before anything is pla
   expect_length(fake$seeds, 0)
 })
 
-test_that("an environment with sub-environments is refused, and a flag must be one", {
+test_that("a vector environment is refused, and a flag must be one", {
   env <- local_env("CartPole-v1", num_envs = 2)
   expect_error(rollout(env, policy_random(), frames = TRUE), "has 2 sub-environments",
                class = "gym_error_argument")
@@ -89,7 +89,7 @@ test_that("an environment with sub-environments is refused, and a flag must be o
                "`frames` must be TRUE or FALSE", class = "gym_error_argument")
 })
 
-test_that("an environment tells its frames a second", {
+test_that("an environment has its number of frames a second", {
   expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
   expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)
   expect_null(make_odd("Image", local_odd_server())$spec$render_fps)

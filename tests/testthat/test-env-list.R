@@ -40,7 +40,8 @@ test_that("a name is a short string", {
 test_that("a server's limits say what to do about them", {
   server <- local_server(max_instances = 2, max_num_envs = 4, max_total_sub_envs = 5)
   env <- gym_make("CartPole-v1", num_envs = 4, client = server)
-  error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server), "max-total-sub-envs",
+  error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server),
+                        "max-total-sub-envs",
                         class = "gym_error_http_429")
   expect_identical(error$code, "too_many_sub_envs")
   gym_make("CartPole-v1", client = server)

@@ -27,7 +27,7 @@ test_that("parts of nested values have columns of their own", {
   value <- function(i) {
     list(a = c(i, i + 0.5), b.c = i, t = list(letters[i], 1L), s = as.list(seq_len(i)))
   }
-  columns <- value_columns(space, sub_envs_from(space, lapply(1:2, value)), "obs")
+  columns <- value_columns(space, batch_of(space, lapply(1:2, value)), "obs")
   expect_named(columns, c("obs_a_1", "obs_a_2", "obs_b.c", "obs_t_1", "obs_t_2", "obs_s"))
   expect_identical(columns$obs_a_2, c(1.5, 2.5))
   expect_identical(columns$obs_t_1, c("a", "b"))

@@ -1,6 +1,6 @@
 by_sub_env <- function(json, n) info_by_sub_env(from_json(json), n)
 
-test_that("each key has an entry a sub-environment, missing where the sub-environment said nothing", {
+test_that("each key has an entry for each sub-environment, missing where there is no value", {
   info <- by_sub_env('{"x":[0,2,0],"_x":[false,true,false],"ok":[true,false,false],
     "_ok":[true,true,false],"word":[null,"b",null],"_word":[false,true,false],
     "half":[0.5,0.0,"NaN"],"_half":[true,false,true]}', 3)
@@ -10,7 +10,7 @@ test_that("each key has an entry a sub-environment, missing where the sub-enviro
   )
 })
 
-test_that("arrays have the sub-environment first, other values are in a list", {
+test_that("the first dimension of arrays counts sub-environments, other values are in a list", {
   info <- by_sub_env('{"place":[[0,0],[1,2]],"_place":[false,true],
     "grid":[[[1,2],[3,4]],[[5,6],[7,8]]],"_grid":[true,true],
     "mixed":[null,{"a":1}],"_mixed":[false,true]}', 2)
@@ -19,7 +19,7 @@ test_that("arrays have the sub-environment first, other values are in a list", {
   expect_identical(info$mixed, list(NULL, list(a = 1L)))
 })
 
-test_that("infos inside of infos are by sub-environment too", {
+test_that("infos inside of infos have entries for each sub-environment, too", {
   info <- by_sub_env('{"episode":{"r":[9,0],"_r":[true,false],"l":[9,0],"_l":[true,false]},
     "_episode":[true,false],"final_info":{"lives":[0,3],"_lives":[false,true]},
     "_final_info":[false,true]}', 2)
@@ -28,8 +28,9 @@ test_that("infos inside of infos are by sub-environment too", {
   expect_named(info, c("episode", "final_info"))
 })
 
-test_that("one sub-environment is still a sub-environment, and what has no mask is told as it is", {
-  info <- by_sub_env('{"x":[5],"_x":[true],"gone":[null],"_gone":[false],"seed":[1,2],"_free":7}', 1)
+test_that("a single sub-environment has entries too, and values without a mask stay as they are", {
+  json <- '{"x":[5],"_x":[true],"gone":[null],"_gone":[false],"seed":[1,2],"_free":7}'
+  info <- by_sub_env(json, 1)
   expect_identical(info, list(x = 5L, gone = list(NULL), seed = 1:2, `_free` = 7L))
   expect_identical(by_sub_env("{}", 3), structure(list(), names = character()))
 })

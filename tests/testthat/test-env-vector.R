@@ -1,6 +1,6 @@
 # Vector environments through a real server.
 
-test_that("sub-environments through R are the sub-environments in Python, however they are run", {
+test_that("sub-environments play the same in R as in Python, in every vectorization mode", {
   client <- test_client()
   python <- the_session$servers[[client$remote_base]]$python
   cases <- list(
@@ -39,9 +39,10 @@ test_that("sub-environments through R are the sub-environments in Python, howeve
   }
 })
 
-test_that("what was chosen is told, and printed in one line", {
+test_that("the modes that were chosen can be read, and are printed in one line", {
   env <- local_env("CartPole-v1", num_envs = 256)
-  expect_output(print(env), "<gym_env: CartPole-v1, 256 sub-environments (vector_entry_point, NextStep)>",
+  expect_output(print(env),
+                "<gym_env: CartPole-v1, 256 sub-environments (vector_entry_point, NextStep)>",
                 fixed = TRUE)
   expect_output(print(env), "<Box float32 [256, 4]>", fixed = TRUE)
   expect_equal(env$num_envs, 256)
@@ -56,7 +57,7 @@ test_that("what was chosen is told, and printed in one line", {
   expect_output(print(single), "<gym_env: CartPole-v1>", fixed = TRUE)
 })
 
-test_that("the spaces have the sub-environments first, as the server describes them", {
+test_that("the first dimension of the spaces counts sub-environments, as on the server", {
   env <- local_env("CartPole-v1", num_envs = 3)
   asked <- function(which) {
     new_space(get_request(env$client, paste0("/v1/envs/", env$instance_id, "/", which, "/"))$info)
@@ -78,7 +79,7 @@ test_that("the spaces have the sub-environments first, as the server describes t
   expect_false(observed(env$reset()[1:2, ]))
 })
 
-test_that("each part of a result has a row a sub-environment, with one sub-environment too", {
+test_that("each part of a result has a row for each sub-environment, also when there is one", {
   for (n in c(1L, 3L)) {
     env <- local_env("CartPole-v1", num_envs = n, seed = 1)
     expect_identical(dim(env$reset()), c(n, 4L))
@@ -94,7 +95,7 @@ test_that("each part of a result has a row a sub-environment, with one sub-envir
   }
 })
 
-test_that("a seed for each sub-environment is that sub-environment's seed, NA leaves the sub-environment its generator", {
+test_that("with a seed for each, a sub-environment gets its own; NA leaves its generator", {
   seeds <- c(11, 12, 13)
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = seeds)
   single <- local_env("CartPole-v1")
@@ -110,7 +111,7 @@ test_that("a seed for each sub-environment is that sub-environment's seed, NA le
   expect_identical(chosen$vectorization_mode, "sync")
 })
 
-test_that("only the sub-environments that are asked for step, and have rows", {
+test_that("only the sub-environments that `which` picks step, and have rows", {
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   twin <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   env$reset()
@@ -124,7 +125,7 @@ test_that("only the sub-environments that are asked for step, and have rows", {
   expect_identical(env$step(c(0, 0, 0), which = 1:3), twin$step(c(0, 0, 0)))
 })
 
-test_that("a mask resets only its sub-environments", {
+test_that("a mask resets only the sub-environments that it picks", {
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1)
   env$reset()
   before <- env$step(c(1, 1, 1))$observation
@@ -133,12 +134,12 @@ test_that("a mask resets only its sub-environments", {
   expect_false(identical(after[2, ], before[2, ]))
 })
 
-test_that("a sub-environment that ends begins again in the same step, and its last observation is kept", {
+test_that("with SameStep the step that ends an episode begins one and keeps its observation", {
   env <- local_env("CartPole-v1", num_envs = 3, autoreset_mode = "SameStep", seed = 1)
   single <- local_env("CartPole-v1")
   env$reset(seed = c(1, 2, 3))
   single$reset(seed = 1)
-  # The first sub-environment falls soon, the others are held up longer.
+  # The first pole falls soon, the others stay up longer.
   repeat {
     out <- env$step(c(1, 0, 1), which = 1:3)
     last <- single$step(1)
@@ -154,7 +155,7 @@ test_that("a sub-environment that ends begins again in the same step, and its la
   expect_false(any(startsWith(names(out$info), "_")))
 })
 
-test_that("with autoreset disabled a sub-environment that is done wants a reset before it steps", {
+test_that("with autoreset disabled a sub-environment needs a reset after its episode's end", {
   env <- local_env("CartPole-v1", num_envs = 2, autoreset_mode = "Disabled")
   twin <- local_env("CartPole-v1", num_envs = 2, autoreset_mode = "Disabled")
   env$reset(seed = c(1, 2))
@@ -185,7 +186,7 @@ test_that("with autoreset in the next step no warning comes of stepping on", {
   expect_true(0 %in% out$reward)
 })
 
-test_that("sub-environments in processes of their own give what sub-environments in one process give", {
+test_that("in processes of their own, sub-environments play as in one process", {
   sync <- local_env("CartPole-v1", num_envs = 2, vectorization_mode = "sync")
   async <- local_env("CartPole-v1", num_envs = 2, vectorization_mode = "async")
   expect_identical(async$vectorization_mode, "async")
@@ -193,7 +194,7 @@ test_that("sub-environments in processes of their own give what sub-environments
   for (i in 1:30) expect_identical(async$step(c(1, 0)), sync$step(c(1, 0)))
 })
 
-test_that("a number of sub-environments that is none is refused before anything is made", {
+test_that("a `num_envs` that is no number is refused before anything is made", {
   client <- test_client()
   before <- length(env_list_all(client))
   for (bad in list(0, -1, 2.5, NA, NaN, Inf, "2", c(2, 3), TRUE, list(2))) {
@@ -208,7 +209,7 @@ test_that("a number of sub-environments that is none is refused before anything 
   expect_length(env_list_all(client), before)
 })
 
-test_that("modes that are none, or are for sub-environments that are not there, are refused", {
+test_that("unknown modes, and modes without `num_envs`, are refused", {
   client <- test_client()
   make <- function(...) gym_make("CartPole-v1", ..., client = client)
   for (bad in list("fast", "Sync", NA, 1, c("sync", "async"))) {
@@ -230,7 +231,7 @@ test_that("modes that are none, or are for sub-environments that are not there, 
   expect_match(error$hint, "sync")
 })
 
-test_that("seeds, masks and sub-environments that do not fit the sub-environments are refused, and no sub-environment moves", {
+test_that("seeds, masks and `which` that do not fit are refused, and nothing moves", {
   make <- function() {
     env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync", seed = 1,
                      frame = parent.frame(2))
@@ -257,7 +258,7 @@ test_that("seeds, masks and sub-environments that do not fit the sub-environment
   expect_error(single$step(1, which = 1), "which", class = "gym_error_argument")
 })
 
-test_that("actions that do not fit the sub-environments are refused with the sub-environment, and no sub-environment moves", {
+test_that("actions that do not fit are refused, naming the sub-environment, and nothing moves", {
   make <- function(id, mode, frame) {
     env <- local_env(id, num_envs = 4, vectorization_mode = mode, frame = frame)
     env$reset(seed = 1)
@@ -312,7 +313,7 @@ test_that("a step before the first reset is an error, and a closed environment s
   expect_error(env$step(c(0, 1)), "was closed", class = "gym_error_argument")
 })
 
-test_that("sub-environments travel as tensors where their space has them", {
+test_that("values of vector environments travel as tensors where their space has them", {
   env <- local_env("CartPole-v1", num_envs = 2)
   instance <- known_instance(env$client, env$instance_id)
   expect_true(instance$takes_tensors)
@@ -322,14 +323,14 @@ test_that("sub-environments travel as tensors where their space has them", {
   expect_false(travels_as_tensors(new_space(list(name = "Tuple", spaces = list())), 2))
 })
 
-test_that("the info of a reset is by sub-environment", {
+test_that("the info of a reset has entries for each sub-environment", {
   skip_if_not(env_registry(test_client(), "FrozenLake-v1")$available[1], "the extra toy-text")
   env <- local_env("FrozenLake-v1", num_envs = 2)
   both <- env$reset(return_info = TRUE)
   expect_identical(both, list(observation = c(0L, 0L), info = list(prob = c(1L, 1L))))
 })
 
-test_that("the classic calls play sub-environments", {
+test_that("the classic calls play a vector environment", {
   client <- test_client()
   id <- env_create(client, "CartPole-v1", seed = 1, num_envs = 2, vectorization_mode = "sync")
   withr::defer(env_close(client, id))
@@ -354,10 +355,11 @@ test_that("kwargs and wrappers reach every sub-environment", {
   expect_identical(short$vectorization_mode, "sync")
 })
 
-test_that("a wrong action of some sub-environments is named by its sub-environment", {
+test_that("an error about a wrong action names the sub-environment, with `which` too", {
   env <- local_env("FrozenLake-v1", num_envs = 5, autoreset_mode = "Disabled")
   env$reset()
-  error <- expect_error(env$step(c(0, NA), which = c(2, 4)), "Sub-environment 4", class = "gym_error_space")
+  error <- expect_error(env$step(c(0, NA), which = c(2, 4)), "Sub-environment 4",
+                        class = "gym_error_space")
   expect_identical(error$sub_env, 4)
 })
 

@@ -57,7 +57,7 @@ test_that("the first step with render = TRUE opens the page, and no other", {
   expect_match(seen$addresses, instance_id)
 })
 
-test_that("an environment made for people opens its page when it is made", {
+test_that("an environment with render_mode \"human\" opens its page when it is made", {
   seen <- local_viewer()
   env <- local_env(render_mode = "human")
   expect_match(seen$addresses, env$instance_id)
@@ -100,7 +100,7 @@ test_that("an interactive session opens the pane where there is one, else the br
 })
 
 test_that("the address is printed when nobody came", {
-  local_binding("watcher_patience", 0.3)
+  local_binding("watcher_timeout", 0.3)
   # What xdg-open does without a display: nothing, and no error.
   withr::local_options(
     gym.viewer = NULL, rlang_interactive = TRUE, viewer = NULL, browser = function(url) NULL

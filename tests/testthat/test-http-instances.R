@@ -154,13 +154,13 @@ test_that("an interrupted gym_make() leaves nothing, whenever the interrupt come
 })
 
 test_that("what was refused or never sent is not remembered", {
-  made <- function() length(ls(the_session$instances))
-  before <- made()
+  remembered <- function() length(ls(the_session$instances))
+  before <- remembered()
   expect_error(env_create(test_client(), "Nothing-v0"), class = "gym_error_http_400")
   nobody <- create_GymClient(paste0("http://127.0.0.1:", free_port()))
   error <- expect_error(env_create(nobody, "CartPole-v1"), class = "gym_error_connection")
   expect_false(error$reached)
-  expect_identical(made(), before)
+  expect_identical(remembered(), before)
 })
 
 test_that("a server that was stopped has nothing left to close", {

@@ -19,9 +19,11 @@ test_that("a session waits for another one, with a message", {
   skip_on_cran()
   local_cache()
   done <- file.path(install_root(), "done")
-  other <- other_session(
-    "gym:::with_install_lock({Sys.sleep(2); writeLines('', file.path(gym:::install_root(), 'done'))})"
-  )
+  other <- other_session(paste(
+    "done <- file.path(gym:::install_root(), 'done')",
+    "gym:::with_install_lock({Sys.sleep(2); writeLines('', done)})",
+    sep = "\n"
+  ))
   wait_until(function() file.exists(install_lock_owner()))
   expect_message(found <- with_install_lock(file.exists(done)), "Another R session is installing")
   expect_true(found)

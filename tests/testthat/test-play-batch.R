@@ -30,7 +30,7 @@ one_by_one <- function(seeds, policy, ...) {
   )
 }
 
-test_that("each sub-environment plays one episode of a block, from its reset to its end", {
+test_that("each sub-environment plays one episode of a batch, from its reset to its end", {
   for (env in every_kind(4, ends = of_some_length)) {
     episodes <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
     expect_identical(episodes$sub_env, c(1:4, 1:4, 1:2))
@@ -45,7 +45,7 @@ test_that("each sub-environment plays one episode of a block, from its reset to 
   }
 })
 
-test_that("an episode is the same in a sub-environment and alone", {
+test_that("an episode is the same in a vector environment and alone", {
   set.seed(1)
   policy <- policy_network()
   env <- fake_vector_env(5, ends = of_some_length, reward = by_action)
@@ -55,7 +55,7 @@ test_that("an episode is the same in a sub-environment and alone", {
   expect_identical(episodes$length, alone$length)
 })
 
-test_that("sub-environments of every kind play the same episodes from the same seeds", {
+test_that("vector environments of every mode play the same episodes from the same seeds", {
   play <- function(mode, autoreset) {
     env <- fake_vector_env(5, mode, autoreset, ends = of_some_length, reward = by_action)
     rollout(env, policy_random(), episodes = 23, seed = 2, steps = TRUE)
@@ -72,14 +72,15 @@ test_that("a sub-environment that has ended takes no further step where it need 
   expect_identical(env$sub_env_steps, sum(played$episodes$length))
 })
 
-test_that("an episode in sub-environments with a single seed can be begun again by seed and sub-environment", {
+test_that("an episode in sub-environments that share a seed can begin again by seed and number", {
   env <- fake_vector_env(4, "vector_entry_point", ends = of_some_length)
   played <- rollout(env, policy_random(), episodes = 10, seed = 1, steps = TRUE)
   expect_identical(played$num_envs, 4L)
   first <- played$steps[played$steps$step == 1, 3:6]
   for (i in 1:10) {
     observation <- env$reset(seed = played$episodes$seed[i])
-    expect_identical(observation[played$episodes$sub_env[i], ], unlist(first[i, ], use.names = FALSE))
+    row <- observation[played$episodes$sub_env[i], ]
+    expect_identical(row, unlist(first[i, ], use.names = FALSE))
   }
   # Elsewhere the seed is enough.
   expect_null(rollout(fake_vector_env(4), policy_random())$num_envs)
@@ -102,7 +103,7 @@ test_that("the steps are those of one episode after the other", {
   }
 })
 
-test_that("max_steps cuts all sub-environments short that still play", {
+test_that("max_steps cuts short all episodes that have not ended", {
   for (env in every_kind(4, ends = of_some_length)) {
     whole <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
     cut <- rollout(env, policy_random(), episodes = 10, seed = 1, max_steps = 3, steps = TRUE)
@@ -129,7 +130,7 @@ test_that("a seed begins the same episodes whatever policy plays them", {
   }
 })
 
-test_that("observations and actions of every shape have a row for each sub-environment that plays", {
+test_that("observations and actions of every shape have a row for each episode that is playing", {
   array_space <- box_space(rep(-1, 6), rep(1, 6), shape = c(2L, 3L))
   for (env in every_kind(4, ends = of_some_length, observation_space = array_space,
                          action_space = array_space)) {
@@ -154,7 +155,7 @@ test_that("observations and actions of every shape have a row for each sub-envir
   }
 })
 
-test_that("ended sub-environments that cannot be left alone and take no step are refused", {
+test_that("sub-environments that must step together, but cannot once they ended, are refused", {
   env <- fake_vector_env(2, "async", "Disabled")
   expect_error(rollout(env, policy_random()), "\"Disabled\".*NextStep",
                class = "gym_error_argument")

@@ -1,7 +1,7 @@
 cartpole <- function(...) fake_environment(id = "CartPole-v1", ...)
 
 pole_map <- function(policy = policy_network(), env = cartpole(), ..., size = 5) {
-  decision_map(policy, env, "pole_angle", "pole_angular_velocity", ..., size = size)
+  decision_map(env, policy, "pole_angle", "pole_angular_velocity", ..., size = size)
 }
 
 # The observations of a map's points.
@@ -36,7 +36,7 @@ test_that("outputs of tanh are brought to the range from 0 to 1", {
 test_that("of several outputs the action with the largest is mapped", {
   env <- fake_environment(action_space = discrete_space(3L, start = 5L))
   policy <- policy_bind(policy_network(c(4, 6, 3)), env)
-  map <- decision_map(policy, env, 1, 3, xlim = c(-9, 9), ylim = c(-9, 9), size = 9)
+  map <- decision_map(env, policy, 1, 3, xlim = c(-9, 9), ylim = c(-9, 9), size = 9)
   expect_identical(map$kind, "choice")
   expect_identical(map$actions, c("5", "6", "7"))
   observations <- map_observations(map, paste0("obs_", 1:4))
@@ -46,12 +46,12 @@ test_that("of several outputs the action with the largest is mapped", {
 test_that("of a Box the value of the action is mapped, of several the one that is named", {
   env <- fake_environment(action_space = box_space(c(-2, 0), c(2, 10)), id = "Other-v0")
   policy <- policy_bind(policy_network(c(4, 3, 2)), env)
-  map <- decision_map(policy, env, "obs_1", "obs_2", action = 2, size = 4)
+  map <- decision_map(env, policy, "obs_1", "obs_2", action = 2, size = 4)
   expect_identical(map$kind, "value")
   expect_identical(map$limits, c(0, 10))
   expect_identical(map$actions, "action_2")
   expect_equal(map$grid$action, act(policy, map_observations(map, paste0("obs_", 1:4)))[, 2])
-  expect_error(decision_map(policy, env, 1, 2, action = 3), "`action`",
+  expect_error(decision_map(env, policy, 1, 2, action = 3), "`action`",
                class = "gym_error_argument")
 })
 
@@ -62,10 +62,10 @@ test_that("a function is asked about the same points", {
   expect_identical(map$grid$action, as.integer(map$grid$pole_angle > 0))
   image <- fake_environment(observation_space = box_space(-(1:6), 1:6, shape = c(2L, 3L)))
   seen <- NULL
-  decision_map(function(observation) {
+  decision_map(image, function(observation) {
     seen <<- observation
     integer(nrow(observation))
-  }, image, 2, 4, size = 3)
+  }, 2, 4, size = 3)
   expect_identical(dim(seen), c(9L, 2L, 3L))
   # Row by row: the second number is in the first row, the fourth the first of the second.
   expect_identical(unique(seen[, 1, 2]), c(-2, 0, 2))
@@ -76,13 +76,13 @@ test_that("a function is asked about the same points", {
 test_that("parts are named or numbered, and two need not be named", {
   policy <- policy_network(c(2, 1))
   env <- fake_environment(observation_space = box_space(c(-1, -2), c(1, 2)), id = "MountainCar-v0")
-  map <- decision_map(policy, env)
+  map <- decision_map(env, policy)
   expect_identical(c(map$x, map$y), c("position", "velocity"))
-  expect_identical(decision_map(policy, env, 2, 1)$x, "velocity")
+  expect_identical(decision_map(env, policy, 2, 1)$x, "velocity")
   expect_error(pole_map(env = NULL), "`x` must be a part of the observation, not \"pole_angle\"",
                class = "gym_error_argument")
   bad <- function(..., message) {
-    expect_error(decision_map(policy_network(), cartpole(), ...), message, fixed = TRUE,
+    expect_error(decision_map(cartpole(), policy_network(), ...), message, fixed = TRUE,
                  class = "gym_error_argument")
   }
   bad(message = "`x` and `y` must name two parts")
@@ -101,7 +101,7 @@ test_that("parts are named or numbered, and two need not be named", {
 
 test_that("other parts are held at 0, or in the middle where 0 is out of bounds", {
   env <- fake_environment(observation_space = box_space(c(-1, 2, -Inf, -1), c(1, 4, Inf, 1)))
-  expect_identical(decision_map(policy_network(), env, 1, 4)$at, c(obs_2 = 3, obs_3 = 0))
+  expect_identical(decision_map(env, policy_network(), 1, 4)$at, c(obs_2 = 3, obs_3 = 0))
 })
 
 test_that("ranges are given, usual, the bounds, or those of the path", {
@@ -110,8 +110,8 @@ test_that("ranges are given, usual, the bounds, or those of the path", {
   expect_equal(ends(pole_map(xlim = c(0, 1))), c(0, 1, -2.5, 2.5))
   env <- fake_environment(observation_space = box_space(c(-5, -Inf, -1, -1), c(7, Inf, 1, 1)))
   path <- data.frame(obs_1 = c(1, 2), obs_2 = c(10, 30))
-  expect_equal(ends(decision_map(policy_network(), env, 1, 2, path = path)), c(-5, 7, 9, 31))
-  expect_error(decision_map(policy_network(), env, 1, 2), "range of obs_2 to show is unknown",
+  expect_equal(ends(decision_map(env, policy_network(), 1, 2, path = path)), c(-5, 7, 9, 31))
+  expect_error(decision_map(env, policy_network(), 1, 2), "range of obs_2 to show is unknown",
                class = "gym_error_argument")
   beyond <- data.frame(pole_angle = c(0, 1), pole_angular_velocity = c(0, 1))
   expect_equal(ends(pole_map(path = beyond))[2], 1)
@@ -148,13 +148,14 @@ test_that("path = TRUE plays one episode under the seed, and nothing else is pla
 test_that("a network that was played needs no environment, one of its own no names", {
   bound <- policy_bind(policy_network(), cartpole())
   expect_identical(pole_map(bound, env = NULL), pole_map(bound))
-  map <- decision_map(policy_network(), x = 1, y = "obs_2", xlim = 0:1, ylim = 0:1)
+  map <- decision_map(policy = policy_network(), x = 1, y = "obs_2", xlim = 0:1, ylim = 0:1)
   expect_identical(map$actions, c("0", "1"))
 })
 
 test_that("what cannot be mapped says why", {
-  bad <- function(..., message) {
-    expect_error(decision_map(...), message, fixed = TRUE, class = "gym_error_argument")
+  bad <- function(policy, env = NULL, ..., message) {
+    expect_error(decision_map(env, policy, ...), message, fixed = TRUE,
+                 class = "gym_error_argument")
   }
   bad(policy_random(), cartpole(), message = "a random policy draws its actions")
   bad(function(observation) 1, message = "What is observed and done is known of networks")

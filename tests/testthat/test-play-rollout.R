@@ -231,7 +231,7 @@ first_observations <- function(played) {
   unname(as.matrix(played$steps[played$steps$step == 1, 3:6]))
 }
 
-test_that("CartPole: an episode can be begun again by its seed, in sub-environments by its sub-environment, too", {
+test_that("CartPole: a seed begins an episode again, in a vector environment with its number", {
   env <- local_env("CartPole-v1")
   played <- rollout(env, policy_random(), 3, seed = 1, steps = TRUE)
   expect_identical(env$reset(seed = played$episodes$seed[2]), first_observations(played)[2, ])
@@ -247,7 +247,7 @@ test_that("CartPole: an episode can be begun again by its seed, in sub-environme
   }
 })
 
-test_that("where sub-environments have seeds of their own, a single environment plays an episode again", {
+test_that("where each sub-environment has a seed, a single environment plays an episode again", {
   client <- test_client()
   skip_if_not(env_registry(client, "LunarLander-v3")$available, "the extra box2d")
   set.seed(1)
@@ -261,7 +261,7 @@ test_that("where sub-environments have seeds of their own, a single environment 
   expect_identical(alone$episodes$return, played$episodes$return)
 })
 
-test_that("environments of every implementation given with sub-environments are played as they are", {
+test_that("vector environments of every mode are played as they are given", {
   for (mode in c("vector_entry_point", "sync", "async")) {
     env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = mode)
     played <- rollout(env, policy_random(), 7, seed = 1)
@@ -311,10 +311,10 @@ test_that("CartPole: 200 pushes at most in v0, and a policy's mistake is the env
 
 test_that("what was played survives an environment that cannot be closed", {
   env <- list(close = function() gym_abort("gone", class = "gym_error_connection"))
-  expect_warning(close_made(env, finished = TRUE), "could not be closed",
+  expect_warning(close_or_warn(env), "could not be closed",
                  class = "gym_warning_close")
   # After an error there is that error to hear of.
-  expect_silent(close_made(env, finished = FALSE))
+  expect_silent(close_quietly(env))
 })
 
 test_that("Blackjack: observations with several parts have named columns", {
@@ -374,7 +374,7 @@ test_that("an environment of one's own whose step lacks something is refused at 
   expect_match(refusal(with(reward = numeric())), "`reward` .* must be a number")
 })
 
-test_that("an environment of one's own with sub-environments says how each of its episodes stands", {
+test_that("a user's own vector environment must return flags for each of its episodes", {
   for (mode in c("sync", "vector_entry_point")) {
     env <- fake_vector_env(3, mode)
     step <- env$step

@@ -1,5 +1,6 @@
-map_of <- function(policy = policy_network(c(2, 1)), ..., xlim = c(-2, 2), ylim = c(-1, 1)) {
-  decision_map(policy, ..., x = 1, y = 2, xlim = xlim, ylim = ylim, size = 21)
+map_of <- function(policy = policy_network(c(2, 1)), env = NULL, ..., xlim = c(-2, 2),
+                   ylim = c(-1, 1)) {
+  decision_map(env, policy, ..., x = 1, y = 2, xlim = xlim, ylim = ylim, size = 21)
 }
 
 test_that("the picture's field has a row for each x and a column for each y", {
@@ -20,33 +21,6 @@ test_that("regions have the names of their actions, inside of them", {
   expect_gt(regions$x[2], 0.5)
   always <- policy_network(c(2, 1), weights = list(matrix(0, 1, 2)))
   expect_identical(decision_plot_data(map_of(always))$regions$label, "0")
-})
-
-test_that("the call that names the observations x and y draws the map of the policy", {
-  local_device()
-  env <- fake_environment(id = "CartPole-v1")
-  policy <- policy_network()
-  map <- decision_map(policy, env, "pole_angle", "pole_angular_velocity")
-  drawn <- plot(policy, env, x = "pole_angle", y = "pole_angular_velocity")
-  expect_identical(drawn, map)
-  expect_identical(plot(policy, env, "pole_angle", "pole_angular_velocity"), map)
-  expect_identical(plot(policy = policy, env = env, x = "pole_angle", y = "pole_angular_velocity"),
-                   map)
-  follow <- function(observation) as.integer(observation[, 3] > 0)
-  drawn <- plot(follow, env, x = "pole_angle", y = "cart_position", size = 11, main = "mine")
-  expect_identical(drawn, decision_map(follow, env, "pole_angle", "cart_position", size = 11))
-  expect_error(plot(policy_random(), env, x = "pole_angle", y = "pole_angular_velocity"),
-               "nothing to map", class = "gym_error_argument")
-  # Without env and y the policy arrives in another place.
-  expect_error(plot(policy, x = "pole_angle"), class = "gym_error_argument")
-})
-
-test_that("other strings are plotted as R does", {
-  local_device()
-  expect_silent(plot(c("1", "2", "3"), 4:6))
-  expect_equal(graphics::par("usr")[1:2], c(0.92, 3.08))
-  expect_silent(plot(c("1", "2"), panel.first = graphics::grid()))
-  suppressWarnings(expect_error(plot("a"), "finite"))
 })
 
 test_that("any map plots, returns itself and leaves par and R's generator alone", {
@@ -88,15 +62,16 @@ test_that("ggplot2 draws the same field and path", {
   expect_silent(print(plot))
   three <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)),
                             action_space = discrete_space(3L))
-  expect_silent(print(ggplot2::autoplot(policy_network(c(2, 3)), three, x = 1, y = 2)))
+  expect_silent(print(ggplot2::autoplot(map_of(policy_network(c(2, 3)), three))))
 })
 
 test_that("CartPole: an episode of the real environment lies on the map of its policy", {
   client <- test_client()
   local_device()
   policy <- search_random(rounds = 3, seed = 1, client = client)$policy
-  map <- plot(policy, "CartPole-v0", x = "pole_angle", y = "pole_angular_velocity", path = TRUE,
-              seed = 1, client = client)
+  map <- decision_map("CartPole-v0", policy, x = "pole_angle", y = "pole_angular_velocity",
+                      path = TRUE, seed = 1, client = client)
+  plot(map)
   played <- rollout("CartPole-v0", policy, seed = 1, steps = TRUE, client = client)
   expect_identical(map$path$x, played$steps$pole_angle)
   expect_identical(map$actions, c("0: push left", "1: push right"))

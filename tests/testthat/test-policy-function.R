@@ -11,7 +11,7 @@ test_that("a function is asked about a matrix, also when there is one observatio
                "one action for the one observation, not 2 actions", class = "gym_error_argument")
 })
 
-test_that("a rollout asks for all sub-environments that play at once", {
+test_that("a rollout asks once for the actions of all sub-environments that are playing", {
   rows <- integer()
   count <- function(observation) {
     rows <<- c(rows, nrow(observation))
@@ -72,14 +72,14 @@ test_that("observations and actions with parts have them batched, in any order o
   ))
   sub_envs <- list(action_space = space, observation_space = space)
   actions <- list(b = c(1, 2), a = rbind(1:2, 3:4))
-  expect_identical(sub_env_actions(actions, 2L, sub_envs), list(a = rbind(1:2, 3:4), b = c(1, 2)))
-  expect_error(sub_env_actions(actions["a"], 2L, sub_envs),
+  expect_identical(batch_actions(actions, 2L, sub_envs), list(a = rbind(1:2, 3:4), b = c(1, 2)))
+  expect_error(batch_actions(actions["a"], 2L, sub_envs),
                "each of 2 observations, not a list of length 1", class = "gym_error_argument")
-  expect_error(sub_env_actions(actions, 3L, sub_envs), "each of 3 observations, not 2 actions",
+  expect_error(batch_actions(actions, 3L, sub_envs), "each of 3 observations, not 2 actions",
                class = "gym_error_argument")
 })
 
-test_that("policies of other classes are asked by their own method, in sub-environments too", {
+test_that("policies of other classes are asked by their own method, in vector environments too", {
   registerS3method("act", "follower", function(policy, observation, ...) follow_pole(observation),
                    envir = asNamespace("gym"))
   for (follower in list(
@@ -94,7 +94,7 @@ test_that("policies of other classes are asked by their own method, in sub-envir
   follower <- structure(list(), class = "follower")
   played <- rollout(fake_environment(), follower)
   expect_output(print(played), "Policy: an object of class follower")
-  map <- decision_map(follower, fake_environment(), x = 3, y = 4)
+  map <- decision_map(fake_environment(), follower, x = 3, y = 4)
   expect_output(print(map), "Policy: an object of class follower")
   expect_error(search_random(fake_environment(), follower),
                "weights to draw, not an object of class follower", class = "gym_error_argument")

@@ -203,7 +203,7 @@ test_that("a network prints in one line", {
   )
 })
 
-test_that("a discrete observation that there is not is told", {
+test_that("a discrete observation out of range is an error", {
   space <- new_space(list(name = "Discrete", n = 4L, start = 1L))
   policy <- policy_network(c(4, 2))
   policy$observation_space <- space

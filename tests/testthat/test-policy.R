@@ -8,29 +8,29 @@ test_that("a vector is one observation, a matrix has one in each row", {
   space <- box_space(rep(-1, 3), rep(1, 3))
   for (known in list(NULL, space)) {
     expect_identical(
-      observation_sub_envs(c(1, 2, 3), known), list(values = rbind(c(1, 2, 3)), one = TRUE)
+      observation_rows(c(1, 2, 3), known), list(values = rbind(c(1, 2, 3)), one = TRUE)
     )
     rows <- matrix(c(1, 2, 3, 4, 5, 6), nrow = 2)
-    expect_identical(observation_sub_envs(rows, known), list(values = rows, one = FALSE))
-    expect_identical(observation_sub_envs(rows[1, , drop = FALSE], known)$one, FALSE)
+    expect_identical(observation_rows(rows, known), list(values = rows, one = FALSE))
+    expect_identical(observation_rows(rows[1, , drop = FALSE], known)$one, FALSE)
   }
 })
 
 test_that("arrays are flattened row by row, as Gymnasium does", {
   space <- box_space(rep(-1, 6), rep(1, 6), shape = c(2L, 3L))
   one <- rbind(1:3, 4:6)
-  expect_identical(observation_sub_envs(one, space), list(values = rbind(1:6), one = TRUE))
+  expect_identical(observation_rows(one, space), list(values = rbind(1:6), one = TRUE))
   two <- array(0L, c(2, 2, 3))
   two[1, , ] <- one
   two[2, , ] <- one + 10L
   expect_identical(
-    observation_sub_envs(two, space), list(values = rbind(1:6, 11:16), one = FALSE)
+    observation_rows(two, space), list(values = rbind(1:6, 11:16), one = FALSE)
   )
 })
 
 test_that("of single numbers a vector is many observations", {
   for (space in list(discrete_space(16L), box_space(0, 1, shape = integer()))) {
-    expect_identical(observation_sub_envs(3, space), list(values = matrix(3), one = TRUE))
-    expect_identical(observation_sub_envs(c(3, 4), space), list(values = cbind(c(3, 4)), one = FALSE))
+    expect_identical(observation_rows(3, space), list(values = matrix(3), one = TRUE))
+    expect_identical(observation_rows(c(3, 4), space), list(values = cbind(c(3, 4)), one = FALSE))
   }
 })

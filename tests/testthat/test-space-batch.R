@@ -55,8 +55,8 @@ test_that("a value for each sub-environment belongs, drawn from each kind of spa
       batch <- spread_bounds(batch_space(space, n))
       values <- space_sample(batch)
       expect_true(space_contains(batch, values))
-      expect_no_error(check_sub_envs(space, batch_space(space, n), values, n, NULL))
-      for (sub_env in seq_len(n)) expect_true(space_contains(space, sub_env_value(space, values, sub_env)))
+      expect_no_error(check_batch(space, batch_space(space, n), values, n, NULL))
+      for (i in seq_len(n)) expect_true(space_contains(space, batch_value(space, values, i)))
     }
   }
   expect_type(space_sample(batch_space(sub_envs_of_spaces()$text, 3)), "character")
@@ -72,12 +72,12 @@ test_that("values of sub-environments of 200 random spaces belong, and come back
     n <- sample(1:4, 1)
     batch <- batch_space(space, n)
     singles <- lapply(seq_len(n), function(i) space_sample(space))
-    values <- sub_envs_from(space, singles)
-    expect_no_error(check_sub_envs(space, batch, values, n, NULL))
+    values <- batch_of(space, singles)
+    expect_no_error(check_batch(space, batch, values, n, NULL))
     # An empty Tuple has no sub-environments.
     if (!length(unlist(lapply(singles, unlist)))) next
-    back <- from_json(write_sub_envs(space, values, n))
-    expect_identical(sub_envs_from(space, lapply(back, decode_value, space = space)), values)
+    back <- from_json(write_batch(space, values, n))
+    expect_identical(batch_of(space, lapply(back, decode_value, space = space)), values)
     if (!has_tensors(space)) next
     parts <- to_tensors(batch, values, "action", NULL)
     texts <- Filter(is.character, parts)
@@ -90,7 +90,7 @@ test_that("values of sub-environments of 200 random spaces belong, and come back
 
 refused <- function(space, values, n, ...) {
   error <- expect_error(
-    check_sub_envs(space, batch_space(space, n), values, n, NULL), class = "gym_error_space"
+    check_batch(space, batch_space(space, n), values, n, NULL), class = "gym_error_space"
   )
   for (part in c(...)) expect_match(conditionMessage(error), part, fixed = TRUE)
   error
@@ -119,7 +119,8 @@ test_that("the sub-environment whose value does not fit is named, counted from 1
   refused(spaces$discrete, c(5, 6.5), 2L, "Sub-environment 2: ", "6.5")
   refused(spaces$discrete, c(5, Inf), 2L, "Sub-environment 2: ")
   refused(spaces$discrete, c("left", "right"), 2L, "Sub-environment 1: ", "\"left\"")
-  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Sub-environment 2: ", "`$[1]`", "<Box float32 [2]>")
+  refused(spaces$box, rbind(c(0, 1), c(0, NA)), 2L, "Sub-environment 2: ", "`$[1]`",
+          "<Box float32 [2]>")
   refused(spaces$dials, rbind(c(0, 4), c(0.5, 4)), 2L, "Sub-environment 2: ", "not whole")
   refused(spaces$text, c("a", NA), 2L, "Sub-environment 2: ", "one string")
   both <- new_space(describe_dict(x = describe_box(c(0, 0), c(1, 1)),
@@ -142,17 +143,17 @@ test_that("what has not the form of sub-environments is refused", {
   refused(both, list(x = c(0, 0), y = 0), 2L, "`$y`")
 })
 
-test_that("logicals are actions of sub-environments that are Discrete, a vector those of one number", {
+test_that("logicals are actions of Discrete sub-environments, a vector those of one number", {
   spaces <- sub_envs_of_spaces()
   moves <- discrete_space(2L)
-  expect_no_error(check_sub_envs(moves, batch_space(moves, 2), c(TRUE, FALSE), 2L, NULL))
-  expect_identical(write_sub_envs(moves, c(TRUE, FALSE), 2L), "[1,0]")
+  expect_no_error(check_batch(moves, batch_space(moves, 2), c(TRUE, FALSE), 2L, NULL))
+  expect_identical(write_batch(moves, c(TRUE, FALSE), 2L), "[1,0]")
   parts <- to_tensors(batch_space(moves, 2), c(TRUE, FALSE), "action", NULL)
   expect_identical(read_int32(parts$action$bytes, 2L, 2L), 1:0)
   as_vector <- to_tensors(batch_space(spaces$column, 2), c(1, 2), "action", NULL)
   as_column <- to_tensors(batch_space(spaces$column, 2), matrix(c(1, 2)), "action", NULL)
   expect_identical(as_vector, as_column)
-  expect_no_error(check_sub_envs(spaces$column, batch_space(spaces$column, 2), 1:2, 2L, NULL))
+  expect_no_error(check_batch(spaces$column, batch_space(spaces$column, 2), 1:2, 2L, NULL))
 })
 
 test_that("actions beyond R's integers travel as 64 bits", {

@@ -3,12 +3,12 @@ figures <- function(search) {
   search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
 }
 
-# Each file that is gone on from is told.
+# A search that goes on from a file says so.
 quiet_search <- function(...) {
   suppressMessages(search_random(...), classes = "gym_message_resumed")
 }
 
-# Plays a search that writes after each block, and keeps the file as each write left it.
+# Plays a search that writes after each batch, and keeps the file as each write left it.
 local_kept_files <- function(frame = parent.frame()) {
   files <- new.env()
   files$list <- list()
@@ -36,7 +36,7 @@ environments <- list(
   together = function() fake_vector_env(7, "vector_entry_point", reward = first_action)
 )
 
-test_that("a search goes on from the file of any block to the result of an undisturbed one", {
+test_that("a search goes on from the file of any batch to the result of an undisturbed one", {
   for (make in environments) {
     for (target in list(Inf, 13.5)) {
       play <- function(checkpoint = NULL) {
@@ -123,7 +123,7 @@ test_that("the progress bar goes on, too", {
   play <- function(path) {
     shown <- integer()
     local_functions(
-      progress_bar = function(rounds) function(finished, best) shown <<- c(shown, finished)
+      progress_bar = function(...) function(finished, note) shown <<- c(shown, finished)
     )
     quiet_search(fake_environment(), rounds = 3, episodes = 1, target = Inf, seed = 1,
                   progress = TRUE, checkpoint = path)
@@ -157,7 +157,8 @@ test_that("arguments that differ from the file's are named, with both values", {
   refused(policy = policy_network(c(4, 1)), argument = "policy", message = "`policy` is network")
   refused(env = fake_environment(id = "Other-v0"), argument = "env",
           message = "`env` is Fake-v0 there, and Other-v0 here.")
-  refused(env = fake_vector_env(3), argument = "env", message = "Fake-v0 with 3 sub-environments here")
+  refused(env = fake_vector_env(3), argument = "env",
+          message = "Fake-v0 with 3 sub-environments here")
   refused(env = gym_wrap("Fake-v0", "TimeLimit", max_episode_steps = 5), argument = "env",
           message = "`env` is another there.")
   refused(seed = 2, rounds = 4, argument = c("rounds", "seed"), message = "`seed`")
@@ -268,7 +269,7 @@ test_that("a relative path is that of the folder at the start", {
   expect_identical(list.files(folder), "here.rds")
 })
 
-test_that("a server that plays otherwise than the one before is told", {
+test_that("a server that plays other episodes than the one before is an error", {
   kept <- local_kept_files()
   play <- function(threshold, path) {
     quiet_search(fake_environment(reward_threshold = threshold), rounds = 3, checkpoint = path)
@@ -316,7 +317,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
 
-test_that("with sub-environments each block is kept, however long writing takes", {
+test_that("in a vector environment the file is written after each batch, however long that takes", {
   written <- function(env) {
     kept <- local_kept_files()
     local_functions(rest_per_writing = 1e6)
@@ -324,7 +325,7 @@ test_that("with sub-environments each block is kept, however long writing takes"
                  checkpoint = local_checkpoint())
     length(kept$list)
   }
-  # One before the first block.
+  # One before the first batch.
   expect_identical(written(fake_vector_env(8, "sync", reward = first_action)), 4L)
   expect_lt(written(fake_environment(reward = first_action)), 25L)
 })

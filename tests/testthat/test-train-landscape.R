@@ -94,7 +94,7 @@ test_that("the seed fixes it and leaves R's generator alone", {
   expect_false(identical(other$directions, seeded$directions))
 })
 
-test_that("in sub-environments with seeds of their own it is the same landscape", {
+test_that("where each sub-environment has a seed of its own it is the same landscape", {
   alone <- fake_environment(reward = weights_matter)
   search <- found(alone)
   single <- search_landscape(search, size = 5, episodes = 3, seed = 1)
@@ -104,7 +104,7 @@ test_that("in sub-environments with seeds of their own it is the same landscape"
   expect_identical(sub_envs$seeds, single$seeds)
 })
 
-test_that("sub-environments that share a seed say that the episodes differ", {
+test_that("where sub-environments share a seed the result says that the episodes differ", {
   search <- found(fake_vector_env(6, "vector_entry_point", reward = weights_matter))
   landscape <- search_landscape(search, size = 3, episodes = 2, seed = 1)
   expect_false(landscape$common)

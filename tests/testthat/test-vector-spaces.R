@@ -26,7 +26,7 @@ play_sub_envs <- function(env, values, tensors) {
   }
   # Only some of them, the last step of an episode.
   sub_envs <- which(seq_len(n) != 2L)
-  some <- env$step(sub_env_rows(env$single_action_space, observation, sub_envs), which = sub_envs)
+  some <- env$step(batch_rows(env$single_action_space, observation, sub_envs), which = sub_envs)
   expect_identical(some$terminated, rep(TRUE, length(sub_envs)))
   list(seen = c(seen, list(some$observation)), problems = c(problems, some$info$problem))
 }
@@ -40,7 +40,7 @@ make_mirrors <- function(server, ...) {
   )
 }
 
-test_that("values of random spaces come back to Python from their own sub-environments", {
+test_that("values of random spaces reach Python in the sub-environment that they are for", {
   skip_unless_all()
   skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
@@ -65,7 +65,7 @@ test_that("values of random spaces come back to Python from their own sub-enviro
     for (sub_env in 1:3) {
       # As text: an integer is a double where other sub-environments need one.
       expect_identical(
-        write_value(space, sub_env_value(space, by_json$seen[[1L]], sub_env)),
+        write_value(space, batch_value(space, by_json$seen[[1L]], sub_env)),
         write_value(space, single$reset(seed = sub_env)), info = number
       )
     }
@@ -93,21 +93,21 @@ test_that("the last observation of a sub-environment is kept for every kind of s
     first <- env$reset(seed = 0:1)
     second <- env$step(first)$observation
     # The first sub-environment ends, the second does not step.
-    out <- env$step(sub_env_rows(space, second, 1L), which = 1)
+    out <- env$step(batch_rows(space, second, 1L), which = 1)
     expect_length(out$info$final_obs, 1)
     # After its last value a mirror shows its first again.
-    expect_identical(out$info$final_obs[[1L]], sub_env_value(space, first, 1L), info = number)
-    out <- env$step(sub_envs_from(space, list(
-      sub_env_value(space, out$observation, 1L), sub_env_value(space, second, 2L)
+    expect_identical(out$info$final_obs[[1L]], batch_value(space, first, 1L), info = number)
+    out <- env$step(batch_of(space, list(
+      batch_value(space, out$observation, 1L), batch_value(space, second, 2L)
     )))
     expect_identical(out$terminated, c(FALSE, TRUE))
     expect_null(out$info$final_obs[[1L]])
-    expect_identical(out$info$final_obs[[2L]], sub_env_value(space, first, 2L), info = number)
+    expect_identical(out$info$final_obs[[2L]], batch_value(space, first, 2L), info = number)
     env$close()
   }
 })
 
-test_that("infos of sub-environments arrive by sub-environment, pictures with the sub-environment first", {
+test_that("infos have an entry for each sub-environment, and pictures one dimension more", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Telling-v0", num_envs = 2, client = server)
   env$reset()
@@ -144,7 +144,7 @@ test_that("numbers of sub-environments keep their types, and what R cannot hold 
   expect_error(make("LargestNatural")$reset(), class = "gym_error_space")
 })
 
-test_that("actions of sub-environments are drawn by the server in the form in which it takes them", {
+test_that("the server draws actions of a vector environment in the form in which it takes them", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -157,7 +157,7 @@ test_that("actions of sub-environments are drawn by the server in the form in wh
   expect_false(env_action_space_contains(server, env$instance_id, drawn))
 })
 
-test_that("a nested action of a sub-environment that does not fit is named with its sub-environment", {
+test_that("an error about a nested action names the sub-environment", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -172,7 +172,7 @@ test_that("a nested action of a sub-environment that does not fit is named with 
                class = "gym_error_space")
 })
 
-test_that("an exception in one sub-environment is reported, and the others' server goes on", {
+test_that("an exception in one sub-environment is an error, and the server goes on", {
   server <- local_odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()

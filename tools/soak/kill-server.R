@@ -8,7 +8,7 @@ library(gym)
 moments <- as.integer(c(commandArgs(TRUE), "50")[[1]])
 path <- tempfile(fileext = ".rds")
 
-# In sub-environments of its own, so that a search has dozens of blocks.
+# A vector environment of few sub-environments, so that a search has dozens of batches.
 play <- function(server, ...) {
   env <- gym_make("CartPole-v1", num_envs = 16, client = server)
   search_random(env, rounds = 60, target = Inf, seed = 1, ...)
@@ -29,7 +29,7 @@ kill_after <- function(server, seconds) {
 # How many episodes the file has.
 episodes_kept <- function() {
   if (!file.exists(path)) return(0L)
-  length(gym:::read_checkpoint(path, NULL)$record$returns)
+  length(gym:::read_checkpoint(path, NULL)$history$returns)
 }
 
 server <- gym_server_start()

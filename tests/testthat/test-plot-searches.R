@@ -12,36 +12,36 @@ searches_of <- function(round, max_rounds = 10L) {
 
 test_that("bars count the searches, the curve is geometric with the estimated chance", {
   searches <- searches_of(c(1, 1, 3, 7, NA))
-  data <- luck_plot_data(searches)
+  data <- searches_plot_data(searches)
   expect_identical(searches$chance, 4 / (1 + 1 + 3 + 7 + 10))
   solved <- data$bars[!data$bars$unsolved, ]
   expect_identical(solved$round, 1:10)
   expect_identical(solved$searches, c(2L, 0L, 1L, 0L, 0L, 0L, 1L, 0L, 0L, 0L))
   expect_equal(solved$expected, 5 * stats::dgeom(0:9, searches$chance))
-  given_up <- data$bars[data$bars$unsolved, ]
-  expect_identical(given_up$searches, 1L)
-  expect_equal(given_up$expected, 5 * (1 - searches$chance)^10)
-  expect_gt(given_up$x, 11)
+  unsolved <- data$bars[data$bars$unsolved, ]
+  expect_identical(unsolved$searches, 1L)
+  expect_equal(unsolved$expected, 5 * (1 - searches$chance)^10)
+  expect_gt(unsolved$x, 11)
   expect_equal(sum(data$bars$expected), 5)
 })
 
 test_that("where all were solved the bars end with the last", {
-  bars <- luck_plot_data(searches_of(c(1, 4, 2)))$bars
+  bars <- searches_plot_data(searches_of(c(1, 4, 2)))$bars
   expect_identical(bars$round, 1:4)
   expect_false(any(bars$unsolved))
 })
 
-test_that("the mark tells the chance of that many rounds or fewer, and what was seen", {
+test_that("the mark has the chance of that many rounds or fewer, and their share of the searches", {
   searches <- searches_of(c(1, 1, 3, 7, NA))
-  data <- luck_plot_data(searches, mark = 3)
-  expect_equal(data$lucky$expected, 1 - (1 - searches$chance)^3)
-  expect_identical(data$lucky$observed, 3 / 5)
-  expect_identical(which(data$bars$lucky), 1:3)
+  data <- searches_plot_data(searches, mark = 3)
+  expect_equal(data$marked$expected, 1 - (1 - searches$chance)^3)
+  expect_identical(data$marked$observed, 3 / 5)
+  expect_identical(which(data$bars$marked), 1:3)
   expect_match(data$mark_label[[1]], "within 3 rounds")
-  expect_match(luck_plot_data(searches, mark = 1)$mark_label[[1]], "in the first round")
-  none <- luck_plot_data(searches, mark = NULL)
+  expect_match(searches_plot_data(searches, mark = 1)$mark_label[[1]], "in the first round")
+  none <- searches_plot_data(searches, mark = NULL)
   expect_null(none$mark_label)
-  expect_false(any(none$bars$lucky))
+  expect_false(any(none$bars$marked))
 })
 
 test_that("any searches plot, return themselves and leave par and R's generator alone", {
@@ -66,7 +66,7 @@ test_that("ggplot2 draws the same bars and curve", {
   skip_if_not_installed("ggplot2")
   searches <- searches_of(c(1, 1, 3, 7, NA))
   plot <- ggplot2::autoplot(searches)
-  data <- luck_plot_data(searches)
+  data <- searches_plot_data(searches)
   bars <- ggplot2::layer_data(plot, 1L)
   expect_identical(bars$y[order(bars$x)], as.numeric(data$bars$searches))
   expect_equal(ggplot2::layer_data(plot, 2L)$y, data$bars$expected[!data$bars$unsolved])

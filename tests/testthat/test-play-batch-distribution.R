@@ -13,7 +13,7 @@ expect_known_returns <- function(returns) {
   expect_true(all(abs(share - known$share) < 3.5 * sqrt(known$share * (1 - known$share) / n)))
 }
 
-test_that("CartPole: returns in sub-environments are distributed as those of one episode after the other", {
+test_that("CartPole: returns in batches are distributed as those of one episode after the other", {
   skip_unless_all()
   client <- test_client()
   play <- function(env, episodes, seed) {

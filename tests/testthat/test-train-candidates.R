@@ -32,19 +32,19 @@ test_that("an earlier round that fails after a later one has reached the target 
 test_that("once the search is decided nothing more is played", {
   env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(1, 1, 2, 2, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
-  # Two steps of all that play, and no second block.
+  # Two steps of all that play, and no second batch.
   expect_identical(env$sub_env_steps, 6L + 4L)
   expect_length(env$resets, 1)
 })
 
-test_that("sub-environments of rounds after one that has reached the target are not waited for", {
+test_that("rounds after one that has reached the target are not waited for", {
   env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(5, 5, 1, 1, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
   # After the first step only the first round plays, of which it is not yet known.
   expect_identical(env$sub_env_steps, 6L + 4L * 2L)
 })
 
-test_that("a round may begin in one block and end in another", {
+test_that("a round may begin in one batch and end in another", {
   for (mode in modes) {
     returns <- c(1, 2, 3, 4, 5, 21, 20, 20, 19, 20, 90)
     env <- scripted_vector_env(4, returns, lengths = rep(c(3L, 1L), length.out = 11), mode)
@@ -90,7 +90,7 @@ test_that("the policy returned is the one that was played in its round", {
   expect_identical(again, played$return)
 })
 
-test_that("set.seed() alone fixes a search in sub-environments, and seed = gives the same", {
+test_that("set.seed() alone fixes a search in a vector environment, and seed = gives the same", {
   play <- function(...) {
     figures(search_random(fake_vector_env(8, "vector_entry_point", reward = first_action), ...))
   }
@@ -149,27 +149,29 @@ test_that("an error in the middle carries the rounds that were finished", {
 test_that("the progress bar counts the rounds in their order", {
   env <- scripted_vector_env(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
   shown <- list()
-  record <- new_rounds(4L, 2L, NULL, function(finished, best) {
+  history <- new_candidates(4L, 2L, NULL, function(finished, best) {
     shown[[length(shown) + 1L]] <<- c(finished, best)
   })
   template <- policy_bind(policy_network(), vector_env_of(env))
-  begin <- function(block, episodes) {
-    list(seeds = draw_environment_seeds(4L), policy = draw_policies(record, template, episodes))
+  begin <- function(batch, episodes) {
+    list(seeds = draw_environment_seeds(4L), policy = draw_policies(history, template, episodes))
   }
-  play_episodes(vector_env_of(env), record, begin)
+  play_episodes(vector_env_of(env), history, begin)
   expect_identical(shown, list(c(2, 3.5), c(4, 7.5)))
 })
 
 test_that("an interrupt finds no round that has ended without a mean", {
-  record <- new_rounds(2, 1, NULL, function(finished, best) NULL)
-  record$open <- c(1L, 1L)
-  rm("means", envir = record)
+  history <- new_candidates(2, 1, NULL, function(finished, best) NULL)
+  history$unfinished <- c(1L, 1L)
+  rm("means", envir = history)
   makeActiveBinding("means", function(value) {
     if (missing(value)) numeric() else rlang::interrupt()
-  }, record)
-  interrupted <- tryCatch(end_round_episodes(record, 1L, 5), interrupt = function(cnd) "interrupt")
+  }, history)
+  interrupted <- tryCatch(
+    end_candidate_episodes(history, 1L, 5), interrupt = function(cnd) "interrupt"
+  )
   expect_identical(interrupted, "interrupt")
-  expect_equal(count_finished(record), 0)
+  expect_equal(count_finished(history), 0)
 })
 
 test_that("there may be more rounds than R's integers count episodes", {

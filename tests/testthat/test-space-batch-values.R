@@ -11,21 +11,22 @@ spaces <- list(
 spaces$tuple <- list(name = "Tuple", spaces = unname(spaces))
 spaces$dict <- do.call(describe_dict, spaces)
 
-test_that("what was put together comes apart again, sub-environment by sub-environment and in any choice", {
+test_that("what was put together comes apart again, by sub-environment and in any choice", {
   for (name in names(spaces)) {
     space <- new_space(spaces[[name]])
     set.seed(1)
     values <- replicate(4, space_sample(space), simplify = FALSE)
-    sub_envs <- sub_envs_from(space, values)
+    batch <- batch_of(space, values)
     for (i in 1:4) {
-      expect_identical(sub_env_value(space, sub_envs, i), values[[i]], info = name)
+      expect_identical(batch_value(space, batch, i), values[[i]], info = name)
     }
     chosen <- c(4L, 1L, 4L)
-    expect_identical(sub_env_rows(space, sub_envs, chosen), sub_envs_from(space, values[chosen]),
+    expect_identical(batch_rows(space, batch, chosen), batch_of(space, values[chosen]),
                      info = name)
-    one <- sub_envs_from(space, values[1])
-    expect_identical(sub_env_value(space, one, 1L), values[[1]], info = name)
-    expect_identical(bind_sub_envs(space, list(one, sub_env_rows(space, sub_envs, 2:4))), sub_envs, info = name)
+    one <- batch_of(space, values[1])
+    expect_identical(batch_value(space, one, 1L), values[[1]], info = name)
+    others <- batch_rows(space, batch, 2:4)
+    expect_identical(bind_batches(space, list(one, others)), batch, info = name)
   }
 })
 
@@ -35,7 +36,7 @@ test_that("values for several sub-environments are drawn as single ones are, one
     set.seed(1)
     values <- replicate(4, space_sample(space), simplify = FALSE)
     set.seed(1)
-    expect_equal(sample_sub_envs(space, 4L), sub_envs_from(space, values), info = name)
+    expect_equal(sample_batch(space, 4L), batch_of(space, values), info = name)
   }
 })
 
@@ -46,9 +47,9 @@ test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
     high = list(1e18, 1e18)
   ))
   large <- bit64::as.integer64(c("900719925474099301", "3"))
-  sub_envs <- sub_envs_from(space, list(large, c(1L, 2L)))
-  expect_identical(format(sub_env_value(space, sub_envs, 1L)), format(large))
-  bound <- bind_sub_envs(space, list(sub_envs, sub_envs_from(space, list(5:6))))
+  batch <- batch_of(space, list(large, c(1L, 2L)))
+  expect_identical(format(batch_value(space, batch, 1L)), format(large))
+  bound <- bind_batches(space, list(batch, batch_of(space, list(5:6))))
   expect_identical(dim(bound), 3:2)
   columns <- value_columns(space, bound, "obs")
   expect_identical(as.character(columns$obs_1), c("900719925474099301", "1", "5"))

@@ -1,6 +1,7 @@
-# Values of several sub-environments, put together and taken apart. Numbers are in an array with the
-# sub-environments along its first dimension (in a vector, for single numbers), texts in a character
-# vector, the values of Tuple and Dict in a list of such parts, other values in a list.
+# Batches of values, one for each sub-environment, put together and taken apart. Numbers are in an
+# array whose first dimension counts the sub-environments (in a vector, for single numbers), texts
+# in a character vector, the values of Tuple and Dict in a list of such parts, other values in a
+# list.
 
 has_parts <- function(space) {
   inherits(space, "gym_space_tuple") || inherits(space, "gym_space_dict")
@@ -13,44 +14,44 @@ map_parts <- function(space, part, ...) {
   parts
 }
 
-#' Put the single values of sub-environments together
+#' Make a batch of single values
 #' @param values A list of values of the space.
 #' @noRd
-sub_envs_from <- function(space, values) {
+batch_of <- function(space, values) {
   if (is_stackable(space)) {
     stack_values(space, values)
   } else if (inherits(space, "gym_space_text")) {
     as.character(values)
   } else if (has_parts(space)) {
     each <- lapply(seq_along(space$spaces), function(i) lapply(values, function(v) v[[i]]))
-    map_parts(space, sub_envs_from, each)
+    map_parts(space, batch_of, each)
   } else {
     values
   }
 }
 
-#' Take the value of one sub-environment
+#' Take one value out of a batch
 #' @noRd
-sub_env_value <- function(space, sub_envs, i) {
+batch_value <- function(space, batch, i) {
   if (has_parts(space)) {
-    map_parts(space, sub_env_value, in_order(space, sub_envs), i)
+    map_parts(space, batch_value, in_order(space, batch), i)
   } else if (is_stackable(space)) {
-    value <- rows_of(sub_envs, i)
+    value <- rows_of(batch, i)
     dim(value) <- if (length(space$shape) > 1L) dim(value)[-1L]
     value
   } else {
-    sub_envs[[i]]
+    batch[[i]]
   }
 }
 
-#' Take the values of some sub-environments
+#' Take some values of a batch, which are a batch again
 #' @param i Their numbers; one may come more than once.
 #' @noRd
-sub_env_rows <- function(space, sub_envs, i) {
+batch_rows <- function(space, batch, i) {
   if (has_parts(space)) {
-    map_parts(space, sub_env_rows, in_order(space, sub_envs), list(i))
+    map_parts(space, batch_rows, in_order(space, batch), list(i))
   } else {
-    rows_of(sub_envs, i)
+    rows_of(batch, i)
   }
 }
 
@@ -74,20 +75,20 @@ in_order <- function(space, parts) {
   if (is.null(keys) || is.null(names(parts))) parts else parts[match(keys, enc2utf8(names(parts)))]
 }
 
-#' Put the sub-environments of several values after each other
-#' @param each A list of values of sub-environments, at least one.
+#' Put several batches one after the other
+#' @param each A list of batches, at least one.
 #' @noRd
-bind_sub_envs <- function(space, each) {
+bind_batches <- function(space, each) {
   if (has_parts(space)) {
     parts <- lapply(seq_along(space$spaces), function(i) {
-      lapply(each, function(sub_envs) in_order(space, sub_envs)[[i]])
+      lapply(each, function(batch) in_order(space, batch)[[i]])
     })
-    map_parts(space, bind_sub_envs, parts)
+    map_parts(space, bind_batches, parts)
   } else if (!is_stackable(space)) {
     do.call(c, each)
   } else if (any(vapply(each, inherits, NA, "integer64"))) {
     # Other values may be integer or double, as integer64 stands for the numbers beyond 2^53 only.
-    digits <- unlist(lapply(each, function(sub_envs) whole_text(row_major(sub_envs))))
+    digits <- unlist(lapply(each, function(batch) whole_text(row_major(batch))))
     n <- length(digits) / prod(space$shape)
     shape_values(whole_from_digits(digits), c(n, space$shape))
   } else if (is.null(dim(each[[1L]]))) {
@@ -100,9 +101,9 @@ bind_sub_envs <- function(space, each) {
   }
 }
 
-#' Draw values for several sub-environments
+#' Draw a batch of values
 #' @noRd
-sample_sub_envs <- function(space, n) {
+sample_batch <- function(space, n) {
   if (inherits(space, "gym_space_discrete") && is.integer(space$n) && is.integer(space$start)) {
     space$start + sample.int(space$n, n, replace = TRUE) - 1L
   } else if (is_stackable(space)) {
@@ -111,21 +112,21 @@ sample_sub_envs <- function(space, n) {
       draw_numbers(space$dtype, rep(bounds$low, n), rep(bounds$high, n)), c(n, space$shape)
     )
   } else {
-    sub_envs_from(space, replicate(n, space_sample(space), simplify = FALSE))
+    batch_of(space, replicate(n, space_sample(space), simplify = FALSE))
   }
 }
 
-#' Put the numbers of each sub-environment into a row of a matrix
+#' Put the numbers of each value of a batch into a row of a matrix
 #' @return A matrix, in each row the numbers in row-major order, as Gymnasium flattens
 #'   them.
 #' @noRd
-sub_env_numbers <- function(sub_envs) {
-  shape <- dim(sub_envs)
+number_rows <- function(batch) {
+  shape <- dim(batch)
   if (length(shape) == 2L) {
-    sub_envs
+    batch
   } else if (is.null(shape)) {
-    matrix(sub_envs, ncol = 1L)
+    matrix(batch, ncol = 1L)
   } else {
-    t(matrix(row_major(sub_envs), ncol = shape[[1L]]))
+    t(matrix(row_major(batch), ncol = shape[[1L]]))
   }
 }

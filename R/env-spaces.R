@@ -1,0 +1,140 @@
+#' Ask for an environment's spaces
+#'
+#' `env_action_space_info()` returns which actions an environment takes,
+#' `env_observation_space_info()` which observations it returns.
+#'
+#' @inheritParams env_reset
+#' @return A space: a list with the element `name` and, for Discrete, `n` (the
+#'   number of values) and `start` (the first of them), for Box, `shape`,
+#'   `dtype`, `low` and `high`, the bounds row by row, which may be infinite;
+#'   for the other kinds see [space_sample()]. In a vector environment it is the space of the
+#'   values of all sub-environments together: a Box of shape 4 becomes one of shape `c(n, 4)`,
+#'   Discrete a MultiDiscrete of shape `n`, Tuple and Dict have such parts, and the others become
+#'   a Tuple with a space for each sub-environment.
+#' @section Errors: `gym_error_http_400` for an unknown instance,
+#'   `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' client <- gym_client()
+#' instance_id <- env_create(client, "CartPole-v1")
+#' env_action_space_info(client, instance_id)
+#' env_observation_space_info(client, instance_id)$high
+#' env_close(client, instance_id)
+env_action_space_info <- function(x, instance_id) {
+  instance_space(known_instance(x, instance_id), "action_space")
+}
+
+#' @rdname env_action_space_info
+#' @export
+env_observation_space_info <- function(x, instance_id) {
+  instance_space(known_instance(x, instance_id), "observation_space")
+}
+
+#' Draw a random action
+#'
+#' Draws from the environment's action space on the server, whose generator is
+#' seeded together with the environment.
+#'
+#' @inheritParams env_reset
+#' @return An action that [env_step()] takes: a whole number for Discrete, a numeric
+#'   vector or array for Box; [space_sample()] has the table of all kinds. In a vector environment
+#'   an action for each sub-environment.
+#' @inheritSection env_action_space_info Errors
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' client <- gym_client()
+#' instance_id <- env_create(client, "CartPole-v1", seed = 1)
+#' env_action_space_sample(client, instance_id)
+#' env_close(client, instance_id)
+env_action_space_sample <- function(x, instance_id) {
+  instance <- known_instance(x, instance_id)
+  answer <- get_answer(x, paste0(instance$route, "action_space/sample"))
+  read_values(decode_sample(instance, answer$action), "Its `action`")
+}
+
+#' Ask whether a value belongs to a space
+#'
+#' @inheritParams env_reset
+#' @param action,observation The value to look at: anything that could be an
+#'   action or an observation.
+#' @return `TRUE` or `FALSE`.
+#' @inheritSection env_action_space_info Errors
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' client <- gym_client()
+#' instance_id <- env_create(client, "CartPole-v1")
+#' env_action_space_contains(client, instance_id, 1)
+#' env_action_space_contains(client, instance_id, 2)
+#' env_observation_space_contains(client, instance_id, c(0, 0, 0, 0))
+#' env_close(client, instance_id)
+env_action_space_contains <- function(x, instance_id, action) {
+  instance_contains(x, instance_id, "action_space", action)
+}
+
+#' @rdname env_action_space_contains
+#' @export
+env_observation_space_contains <- function(x, instance_id, observation) {
+  instance_contains(x, instance_id, "observation_space", observation)
+}
+
+instance_contains <- function(x, instance_id, which, value, call = rlang::caller_env()) {
+  instance <- known_instance(x, instance_id, call = call)
+  single <- instance[[paste0("single_", which)]]
+  num_envs <- instance$num_envs
+  space <- sent_space(single, num_envs)
+  if (instance$classic) {
+    return(fits_space(space, value, bounds = TRUE))
+  }
+  if (!fits_space(space, value)) {
+    return(FALSE)
+  }
+  json <- if (is.null(num_envs)) {
+    write_value(space, value)
+  } else {
+    write_batch(single, value, num_envs)
+  }
+  fields <- c(value = json)
+  answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
+  if (!is_flag(answer$member)) {
+    refuse_field(answer$member, "member", "true or false")
+  }
+  answer$member
+}
+
+# Environments named by their id ----------------------------------------------------
+
+#' Find out the spaces of an environment
+#'
+#' An environment that is named by its id is made for the question, and closed.
+#' @return A list: `observation_space` and `action_space`, those of a single sub-environment where
+#'   there are several, and `spec`.
+#' @noRd
+known_spaces <- function(env, client, call = rlang::caller_env()) {
+  check_environment(env, call = call)
+  if (is.character(env) || inherits(env, "gym_wrapped")) {
+    env <- gym_make(env, client = client)
+    on.exit(close_quietly(env))
+  }
+  list(
+    observation_space = env$single_observation_space %||% env$observation_space,
+    action_space = env$single_action_space %||% env$action_space,
+    spec = env$spec
+  )
+}
+
+# Closes an environment that was made for a question. An error on the way is more useful than one
+# from closing, which would replace it.
+close_quietly <- function(env) tryCatch(env$close(), gym_error = function(cnd) NULL)
+
+check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
+  if (!named && !is_playable(x) && !inherits(x, "gym_wrapped")) {
+    must <- "the id of an environment or an environment made by `gym_make()`"
+    abort_argument(x, must, arg, call)
+  }
+  invisible(x)
+}
+
+is_playable <- function(x) {
+  (is.environment(x) || is.list(x)) && is.function(x$reset) && is.function(x$step)
+}

@@ -1,0 +1,51 @@
+#' @rdname act
+#' @param object A policy made by [policy_network()].
+#' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
+#'   a data frame, such as the steps of a [rollout()], with a column for each number of an
+#'   observation under its name there.
+#' @param type `"action"`, the default, for the policy's actions, or `"output"` for the outputs of
+#'   the network that they follow from.
+#' @export
+predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  predict_policy(object, newdata, type, object$env_id)
+}
+
+predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
+  if (!inherits(policy, "gym_policy_network")) {
+    gym_abort(
+      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
+      class = "gym_error_argument", argument = "object", value = policy, call = call
+    )
+  }
+  observation <- observations_from(newdata, policy, env_id, call)
+  if (type == "action") {
+    return(act(policy, observation))
+  }
+  values <- observation_rows(observation, policy$observation_space)$values
+  outputs <- network_outputs(policy, values, call)
+  if (ncol(outputs) == 1L) outputs[, 1L] else outputs
+}
+
+# The observations in a data frame: the columns with their names, or all columns where it has none
+# of these names.
+observations_from <- function(newdata, policy, env_id, call) {
+  if (!is.data.frame(newdata)) {
+    return(newdata)
+  }
+  discrete <- inherits(policy$observation_space, "gym_space_discrete")
+  size <- if (discrete) 1L else policy$sizes[[1L]]
+  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
+  names <- observation_names(env_id, columns)
+  if (any(names %in% names(newdata))) {
+    absent <- setdiff(names, names(newdata))
+    if (length(absent)) {
+      gym_abort(
+        paste0("`newdata` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
+        class = "gym_error_argument", argument = "newdata", value = newdata, call = call
+      )
+    }
+    newdata <- newdata[names]
+  }
+  if (discrete) newdata[[1L]] else unname(as.matrix(newdata))
+}

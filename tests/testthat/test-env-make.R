@@ -1,0 +1,48 @@
+test_that("an environment is an object with Gymnasium's names", {
+  env <- local_env("CartPole-v1", seed = 1)
+  expect_output(print(env), "<gym_env: CartPole-v1>.*<Box float32 \\[4\\]>.*<Discrete 2>")
+  expect_equal(env$spec$reward_threshold, 475)
+  expect_equal(env$spec$max_episode_steps, 500)
+  expect_length(env$reset(), 4)
+  expect_identical(env$step(1)$truncated, FALSE)
+  # The classic calls see the same environment.
+  out <- env_step(env$client, env$instance_id, 0)
+  expect_equal(out$reward, 1)
+  expect_true(env$is_open)
+  env$close()
+  expect_false(env$is_open)
+  expect_output(print(env), "closed")
+  expect_error(env$close(), NA)
+  gone <- local_env()
+  env_close(gone$client, gone$instance_id)
+  expect_error(gone$close(), NA)
+  expect_error(env$step(1), "was closed", class = "gym_error_argument")
+  expect_error(env$reset(), "was closed", class = "gym_error_argument")
+})
+
+test_that("arguments by name go to the environment", {
+  env <- local_env("CartPole-v1", sutton_barto_reward = TRUE)
+  env$reset()
+  expect_equal(env$step(1)$reward, 0)
+  expect_error(local_env("CartPole-v1", wind = 3), "wind", class = "gym_error_http_400")
+  expect_error(gym_make("CartPole-v1", 3), class = "gym_error_argument")
+  expect_error(gym_make("CartPole-v1", gravity = 1, gravity = 2), "more than once",
+               class = "gym_error_argument")
+})
+
+test_that("an environment that was thrown away is closed by the next that is made", {
+  client <- create_GymClient(test_client()$remote_base)
+  before <- length(env_list_all(client))
+  env <- gym_make("CartPole-v1", client = client)
+  rm(env)
+  gc()
+  env <- local_env(client = client)
+  expect_length(env_list_all(client), before + 1)
+})
+
+test_that("an environment of which nothing could be learnt is closed again", {
+  server <- local_server()
+  client <- local_cut_client(server, "answered", "GET /v1/envs/", times = 100)
+  expect_error(gym_make("CartPole-v1", client = client), class = "gym_error_connection")
+  expect_length(env_list_all(server), 0)
+})
