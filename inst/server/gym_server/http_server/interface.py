@@ -1,4 +1,4 @@
-"""What this server shares with whoever uses it: answers, refusals, room for bodies."""
+"""What this server exchanges with its user: answers, refusals, memory for bodies."""
 
 from __future__ import annotations
 

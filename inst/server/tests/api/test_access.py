@@ -5,7 +5,7 @@ import pytest
 from gym_server.api.access import Access, Guard
 from gym_server.api.app import Config, create_app
 from gym_server.api.routes import ROUTES
-from gym_server.api.routing import Router
+from gym_server.api.routing import Callers, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.errors import GymServerError
 
@@ -209,6 +209,19 @@ def test_without_it_nothing_is_answered(locked, app):
                 assert (answer.status_code, answer.json["code"]) == (401, "unauthorized"), url
                 assert answer.headers["WWW-Authenticate"].startswith("Bearer")
                 assert TOKEN not in answer.text
+
+
+def test_only_the_watch_page_is_open_to_others():
+    others = {route.handler.__name__: route.callers for route in ROUTES}
+    assert {name for name, callers in others.items() if callers is Callers.EVERYONE} == {
+        "env_watch_style",
+        "env_watch_script",
+    }
+    assert {name for name, callers in others.items() if callers is Callers.WATCHERS} == {
+        "env_watch",
+        "env_watch_state",
+        "env_watch_presence",
+    }
 
 
 @pytest.mark.parametrize(
