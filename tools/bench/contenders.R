@@ -59,8 +59,8 @@ vector_contenders <- function(setup, num_envs) {
   mode <- env$vectorization_mode
   c(
     list(
-      contender("vector", num_envs, own[["vector"]], paste("env$step(a),", mode), function(seconds) {
-        play_vector(num_envs, actions, env$step, seconds)
+      contender("vector", num_envs, own[["vector"]], paste("env$step(a),", mode), function(s) {
+        play_vector(num_envs, actions, env$step, s)
       }),
       contender("vector", num_envs, "Python", paste0("envs.step(a), ", mode), function(seconds) {
         ask(setup$python, "vector", seconds, num_envs, mode)
