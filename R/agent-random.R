@@ -6,58 +6,12 @@
 #' CartPole. An environment named by its id is made for the purpose and closed afterwards,
 #' whatever happens.
 #'
-#' # What is drawn
-#'
-#' The weights of each round and the seeds of its episodes are drawn from R's generator, so
-#' that [set.seed()] alone fixes the whole search. Of the policy that is given only the sizes and
-#' activations matter: its own weights are not played, in the first round either, and drawing
-#' them in the call (as the default does) leaves the generator alone.
-#'
-#' # Rounds side by side
-#'
-#' As in [rollout()], many episodes are played at once, and so are the networks of many
-#' rounds. What comes of the search is decided round after round all the same: the first
-#' round that reaches the target ends it, and of later rounds, which may have been played
-#' beside it, nothing counts. With a single environment made by [gym_make()] one episode is
-#' played after the other.
-#'
-#' # Where it differs from the tutorial's script
-#'
-#' The tutorial's script recycles the weights of the output to twice their number, counts for
-#' each episode one step too many, and takes the mean of the *different* returns of a batch.
-#' Here each weight counts once, an episode's return is the sum of its rewards, and the mean
-#' is over all episodes.
-#'
-#' # When it ends early
-#'
-#' A search that is interrupted (Ctrl-C, or Esc) returns what it has, with a message; a round
-#' that was not played to its end does not count. An error in the middle, such as a lost
-#' connection, has the class `gym_error_search` beside its own, and what was played before
-#' it is the element `result` of the condition:
-#'
-#' ```r
-#' search <- tryCatch(search_random(), gym_error_search = function(cnd) cnd$result)
-#' ```
-#'
-#' # To go on after a kill
-#'
-#' With a `checkpoint` the search keeps what it has played in a file, after each batch of
-#' episodes (with a single environment made by [gym_make()], where a batch is one episode and
-#' may be over in milliseconds, as often as takes a tenth of the time at most). The file is
-#' replaced by a rename, so that it is complete whenever R, the server or the machine's queue ends
-#' the search. The same call then goes on where the file has it, and comes to the result that an
-#' undisturbed search comes to, the generator's state afterwards included: in a script that
-#' is submitted to a cluster again and again, that one line is enough. The batch that was under
-#' way is played again. `elapsed` adds up.
-#'
-#' ```r
-#' search <- search_random("CartPole-v1", rounds = 1000, seed = 1, checkpoint = "search.rds")
-#' ```
-#'
-#' A search goes on only with the arguments that it began with (`progress` and `client` may be
-#' others), in an environment that is made in the same way. Two searches at the same time need
-#' two files. Read such files only if you trust where they are from, as all that [readRDS()]
-#' reads.
+#' The weights of each round and the seeds of its episodes are drawn from R's generator, so that
+#' [set.seed()] alone fixes the whole search. Rounds are played side by side, and the first one that
+#' reaches the target ends the search all the same. A search that is interrupted returns what it
+#' has; one with a `checkpoint` goes on where it was when the same call is made again, also after a
+#' kill. `vignette("playing", package = "gym")` tells all of this in full, and where the tutorial's
+#' own script differs.
 #'
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
 #'   [gym_make()], with sub-environments or without.

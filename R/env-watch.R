@@ -11,37 +11,14 @@
 #' An environment made with `render_mode = "human"` opens its page by itself, and so does
 #' the first [env_step()] with `render = TRUE`.
 #'
-#' # How fast it moves
+#' In an interactive session the page opens in RStudio's viewer, else in the browser; in a script the
+#' address is printed, once an environment, as a message of class `gym_message_watch`.
+#' `options(gym.viewer = )` changes that, in scripts too: a function, such as [utils::browseURL()],
+#' is called with the address, and `FALSE` opens and prints nothing. Where the server asks for a
+#' token, the address holds a key that opens this page and nothing else.
 #'
-#' An environment that is stepped goes as fast as it is stepped, and people see samples
-#' of what goes by, at most 30 a second. One made with `render_mode = "human"`, or
-#' stepped with `render = TRUE`, is shown in real time, as in Gymnasium's own human
-#' mode: while somebody watches each step waits until the environment's clock (CartPole's
-#' ticks 50 times a second) has come so far. Unwatched it runs at full speed. The pace is
-#' the environment's own: pausing the page, or slowing it down, does not change it.
-#'
-#' Pictures are drawn only while somebody watches, and take at most a fifth of the
-#' environment's time (half of it in real time).
-#'
-#' # Where it opens
-#'
-#' In an interactive session the page opens in RStudio's viewer, else in the browser. In a
-#' script the address is printed, once an environment, as a message of class
-#' `gym_message_watch`, so that
-#' `withCallingHandlers(..., gym_message_watch = function(m) invokeRestart("muffleMessage"))`
-#' or [suppressMessages()] keeps it away.
-#'
-#' `options(gym.viewer = )` changes that, in scripts too: a function, such as
-#' [utils::browseURL()], is called with the address, and `FALSE` opens and prints
-#' nothing. `NULL`, the default, is as said above. When a page was opened, the call waits
-#' until the page is there, at most 5 seconds, so that the beginning is not missed. If it has
-#' not come by then, as when there is no browser, the address is printed as in a script.
-#'
-#' # Who can open it
-#'
-#' Everybody who can reach the server, unless it asks for a token. Then the address holds a key,
-#' which opens this environment's page and nothing else. It is good until nobody has used it for 10
-#' minutes; each call makes a new one.
+#' How fast the page moves, and who can open it:
+#' `vignette("server", package = "gym")`, section "Watching".
 #'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.

@@ -10,28 +10,11 @@
 #' first episode begins, and so are, while they play, the actions of a random
 #' policy. So [set.seed()] alone fixes everything.
 #'
-#' # Episodes side by side
-#'
 #' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
-#' at once, each in a sub-environment of its own: 256 where the environment has a vector
-#' implementation of its own (CartPole has), elsewhere 16. They are played in batches: all
-#' sub-environments begin an episode together, and the next batch begins when all have ended, so
-#' that short episodes are not favoured. The policy is asked for actions in the episodes that have
-#' not ended: as they end, a function is given fewer and fewer rows, and it returns as many
-#' actions. A row is not the same episode throughout.
-#'
-#' Only with `frames = TRUE` one episode is played after the other, in an environment without
-#' sub-environments. In CartPole these are other episodes than the same seed plays side by side,
-#' because its vector implementation uses seeds in another way; elsewhere they are the same ones, if
-#' the policy draws nothing.
-#'
-#' # To begin an episode again
-#'
-#' A seed of the table begins the same episode again, by `env$reset(seed = )` of an
-#' environment made by [gym_make()]. A vector implementation of an environment's own has
-#' a single seed for all of its sub-environments: to begin the episode again it takes an environment
-#' with `num_envs` of the result sub-environments, and the episode is in the one whose number is
-#' `sub_env` of the table (see the examples).
+#' side by side, each in a sub-environment of its own; with `frames = TRUE` one after the other. The
+#' policy is asked about the episodes that still run, so that a function gets fewer rows as they
+#' end. `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
+#' again.
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
