@@ -1,5 +1,6 @@
 """Every family of environments draws, from any thread, while others close, and is recorded."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -144,3 +145,22 @@ def test_mujoco_warns_in_the_log_and_leaves_no_file(
     mujoco.get_mju_user_warning()("the model is odd")
     assert "MuJoCo: the model is odd" in caplog.text
     assert list(tmp_path.glob("MUJOCO*")) == []
+
+
+def test_two_mujoco_environments_each_draw_their_own_picture(client, create, installed):
+    if not installed("Pusher-v5"):
+        pytest.skip("not installed")
+
+    def drawn(url):
+        return client.get(f"{url}/render/").data
+
+    first, second = create("Pusher-v5"), create("Hopper-v5")
+    for url in (first, second):
+        client.post(f"{url}/reset/", json={"seed": 1})
+    alone = drawn(first)
+    assert drawn(second) != alone
+    assert drawn(first) == alone
+    # What a closed environment leaves behind is collected whenever Python likes.
+    client.post(f"{second}/close/")
+    client.application._renderer.run(gc.collect)
+    assert drawn(first) == alone

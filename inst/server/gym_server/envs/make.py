@@ -181,6 +181,7 @@ def _load_creator(spec: registration.EnvSpec) -> Callable:
         mujoco.choose_gl()
         creator = registration.load_env_creator(entry_point)
         mujoco.log_warnings()
+        mujoco.draw_in_own_context()
         return creator
 
 

@@ -1,4 +1,4 @@
-"""Prepare MuJoCo for a server: OpenGL without a display, and warnings in the log."""
+"""Prepare MuJoCo for a server: OpenGL without a display, for several environments; its warnings."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import ctypes.util
 import logging
 import os
 import sys
+from typing import Any
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +38,39 @@ def log_warnings() -> None:
     import mujoco
 
     mujoco.set_mju_user_warning(lambda words: log.warning("MuJoCo: %s", words))
+
+
+def draw_in_own_context() -> None:
+    """Let every environment draw, and free what it drew with, in its own OpenGL context.
+
+    Gymnasium leaves the context current that was used last, so that an environment draws in that
+    of another one. And what a closed environment drew with is freed when Python collects it, in
+    whatever context is current then: the environment that has it draws black pictures from then on.
+    """
+    from gymnasium.envs.mujoco import mujoco_rendering
+
+    rendering: Any = mujoco_rendering
+    original: Any = rendering.OffScreenViewer
+    if getattr(original, "draws_in_own_context", False):
+        return
+
+    # The class is known only where MuJoCo is installed.
+    class OwnContextViewer(original):  # type: ignore[misc]
+        con: Any
+        draws_in_own_context = True
+
+        def render(self, *args: Any, **kwargs: Any) -> Any:
+            self.make_context_current()
+            return super().render(*args, **kwargs)
+
+        def close(self) -> None:
+            if self.con is not None:
+                self.make_context_current()
+                self.con.free()
+                self.con = None
+            super().close()
+
+    rendering.OffScreenViewer = OwnContextViewer
 
 
 def _has_display() -> bool:
