@@ -40,8 +40,8 @@ draw_figure <- function(rows, run, file) {
     bty = "n", cex = 0.85, inset = 0.01
   )
   graphics::title("CartPole-v1 from R: env steps a second", line = 1, adj = 0)
-  graphics::title(xlab = "num_envs", line = 2.4)
-  graphics::mtext(figure_note(rows, run), side = 1L, adj = 1, cex = 0.7, line = 2.8,
+  graphics::title(xlab = "num_envs", line = 2)
+  graphics::mtext(figure_note(rows, run), side = 1L, adj = 1, cex = 0.7, line = 3,
                   col = "grey40")
 }
 

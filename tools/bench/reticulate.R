@@ -30,7 +30,7 @@ by_bytes <- function(x) {
   if (x$ndim == 2L) matrix(values, ncol = x$shape[[2L]]) else values
 }
 
-# One sub-environment, too, has its row.
+# A single sub-environment has a row, too.
 numpy_actions <- function(actions) numpy$array(actions, dtype = "int64", ndmin = 1L)
 
 single_forms <- list(
@@ -84,7 +84,7 @@ single <- function(form, seconds) {
   )
 }
 
-vector <- function(form, seconds, num_envs, mode) {
+play_vector_form <- function(form, seconds, num_envs, mode) {
   num_envs <- as.integer(num_envs)
   env <- environment_of(paste("num_envs", num_envs), function() {
     gymnasium$make_vec("CartPole-v1", num_envs = num_envs, vectorization_mode = mode)
@@ -110,9 +110,9 @@ versions <- function() {
 answer <- function(command, ...) {
   switch(command,
     versions = jsonlite::toJSON(versions(), auto_unbox = TRUE),
-    forms = jsonlite::toJSON(names(switch(..1, single = single_forms, num_envs = vector_forms))),
+    forms = jsonlite::toJSON(names(switch(..1, single = single_forms, vector = vector_forms))),
     single = format(single(...), digits = 15),
-    vector = format(vector(...), digits = 15)
+    vector = format(play_vector_form(...), digits = 15)
   )
 }
 

@@ -5,9 +5,9 @@ number <- function(x) {
 }
 
 what_text <- function(summary) {
-  num_envs <- ifelse(summary$num_envs == 1, "sub_env", "vector")
+  plural <- ifelse(summary$num_envs == 1, "", "s")
   ifelse(
-    summary$part == "vector", sprintf("%.0f %s", summary$num_envs, num_envs),
+    summary$part == "vector", sprintf("%.0f sub-environment%s", summary$num_envs, plural),
     c(single = "single", search = "random search", fresh = "search in a fresh R",
       memory = "memory")[summary$part]
   )
