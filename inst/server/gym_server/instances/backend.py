@@ -98,7 +98,7 @@ class Backend(Protocol):
 
     @property
     def busy_since(self) -> float | None:
-        """Since when it owes an answer to a call that needs no lock, or None."""
+        """Since when a call that needs no lock has waited, in the clock's seconds, or None."""
 
     def stay(self, on_end: Callable[[GymServerError], None]) -> None:
         """Know that the instance is listed now.

@@ -71,7 +71,7 @@ class Instance:
                 each of which makes its own of it, or one for each.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
-            mask: a boolean a sub-environment; None for all of them.
+            mask: a boolean for each sub-environment; None for all of them.
 
         Returns:
             ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
@@ -105,7 +105,7 @@ class Instance:
                 Box are the environment's affair. With sub-environments a list of one JSON value
                 for each that steps, or a batch as ``Parts``.
             tensors: whether the answer is wanted as tensors.
-            mask: a boolean a sub-environment; None for all of them.
+            mask: a boolean for each sub-environment; None for all of them.
             in_real_time: whether people want to see it: not faster than in real time, then, while
                 somebody watches.
 

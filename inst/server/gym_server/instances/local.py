@@ -207,13 +207,9 @@ class LocalBackend:
         return self._contains(self.env.single_observation_space, "observation_space_info", claim)
 
     def _contains(self, space: Space, info: str, claim: dict) -> bool:
-        if "value" not in claim:
-            return spaces.describes(claim, getattr(self, info))
-        try:
-            self.env.decode(space, claim["value"])
-        except spaces.NotInSpace:
-            return False
-        return True
+        return spaces.contains(
+            claim, lambda value: self.env.decode(space, value), lambda: getattr(self, info)
+        )
 
     def about(self) -> dict:
         """Return what is known of the environment, without waiting for it."""

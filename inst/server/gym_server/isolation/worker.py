@@ -73,9 +73,9 @@ def serve_instance(
     the server kills it.
 
     Args:
-        moves: brings one call after the other that needs the environment's lock; the first answer
+        moves: carries one call after the other that needs the environment's lock; the first answer
             is about its creation.
-        questions: brings calls that can be answered while the environment moves.
+        questions: carries calls that can be answered while the environment moves.
         choices: what the client wants.
         settings: what is to be known of the server.
     """

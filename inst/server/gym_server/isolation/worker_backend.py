@@ -153,7 +153,7 @@ class WorkerBackend:
 
     @property
     def busy_since(self) -> float | None:
-        """Since when the process owes an answer to a query, or None."""
+        """Since when a query has waited for the process, in the clock's seconds, or None."""
         return self._worker.query_since
 
     # Monitors -------------------------------------------------------------------------------
