@@ -66,8 +66,7 @@ ROUTES = Table()
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    choices = EnvConfig(**fields)
-    return {"instance_id": call.services.instances.create(choices)}
+    return {"instance_id": call.services.instances.create(EnvConfig(**fields))}
 
 
 @ROUTES.declare(

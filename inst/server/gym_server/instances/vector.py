@@ -26,21 +26,21 @@ class VectorEnvironment:
     fails_as_a_whole = True
 
     def __init__(
-        self, env: VectorEnv, mode: str, choices: EnvConfig, renderer: RenderThread
+        self, env: VectorEnv, mode: str, config: EnvConfig, renderer: RenderThread
     ) -> None:
         """Take over a vector environment.
 
         Args:
             env: it.
             mode: its vectorization_mode.
-            choices: what the client wanted.
+            config: what the client wanted.
             renderer: the process's render thread.
 
         Raises:
             GymServerError: ``unsupported_space``.
         """
         self.gym_env: Any = env
-        self.env_id = env_id_of(choices, env)
+        self.env_id = env_id_of(config, env)
         self.num_envs: int | None = env.num_envs
         self._num_envs = env.num_envs
         self.action_space = env.action_space
