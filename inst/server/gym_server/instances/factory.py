@@ -25,10 +25,10 @@ def make_instance(
     undo: contextlib.ExitStack,
     reservation: MemoryReservation,
 ) -> Instance:
-    """Create an instance of what a client wants.
+    """Create an instance whose environment runs in this process.
 
     Args:
-        config: what that is.
+        config: what the client chose.
         allowed_modules: names of the modules that an env_id may import.
         max_num_envs: how many sub-environments it may have.
         renderer: the process's render thread.

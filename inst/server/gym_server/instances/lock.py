@@ -134,9 +134,10 @@ class InstanceLock:
         if self._held.finish(thread):
             self._lock.release()
             return
-        # The lock was taken away from this thread meanwhile. Where the error is the reason for
-        # that, the render thread is the one that hangs in the environment, and the environment
-        # must be left to it.
+        # The lock was taken away from this thread meanwhile, and the environment has to be closed,
+        # unless this thread only waited for the render thread. Then the error is why the
+        # environment was abandoned, raised by RenderThread.abandon(), and the render thread is still
+        # in the environment, so nothing else may touch it.
         if error is not self.why:
             self._close_abandoned()
         self._held.wait_until_answered(thread)

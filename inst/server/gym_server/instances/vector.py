@@ -31,7 +31,7 @@ class VectorEnvironment:
         """Take over a vector environment.
 
         Args:
-            env: it.
+            env: the environment.
             mode: its vectorization_mode.
             config: what the client wanted.
             renderer: the process's render thread.

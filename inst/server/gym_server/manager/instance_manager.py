@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class _Share(NamedTuple):
-    """What an environment takes of what all share, until it is gone."""
+    """What an environment takes of the server's limits, until it is gone."""
 
     room: Room
     reservation: MemoryReservation
@@ -43,7 +43,7 @@ class _Creation:
 
     Attributes:
         config: what its client wants.
-        share: what it takes of what all share.
+        share: what it takes of the server's limits.
         kill: kills the process that the creating thread waits for, so that the thread answers for
             itself; None where there is no such process.
         began: in the clock's seconds.
