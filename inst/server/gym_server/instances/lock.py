@@ -135,9 +135,9 @@ class InstanceLock:
             self._lock.release()
             return
         # The lock was taken away from this thread meanwhile, and the environment has to be closed,
-        # unless this thread only waited for the render thread. Then the error is why the
-        # environment was abandoned, raised by RenderThread.abandon(), and the render thread is still
-        # in the environment, so nothing else may touch it.
+        # unless this thread only waited for the render thread. Then the error is the reason for
+        # abandoning it, which RenderThread.abandon() passes on, and the render thread is still in
+        # the environment, so nothing else may touch it.
         if error is not self.why:
             self._close_abandoned()
         self._held.wait_until_answered(thread)
