@@ -4,7 +4,7 @@ import os
 
 # SDL reads these when pygame is first imported, which an environment may do at any time;
 # the server draws off screen, also on a machine without a display.
-# (This file and __main__.py must parse on any Python: they tell what is wrong with it.)
+# (This file and __main__.py must parse on any Python: __main__.py prints where it is too old.)
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("SDL_AUDIODRIVER", "dummy")
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")

@@ -1,4 +1,4 @@
-"""Start the server, or say in one line why this Python cannot.
+"""Start the server, or print in one line why this Python cannot.
 
 The line and exit status 78 (EX_CONFIG) tell a caller who looks for a fitting Python, such as
 the R package, to try the next one.  For that this file must parse on any Python, also 2.7.
@@ -10,7 +10,7 @@ CANNOT_RUN_HERE = 78
 
 
 def refuse(reason):
-    """Say why this Python cannot run the server and exit with status 78."""
+    """Print why this Python cannot run the server, and exit with status 78."""
     version = ".".join(str(part) for part in sys.version_info[:3])
     sys.stderr.write(
         "gym_server cannot run on this Python (%s, %s): %s\n" % (version, sys.executable, reason)

@@ -51,7 +51,7 @@ class Share:
         self._held = 0
 
     def take(self, size: int) -> bool:
-        """Hold so many bytes more, if they are left; return whether they were."""
+        """Take so many bytes more, if they are left; return whether they were."""
         with self._budget._lock:
             taken = self._budget.take(size)
             if taken:
@@ -59,7 +59,7 @@ class Share:
             return taken
 
     def give_back(self, size: int) -> None:
-        """Hold so many bytes less, but not less than none."""
+        """Give back so many bytes, or all where it holds fewer."""
         with self._budget._lock:
             size = min(size, self._held)
             self._held -= size

@@ -14,7 +14,7 @@ import threading
 
 
 class Cutter:
-    """A proxy that passes each byte on at once, and cuts one connection when it is told to."""
+    """A proxy that passes each byte on at once, and cuts one connection when it is asked to."""
 
     def __init__(self, port, pattern=b"/step"):
         self.port, self.pattern = port, pattern
@@ -57,7 +57,7 @@ class Cutter:
         request = read_message(client)
         if request is None:
             return False
-        where, after = self._told(request)
+        where, after = self._cut_for(request)
         if where == "request":
             server.sendall(request[:after])
             return self._break(client, server)
@@ -73,14 +73,14 @@ class Cutter:
         client.sendall(answer)
         return True
 
-    def _told(self, request):
+    def _cut_for(self, request):
         with self._lock:
             if self.where is None or self.pattern not in request.split(b"\r\n", 1)[0]:
                 return None, 0
-            told = self.where, self.after
+            cut = self.where, self.after
             self.where = None
             self.cuts += 1
-            return told
+            return cut
 
     def _break(self, client, server):
         # In turn as by a process that ended, and as by a machine that did.

@@ -40,7 +40,7 @@ def actions_of(env, seed):
 
 
 def members(env, batch):
-    """Return a batch's members, one a sub-environment, as JSON values."""
+    """Return a batch's members, one for each sub-environment, as JSON values."""
     return [
         plain(spaces.encode(env.single_observation_space, member))
         for member in iterate(env.observation_space, batch)

@@ -164,14 +164,14 @@ class Guard:
 
     def _watch_key(self, environ: dict, match: Match | None) -> tuple[bool, str | None]:
         """Return whether a request shows a key that opens what it asks for, and the key."""
-        if match is None or match.route.callers is not Callers.WATCHERS:
+        if match is None or match.callers is not Callers.WATCHERS:
             return False, None
         key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
         return self._watch_keys.opens(key, match.variables["instance_id"]), key
 
     def _check_callers(self, environ: dict, match: Match | None) -> None:
         """Let a request without the token pass where its route takes such requests."""
-        if match is not None and match.route.callers is Callers.EVERYONE:
+        if match is not None and match.callers is Callers.EVERYONE:
             return
         opens, key = self._watch_key(environ, match)
         if not opens:

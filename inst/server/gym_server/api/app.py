@@ -17,7 +17,7 @@ from gym_server.api.calls import Services
 from gym_server.api.endpoint import Endpoint, failure, kept_bytes
 from gym_server.api.exactly_once import ExactlyOnce
 from gym_server.api.routes import ROUTES
-from gym_server.api.routing import Match, Router
+from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.errors import (
@@ -192,7 +192,13 @@ def create_app(config: Config | None = None) -> GymApp:
 def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
     """Answer a request that may not pass; people get the reason on the page that they asked for."""
     wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
-    if match and match.route.refusal_page and refusal.code == "unauthorized" and wants_page:
+    if (
+        match is not None
+        and match.route.refusal_page is not None
+        and match.callers is not Callers.TOKEN
+        and refusal.code == "unauthorized"
+        and wants_page
+    ):
         page = answers.answer(match.route.refusal_page(match.path, refusal.status), None)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return failure(refusal, None)

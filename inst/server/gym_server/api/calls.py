@@ -22,7 +22,7 @@ class Services:
         instances: the environments.
         monitor_root: where monitors may write.
         stop: asks the server to stop once the requests under way are answered.
-        watchers: those who wait for a picture.
+        watchers: counts those who wait for a frame.
         routes: all routes, which one of them describes.
         watch_keys: the keys that open watch pages; None where no page asks for one.
     """

@@ -96,8 +96,8 @@ class ExactlyOnce(Generic[AnswerT]):
             size: tells how many bytes are kept of a request and its answer.
             forget_after: after how many seconds ``forget()`` drops what may be dropped.
             most_keys: how many keys an instance takes in that time.
-            most_gone: to how many ``forget()`` brings down those of instances that are gone.
-            most_bytes: to how many it brings the answers of all down.
+            most_gone: how many of instances that are gone ``forget()`` leaves.
+            most_bytes: how many bytes of answers it leaves.
         """
         self._lives = lives
         self._size = size

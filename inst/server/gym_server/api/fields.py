@@ -1,4 +1,4 @@
-"""What the fields of requests may hold that describe an environment or its sub-environments."""
+"""The kinds of fields that describe an environment, its sub-environments, or what to see of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LONGEST_NAME = 100
 
 def _name(value: object) -> str:
     value = text(value)
-    # Half a character is none, and many readers of patterns cannot say so.
+    # One half of a surrogate pair is no character, and many readers of patterns cannot exclude it.
     value.encode()
     if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
         raise ValueError
@@ -74,8 +74,8 @@ def _mask(value: object) -> np.ndarray:
     return mask
 
 
-def _sub_env(value: object) -> int:
-    """Return a number out of a query, where everything is text."""
+def _query_integer(value: object) -> int:
+    """Return an integer out of a query, where everything is text."""
     if not (isinstance(value, str) and value.isascii() and value.isdecimal()):
         raise ValueError
     return int(value)
@@ -152,6 +152,6 @@ MASK = Kind(
     _mask,
     empty_is_absent=False,
 )
-SUB_ENV = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _sub_env)
+QUERY_INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _query_integer)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})

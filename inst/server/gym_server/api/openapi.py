@@ -50,7 +50,7 @@ def document(routes: Iterable[Route]) -> dict:
 
 
 def _link_created(paths: dict[str, dict]) -> None:
-    """Say where the instance_id that creating answers is of use."""
+    """Link the instance_id in the answer of a creation to the operations that take one."""
     created = paths.get("/v1/envs/", {}).get("post")
     if created is None:
         return

@@ -34,7 +34,7 @@ ROUTES = Table()
         "seed",
         fields.SEED,
         "Seeds the action space, and the first reset without a seed; with num_envs also a list "
-        "of one a sub-environment.",
+        "of one for each sub-environment.",
     ),
     Field(
         "render_mode",
@@ -66,8 +66,7 @@ ROUTES = Table()
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    choices = EnvConfig(**fields)
-    return {"instance_id": call.services.instances.create(choices)}
+    return {"instance_id": call.services.instances.create(EnvConfig(**fields))}
 
 
 @ROUTES.declare(
@@ -119,7 +118,7 @@ def env_about(call: Call) -> dict:
     ),
     Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
-    answer="observation, info; with sub-environments one row a sub-environment",
+    answer="observation, info; with sub-environments one row for each",
     once=True,
     tensors=True,
     schema=schemas.json_object(
@@ -252,7 +251,7 @@ def env_observation_space_contains(call: Call) -> dict:
 @ROUTES.declare(
     "GET",
     INSTANCE + "render/",
-    Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
+    Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
     answer="the current frame",
     content_type="image/png",
     tensors=True,

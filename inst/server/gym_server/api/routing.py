@@ -12,6 +12,9 @@ from gym_server.protocol.fields import Field
 
 INSTANCE = "/v1/envs/<instance_id>/"
 
+# What an instance_id is made of.
+_HEX_DIGITS = frozenset("0123456789abcdef")
+
 Handler = Callable[..., dict | Content | Ready | None]
 
 
@@ -100,6 +103,12 @@ class Match(NamedTuple):
     route: Route
     variables: dict[str, str]
     path: str
+
+    @property
+    def callers(self) -> Callers:
+        """Who may make this request; what has no instance's id where one belongs needs a token."""
+        has_id = _HEX_DIGITS.issuperset(self.variables.get("instance_id", ""))
+        return self.route.callers if has_id else Callers.TOKEN
 
 
 class _Node:

@@ -122,8 +122,10 @@ def env_watch_script(call: Call) -> Content:
 @ROUTES.declare(
     "GET",
     _WATCH + "state/",
-    Field("sub_env", fields.SUB_ENV, "Which sub-environment, from 0; absent for the first."),
-    Field("after", fields.SUB_ENV, "The number of what was seen last; absent for the present."),
+    Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
+    Field(
+        "after", fields.QUERY_INTEGER, "The number of what was seen last; absent for the present."
+    ),
     answer="number, state (running, ended, not_reset, busy), env_id, sub_env, num_envs, episode, "
     "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "
     "reward_threshold, fps (null unless it is shown in real time), frame (a PNG in Base64, or "

@@ -4,7 +4,7 @@ Why it exists:
 
 - Speed. The thread that waits for a client's request also answers it, while servers that run on
   Windows, macOS and Linux alike hand each request over to another thread. Microseconds a request
-  (and requests a second) on one kept-alive connection, medians of 11 interleaved rounds of 1,000
+  (and requests a second) on one kept-alive connection, medians of 11 interleaved runs of 1,000
   on two busy cores:
 
       ==================  ===================  =====================

@@ -150,7 +150,7 @@ class Connection:
     def serve(self) -> None:
         """Answer until the client leaves, is silent for too long, or the server stops."""
         self.thread = threading.get_ident()
-        # A client that has left needs no answer, so an error of its socket is none of ours.
+        # A client that has left needs no answer, so errors of its socket are ignored.
         with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if hasattr(socket, "TCP_NOTSENT_LOWAT"):

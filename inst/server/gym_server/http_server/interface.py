@@ -1,4 +1,4 @@
-"""What this server exchanges with its user: answers, refusals, memory for bodies."""
+"""What passes between the server and the program that uses it: answers, memory for bodies."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Share(Protocol):
     """The memory that the bodies of one connection's requests hold."""
 
     def take(self, size: int) -> bool:
-        """Hold so many bytes more; return whether there are as many."""
+        """Take so many bytes more; return whether as many were left."""
 
     def give_back(self, size: int) -> None:
-        """Hold so many bytes less."""
+        """Give back so many bytes."""
 
     def give_all_back(self) -> None:
-        """Hold nothing any more."""
+        """Give back all bytes."""
 
 
 class Budget(Protocol):

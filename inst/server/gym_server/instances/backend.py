@@ -98,13 +98,13 @@ class Backend(Protocol):
 
     @property
     def busy_since(self) -> float | None:
-        """Since when it owes an answer to a call that needs no lock, or None."""
+        """Since when a call that needs no lock has waited, in the clock's seconds, or None."""
 
-    def stay(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Know that the instance is listed now.
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when the environment's process ends by itself, or at once if it has.
 
         Args:
-            on_end: called with the reason when the environment's process ends by itself.
+            on_end: called with the reason.
         """
 
     # The end -------------------------------------------------------------------------------
@@ -116,5 +116,5 @@ class Backend(Protocol):
             why: the error for the calls that this ends.
         """
 
-    def clear_away(self) -> None:
+    def close_abandoned(self) -> None:
         """Close what was abandoned, once the call that took too long has come back."""

@@ -133,7 +133,7 @@ class Environment(Protocol):
         """Kill the processes that it runs in, if it has any."""
 
 
-def env_id_of(choices: EnvConfig, gym_env: gymnasium.Env | VectorEnv) -> str:
+def env_id_of(config: EnvConfig, gym_env: gymnasium.Env | VectorEnv) -> str:
     """Return what an environment can be created by again: its module, and the version found."""
-    module, colon, name = str(choices.env_id).rpartition(":")
+    module, colon, name = str(config.env_id).rpartition(":")
     return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"

@@ -18,17 +18,17 @@ from gym_server.rendering.render_thread import RenderThread
 
 
 def make_instance(
-    choices: EnvConfig,
+    config: EnvConfig,
     allowed_modules: Collection[str],
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
     reservation: MemoryReservation,
 ) -> Instance:
-    """Create an instance of what a client wants.
+    """Create an instance whose environment runs in this process.
 
     Args:
-        choices: what that is.
+        config: what the client chose.
         allowed_modules: names of the modules that an env_id may import.
         max_num_envs: how many sub-environments it may have.
         renderer: the process's render thread.
@@ -39,27 +39,27 @@ def make_instance(
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
             and ``LocalBackend``.
     """
-    if choices.num_envs is None:
+    if config.num_envs is None:
         env = make.make_env(
-            choices.env_id,
-            choices.render_mode,
-            choices.kwargs or {},
+            config.env_id,
+            config.render_mode,
+            config.kwargs or {},
             allowed_modules,
-            choices.wrappers,
+            config.wrappers,
             reservation,
         )
         undo.push(_closing_quietly(renderer, env.close))
-        wrapped = make.ask(wrappers.wrap, env, choices.wrappers, renderer, reservation)
-        return _instance(SingleEnvironment(wrapped, choices, renderer), choices, renderer)
+        wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
+        return _instance(SingleEnvironment(wrapped, config, renderer), config, renderer)
     sub_envs, mode = vectorization.make_vector_env(
-        choices, allowed_modules, max_num_envs, renderer, reservation
+        config, allowed_modules, max_num_envs, renderer, reservation
     )
     undo.push(_closing_quietly(renderer, sub_envs.close))
-    return _instance(VectorEnvironment(sub_envs, mode, choices, renderer), choices, renderer)
+    return _instance(VectorEnvironment(sub_envs, mode, config, renderer), config, renderer)
 
 
-def _instance(env: Environment, choices: EnvConfig, renderer: RenderThread) -> Instance:
-    return Instance(LocalBackend(env, choices, renderer), choices, renderer)
+def _instance(env: Environment, config: EnvConfig, renderer: RenderThread) -> Instance:
+    return Instance(LocalBackend(env, config, renderer), config, renderer)
 
 
 def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:

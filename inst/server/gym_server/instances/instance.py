@@ -34,24 +34,24 @@ class Instance:
         renderer: the process's render thread.
     """
 
-    def __init__(self, backend: Backend, choices: EnvConfig, renderer: RenderThread) -> None:
+    def __init__(self, backend: Backend, config: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Args:
             backend: what runs it.
-            choices: what its client wanted.
+            config: what its client wanted.
             renderer: the process's render thread.
         """
         self.instance_id = ""
         self._backend = backend
-        self._choices = choices
+        self._config = config
         self.renderer = renderer
         self.lock = InstanceLock(
-            lambda: unknown_instance(self.instance_id), backend.clear_away, renderer
+            lambda: unknown_instance(self.instance_id), backend.close_abandoned, renderer
         )
         self.viewer = Viewer(self, backend.fps)
-        self._is_single = choices.num_envs is None
-        self._in_real_time = choices.render_mode == "human"
+        self._is_single = config.num_envs is None
+        self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
 
     # Moves ----------------------------------------------------------------------------------
@@ -71,7 +71,7 @@ class Instance:
                 each of which makes its own of it, or one for each.
             options: the environment's own.
             tensors: whether the observation is wanted as tensors.
-            mask: a boolean a sub-environment; None for all of them.
+            mask: a boolean for each sub-environment; None for all of them.
 
         Returns:
             ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
@@ -105,7 +105,7 @@ class Instance:
                 Box are the environment's affair. With sub-environments a list of one JSON value
                 for each that steps, or a batch as ``Parts``.
             tensors: whether the answer is wanted as tensors.
-            mask: a boolean a sub-environment; None for all of them.
+            mask: a boolean for each sub-environment; None for all of them.
             in_real_time: whether people want to see it: not faster than in real time, then, while
                 somebody watches.
 
@@ -147,7 +147,7 @@ class Instance:
 
     def check_sub_env(self, sub_env: int) -> None:
         """Raise ``invalid_parameter`` for a sub-environment that does not exist."""
-        num_envs = self._choices.num_envs or 1
+        num_envs = self._config.num_envs or 1
         if sub_env >= num_envs:
             last = f"an integer from 0 to {num_envs - 1}" if num_envs > 1 else "0"
             raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
@@ -202,8 +202,8 @@ class Instance:
         return {
             "instance_id": self.instance_id,
             "env_id": self.env_id,
-            "name": self._choices.name,
-            "num_envs": self._choices.num_envs,
+            "name": self._config.name,
+            "num_envs": self._config.num_envs,
             "age_seconds": now - self._created,
             "idle_seconds": now - self.lock.used,
             "steps": self._backend.steps,
@@ -214,8 +214,9 @@ class Instance:
         """Return all that is known of the instance, without waiting for its environment."""
         about = self._backend.about()
         entry = self.list_entry()
-        # The backend of an isolated environment answers with an entry of its own, which does not
-        # count: it knows neither the id nor the watchers.
+        # The entry comes last, because what the process of an isolated environment sends has an
+        # entry of that process, which knows neither the id nor the watchers. It also comes first,
+        # so that its values stand at the beginning of the answer.
         return {**entry, **about, **entry}
 
     @property
@@ -249,18 +250,18 @@ class Instance:
 
     # Beginning and end ----------------------------------------------------------------------
 
-    def stay(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Know that the instance is listed now.
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when the environment's process ends by itself, or at once if it has.
 
         Args:
-            on_end: called with the reason when the environment's process ends by itself.
+            on_end: called with the reason, after the watchers got it.
         """
 
         def end(why: GymServerError) -> None:
             self.viewer.end(why)
             on_end(why)
 
-        self._backend.stay(end)
+        self._backend.report_end(end)
 
     def close(self) -> None:
         """Finish the monitor and close the environment; waiting calls get an error."""
@@ -288,13 +289,13 @@ class Instance:
         self._backend.kill(why)
         if stuck is None:
             # The call has just come back.
-            threading.Thread(target=self._clear_away_when_free, daemon=True).start()
+            threading.Thread(target=self._close_abandoned_when_free, daemon=True).start()
             return None
         return None if self.renderer.abandon(stuck, why) else stuck
 
-    def _clear_away_when_free(self) -> None:
+    def _close_abandoned_when_free(self) -> None:
         with self.lock.when_free():
-            self._backend.clear_away()
+            self._backend.close_abandoned()
 
 
 def _refuse_mask(name: str, mask: np.ndarray | None) -> None:

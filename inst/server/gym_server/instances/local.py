@@ -39,7 +39,7 @@ class LocalBackend:
     # No call is answered without the instance knowing of it.
     busy_since = None
 
-    def __init__(self, env: Environment, choices: EnvConfig, renderer: RenderThread) -> None:
+    def __init__(self, env: Environment, config: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment.
 
         Raises:
@@ -47,7 +47,7 @@ class LocalBackend:
         """
         self.env = env
         self.env_id = env.env_id
-        self._choices = choices
+        self._config = config
         self._renderer = renderer
         self._single_action_space_info = spaces.describe(env.single_action_space)
         self._single_observation_space_info = spaces.describe(env.single_observation_space)
@@ -59,12 +59,12 @@ class LocalBackend:
         self.draws_when_stepped = env.draws_when_stepped
         self.draws_on_render_thread = env.draws_on_render_thread
         self._monitor: Monitor | None = None
-        self._seed_for_reset = choices.seed
+        self._seed_for_reset = config.seed
         self._was_reset = False
         self._observation: object = None
         self._max_episode_steps = time_limit(env.gym_env)
-        if choices.seed is not None:
-            self._seed_actions(choices.seed)
+        if config.seed is not None:
+            self._seed_actions(config.seed)
 
     def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
         # One generator serves all sub-environments.
@@ -167,11 +167,11 @@ class LocalBackend:
         facts = {
             "env_id": self.env_id,
             "sub_env": sub_env,
-            "num_envs": self._choices.num_envs,
+            "num_envs": self._config.num_envs,
             **facts_of(self.env.statistics, sub_env),
             "reward_threshold": getattr(self.env.gym_env.spec, "reward_threshold", None),
             "steps": self.steps,
-            "fps": usable_fps(self.fps) if self._choices.render_mode == "human" else None,
+            "fps": usable_fps(self.fps) if self._config.render_mode == "human" else None,
         }
         if not self._was_reset:
             return {**facts, "state": "not_reset"}, None
@@ -207,19 +207,15 @@ class LocalBackend:
         return self._contains(self.env.single_observation_space, "observation_space_info", claim)
 
     def _contains(self, space: Space, info: str, claim: dict) -> bool:
-        if "value" not in claim:
-            return spaces.describes(claim, getattr(self, info))
-        try:
-            self.env.decode(space, claim["value"])
-        except spaces.NotInSpace:
-            return False
-        return True
+        return spaces.contains(
+            claim, lambda value: self.env.decode(space, value), lambda: getattr(self, info)
+        )
 
     def about(self) -> dict:
         """Return what is known of the environment, without waiting for it."""
-        gym_env, choices, monitor = self.env.gym_env, self._choices, self._monitor
+        gym_env, config, monitor = self.env.gym_env, self._config, self._monitor
         spec = gym_env.spec
-        single = choices.num_envs is None
+        single = config.num_envs is None
         return {
             "observation_space": self._single_observation_space_info,
             "action_space": self._single_action_space_info,
@@ -228,17 +224,17 @@ class LocalBackend:
             "render_fps": plain((gym_env.metadata or {}).get("render_fps")),
             "vectorization_mode": self.env.vectorization_mode,
             "autoreset_mode": self.env.autoreset_mode,
-            "render_mode": choices.render_mode or gym_env.render_mode,
-            "kwargs": choices.kwargs or {},
-            "wrappers": [wrapper._asdict() for wrapper in choices.wrappers],
-            "seed": choices.seed,
+            "render_mode": config.render_mode or gym_env.render_mode,
+            "kwargs": config.kwargs or {},
+            "wrappers": [wrapper._asdict() for wrapper in config.wrappers],
+            "seed": config.seed,
             "episode_steps": self.env.statistics.of(0).step if single else None,
             "needs_reset": self.env.has_ended or not self._was_reset,
             "monitor": monitor.about() if monitor else None,
             "isolated": False,
         }
 
-    def stay(self, on_end: Callable[[GymServerError], None]) -> None:
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Do nothing: this process does not end by itself."""
 
     # Monitors -------------------------------------------------------------------------------
@@ -289,7 +285,7 @@ class LocalBackend:
         """Kill the processes of sub-environments, which ends what hangs in them."""
         self.env.kill()
 
-    def clear_away(self) -> None:
+    def close_abandoned(self) -> None:
         """Close what was abandoned, once the call that took too long has come back."""
         with contextlib.suppress(BaseException):
             self.close_monitor()

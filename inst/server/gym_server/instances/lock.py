@@ -24,19 +24,19 @@ class InstanceLock:
     def __init__(
         self,
         unknown: Callable[[], GymServerError],
-        clear_away: Callable[[], None],
+        close_abandoned: Callable[[], None],
         renderer: RenderThread | None = None,
     ) -> None:
         """Make a lock that no thread has.
 
         Args:
             unknown: returns the error for an environment that its owner closed.
-            clear_away: closes the environment; called in a thread that comes back after the lock
-                was taken away from it.
+            close_abandoned: closes the environment; called in a thread that comes back after the
+                lock was taken away from it.
             renderer: the render thread that threads with the lock may wait for.
         """
         self._unknown = unknown
-        self._clear_away = clear_away
+        self._close_abandoned = close_abandoned
         self._renderer = renderer
         self._lock = threading.Lock()
         # The thread that has the lock, and since when. The thread that ends this work, its own or
@@ -134,11 +134,12 @@ class InstanceLock:
         if self._held.finish(thread):
             self._lock.release()
             return
-        # The lock was taken away from this thread meanwhile. Where the error is the reason for
-        # that, the render thread is the one that hangs in the environment, and the environment
-        # must be left to it.
+        # The lock was taken away from this thread meanwhile, and the environment has to be closed,
+        # unless this thread only waited for the render thread. Then the error is the reason for
+        # abandoning it, which RenderThread.abandon() passes on, and the render thread is still in
+        # the environment, so nothing else may touch it.
         if error is not self.why:
-            self._clear_away()
+            self._close_abandoned()
         self._held.wait_until_answered(thread)
         raise self.refusal()
 

@@ -28,10 +28,10 @@ class SingleEnvironment:
     autoreset_mode: str | None = None
     fails_as_a_whole = False
 
-    def __init__(self, env: gymnasium.Env, choices: EnvConfig, renderer: RenderThread) -> None:
+    def __init__(self, env: gymnasium.Env, config: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment."""
         self.gym_env: Any = env
-        self.env_id = env_id_of(choices, env)
+        self.env_id = env_id_of(config, env)
         self.action_space = self.single_action_space = env.action_space
         self.observation_space = self.single_observation_space = env.observation_space
         self.draws_when_stepped = draws_when_stepped(env)

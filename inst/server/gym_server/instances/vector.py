@@ -1,4 +1,4 @@
-"""A vector environment: one row a sub-environment in what comes and goes."""
+"""A vector environment: actions, observations and the rest have a row for each sub-environment."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ class VectorEnvironment:
     fails_as_a_whole = True
 
     def __init__(
-        self, env: VectorEnv, mode: str, choices: EnvConfig, renderer: RenderThread
+        self, env: VectorEnv, mode: str, config: EnvConfig, renderer: RenderThread
     ) -> None:
         """Take over a vector environment.
 
         Args:
-            env: it.
+            env: the environment.
             mode: its vectorization_mode.
-            choices: what the client wanted.
+            config: what the client wanted.
             renderer: the process's render thread.
 
         Raises:
             GymServerError: ``unsupported_space``.
         """
         self.gym_env: Any = env
-        self.env_id = env_id_of(choices, env)
+        self.env_id = env_id_of(config, env)
         self.num_envs: int | None = env.num_envs
         self._num_envs = env.num_envs
         self.action_space = env.action_space
@@ -87,7 +87,7 @@ class VectorEnvironment:
         if len(seed) != self._num_envs:
             raise wrong_length("seed", len(seed), self._num_envs, "integer or null")
         if not self._mode.resets_each:
-            raise self._not_supported("one seed a sub-environment")
+            raise self._not_supported("seed for each sub-environment")
 
     def _check_reset_mask(self, mask: np.ndarray, was_reset: bool) -> None:
         self._check_mask("reset_mask", mask)
@@ -219,11 +219,11 @@ class VectorEnvironment:
         return spaces.encode_batch(self.single_observation_space, observation)
 
     def encode_action(self, action: Any) -> object:
-        """Return one action a sub-environment as JSON values."""
+        """Return one action for each sub-environment as JSON values."""
         return spaces.encode_sub_envs(self.single_action_space, action)
 
     def decode(self, space: Space, value: object) -> object:
-        """Return the members of a space that a list has, one a sub-environment."""
+        """Return the members of a space in a list that has one for each sub-environment."""
         return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
 
     @property

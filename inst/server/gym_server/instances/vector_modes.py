@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -162,7 +163,7 @@ class AsyncMode:
         self._env.kill()
 
 
-MODES: dict[str, Any] = {
+MODES: dict[str, Callable[[Any, str, RenderThread], Mode]] = {
     "vector_entry_point": EntryPointMode,
     "sync": SyncMode,
     "async": AsyncMode,

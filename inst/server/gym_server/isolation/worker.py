@@ -65,7 +65,7 @@ class WorkerSettings:
 
 
 def serve_instance(
-    moves: Connection, questions: Connection, choices: EnvConfig, settings: WorkerSettings
+    calls: Connection, queries: Connection, config: EnvConfig, settings: WorkerSettings
 ) -> None:
     """Create an environment and serve it until it is closed.
 
@@ -73,18 +73,18 @@ def serve_instance(
     the server kills it.
 
     Args:
-        moves: brings one call after the other that needs the environment's lock; the first answer
+        calls: carries one call after the other that needs the environment's lock; the first answer
             is about its creation.
-        questions: brings calls that can be answered while the environment moves.
-        choices: what the client wants.
+        queries: carries calls that can be answered while the environment moves.
+        config: what the client wants.
         settings: what is to be known of the server.
     """
     _set_up_process(settings)
-    methods = _Methods(choices, settings)
-    pipe = Pipe(moves)
+    methods = _Methods(config, settings)
+    pipe = Pipe(calls)
     _answer(pipe, 0, methods.create)
     if methods.is_created:
-        threading.Thread(target=_serve, args=(Pipe(questions), methods), daemon=True).start()
+        threading.Thread(target=_serve, args=(Pipe(queries), methods), daemon=True).start()
         _serve(pipe, methods)
 
 
@@ -164,8 +164,8 @@ class _Methods:
 
     _instance: Instance
 
-    def __init__(self, choices: EnvConfig, settings: WorkerSettings) -> None:
-        self._choices = choices
+    def __init__(self, config: EnvConfig, settings: WorkerSettings) -> None:
+        self._config = config
         self._settings = settings
         self.is_created = False
         self.is_closed = False
@@ -174,10 +174,10 @@ class _Methods:
         for module in self._settings.imported:
             with contextlib.suppress(Exception):
                 importlib.import_module(module)
-        reservation = MemoryReservation(Budget(self._settings.memory), self._choices.num_envs or 1)
+        reservation = MemoryReservation(Budget(self._settings.memory), self._config.num_envs or 1)
         with contextlib.ExitStack() as undo:
             instance = make_instance(
-                self._choices,
+                self._config,
                 self._settings.allowed_modules,
                 self._settings.max_num_envs,
                 RenderThread(),

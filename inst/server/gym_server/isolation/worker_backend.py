@@ -42,18 +42,18 @@ class WorkerBackend:
     draws_on_render_thread = False
     can_be_killed = True
 
-    def __init__(self, choices: EnvConfig, settings: WorkerSettings) -> None:
+    def __init__(self, config: EnvConfig, settings: WorkerSettings) -> None:
         """Start the process; ``create()`` waits for the environment.
 
         Args:
-            choices: what the client wants.
+            config: what the client wants.
             settings: what the process is to know of the server.
         """
-        self.env_id = str(choices.env_id)
+        self.env_id = str(config.env_id)
         self.fps: object = None
         self.moves = Moves()
         self.steps = 0
-        self._num_envs = choices.num_envs
+        self._num_envs = config.num_envs
         self._about: dict = {}
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         hint = (
@@ -62,7 +62,7 @@ class WorkerBackend:
             else ""
         )
         self._worker = WorkerProcess(
-            serve_instance, choices, settings, on_end=lambda why: self._on_end(why), hint=hint
+            serve_instance, config, settings, on_end=lambda why: self._on_end(why), hint=hint
         )
 
     def create(self, reservation: MemoryReservation) -> None:
@@ -80,8 +80,8 @@ class WorkerBackend:
         self.env_id = str(self._about["env_id"])
         self.fps = created["fps"]
 
-    def stay(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Know that the instance is listed now, until its process ends."""
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when the process ends by itself, or at once if it has."""
         self._on_end = on_end
         self._worker.report_end()
 
@@ -153,7 +153,7 @@ class WorkerBackend:
 
     @property
     def busy_since(self) -> float | None:
-        """Since when the process owes an answer to a query, or None."""
+        """Since when a query has waited for the process, in the clock's seconds, or None."""
         return self._worker.query_since
 
     # Monitors -------------------------------------------------------------------------------
@@ -183,7 +183,7 @@ class WorkerBackend:
         """Kill the process; every call on it raises the reason, so none is stuck."""
         self._worker.kill(why)
 
-    def clear_away(self) -> None:
+    def close_abandoned(self) -> None:
         """Do nothing: the process was killed."""
 
 

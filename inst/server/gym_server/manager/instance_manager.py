@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class _Share(NamedTuple):
-    """What an environment takes of what all share, until it is gone."""
+    """What an environment takes of the server's limits, until it is gone."""
 
     room: Room
     reservation: MemoryReservation
@@ -42,21 +42,21 @@ class _Creation:
     """An environment that is being created.
 
     Attributes:
-        choices: what its client wants.
-        share: what it takes of what all share.
+        config: what its client wants.
+        share: what it takes of the server's limits.
         kill: kills the process that the creating thread waits for, so that the thread answers for
             itself; None where there is no such process.
         began: in the clock's seconds.
     """
 
-    choices: EnvConfig
+    config: EnvConfig
     share: _Share
     kill: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
 
     def too_long(self, seconds: float) -> GymServerError:
         return call_too_long(
-            f"Making {self.choices.env_id}", seconds, "the server does not wait for it any more"
+            f"Making {self.config.env_id}", seconds, "the server does not wait for it any more"
         )
 
 
@@ -99,7 +99,7 @@ class InstanceManager:
         self._tombstones = Tombstones()
         self._stopping = False
 
-    def create(self, choices: EnvConfig) -> str:
+    def create(self, config: EnvConfig) -> str:
         """Create an environment and return its instance_id, 8 hex digits.
 
         Raises:
@@ -108,19 +108,19 @@ class InstanceManager:
                 ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
         # Before an environment is created for nothing.
-        self._allowed_paths.check(choices)
-        wrappers.check(choices.wrappers)
-        if choices.num_envs is None:
-            vectorization.check_single(choices)
-        isolated = self._isolation.wants(choices.env_id, self._allowed_modules)
+        self._allowed_paths.check(config)
+        wrappers.check(config.wrappers)
+        if config.num_envs is None:
+            vectorization.check_single(config)
+        isolated = self._isolation.wants(config.env_id, self._allowed_modules)
         make_it = self._make_isolated if isolated else self._make
-        with self._room_for(choices, isolated) as creation, contextlib.ExitStack() as undo:
-            instance = make_it(choices, creation, undo)
+        with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
+            instance = make_it(config, creation, undo)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
             undo.pop_all()
-        instance.stay(lambda why: self._remove(instance.instance_id, why))
+        instance.report_end(lambda why: self._remove(instance.instance_id, why))
         log.info("Created instance %s of %s", instance.instance_id, instance.env_id)
         return instance.instance_id
 
@@ -137,11 +137,11 @@ class InstanceManager:
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, choices: EnvConfig, isolated: bool) -> Iterator[_Creation]:
+    def _room_for(self, config: EnvConfig, isolated: bool) -> Iterator[_Creation]:
         """Keep room for an environment while it is created."""
-        room = Room(choices.num_envs or 1, _processes_of(choices, isolated))
+        room = Room(config.num_envs or 1, _processes_of(config, isolated))
         share = _Share(room, MemoryReservation(self._budget, room.sub_envs))
-        creation = _Creation(choices, share)
+        creation = _Creation(config, share)
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
             instances = len(self._instances) + len(self._creating)
@@ -165,11 +165,9 @@ class InstanceManager:
             share.reservation.give_back()
             self.left_garbage = True
 
-    def _make(
-        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
-    ) -> Instance:
+    def _make(self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
         return make_instance(
-            choices,
+            config,
             self._allowed_modules,
             self._limits.max_num_envs,
             self._renderer,
@@ -178,16 +176,16 @@ class InstanceManager:
         )
 
     def _make_isolated(
-        self, choices: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
+        self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
     ) -> Instance:
         settings = self._isolation.settings(
-            choices.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
+            config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        backend = WorkerBackend(choices, settings)
+        backend = WorkerBackend(config, settings)
         undo.callback(backend.kill, shutting_down())
         creation.kill = backend.kill
         backend.create(creation.share.reservation)
-        return Instance(backend, choices, self._renderer)
+        return Instance(backend, config, self._renderer)
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""
@@ -380,7 +378,7 @@ class InstanceManager:
                 return instance_id
 
 
-def _processes_of(choices: EnvConfig, isolated: bool) -> int:
+def _processes_of(config: EnvConfig, isolated: bool) -> int:
     """Return how many processes of its own run an environment."""
-    sub_envs = choices.num_envs or 1
-    return isolated + (sub_envs if choices.vectorization_mode == "async" else 0)
+    sub_envs = config.num_envs or 1
+    return isolated + (sub_envs if config.vectorization_mode == "async" else 0)

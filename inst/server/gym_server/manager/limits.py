@@ -12,7 +12,7 @@ from gym_server.errors import GymServerError
 
 @dataclass(frozen=True)
 class Room:
-    """What an environment takes of what all share.
+    """What an environment takes of the limits on all environments together.
 
     Attributes:
         sub_envs: how many it has; one without sub-environments counts as one.

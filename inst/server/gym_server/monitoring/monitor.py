@@ -37,7 +37,7 @@ class Monitor:
         recorder: Any,
         renderer: RenderThread,
     ) -> None:
-        """Take over files that are taken, and a RecordVideo or None; see ``start()``."""
+        """Take over files after their ``take()``, and a RecordVideo or None; see ``start()``."""
         self._env = env
         self._files = files
         self._rows = csv.writer(files.table, lineterminator="\n")

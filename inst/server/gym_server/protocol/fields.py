@@ -130,7 +130,6 @@ TRUE_OR_FALSE = (
     {"type": "string", "pattern": "^([Tt][Rr][Uu][Ee]|[Ff][Aa][Ll][Ss][Ee])$"},
 )
 BOOLEAN = Kind({"anyOf": [*TRUE_OR_FALSE]}, "true or false", boolean)
-INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 TEXT = Kind({"type": "string"}, "a string", text)
 OBJECT = Kind({"type": "object"}, "an object", json_object)
 REQUEST_ID = Kind(

@@ -122,8 +122,8 @@ def add_metadata(file: bytes, name: str, text: str) -> bytes:
 
     Args:
         file: as ``write()`` returns it; it is not looked at more closely.
-        name: of the text.
-        text: it.
+        name: the text's.
+        text: the text.
     """
     end = 8 + int.from_bytes(file[:8], "little")
     header = file[8:end].rstrip(b" ").removesuffix(b"}}")

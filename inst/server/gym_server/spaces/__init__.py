@@ -27,7 +27,7 @@ from gym_server.spaces.batches import (
     encode_sub_envs,
 )
 from gym_server.spaces.kinds import NotInSpace, brief_space, decode, encode
-from gym_server.spaces.membership import contains, describes
+from gym_server.spaces.membership import contains
 from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe
 from gym_server.spaces.tensor_parts import (
@@ -47,7 +47,6 @@ __all__ = [
     "decode_sub_envs_tensors",
     "decode_tensors",
     "describe",
-    "describes",
     "encode",
     "encode_batch",
     "encode_batch_tensors",

@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
-from gymnasium.spaces import Space
-
 from gym_server.spaces.arrays import is_number
-from gym_server.spaces.kinds import NotInSpace, decode
+from gym_server.spaces.kinds import NotInSpace
 
 
-def contains(space: Space, space_info: dict, claim: dict) -> bool:
+def contains(claim: dict, decode: Callable[[object], object], describe: Callable[[], dict]) -> bool:
     """Answer "contains" as a client asks it.
 
     Args:
-        space: the space.
-        space_info: its description.
         claim: ``{"value": ...}`` asks whether a JSON value stands for a member; anything else is
             a classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
             whether all of it is true of the space.
+        decode: returns the member that a JSON value stands for, or raises ``NotInSpace``.
+        describe: returns the space's description.
     """
     if "value" not in claim:
-        return describes(claim, space_info)
+        return _describes(claim, describe())
     try:
-        decode(space, claim["value"])
+        decode(claim["value"])
     except NotInSpace:
         return False
     return True
 
 
-def describes(claim: dict, space_info: dict) -> bool:
+def _describes(claim: dict, space_info: dict) -> bool:
     """Tell whether all of a classic client's description is true of a space."""
     return all(
         name in space_info and _same(value, space_info[name]) for name, value in claim.items()

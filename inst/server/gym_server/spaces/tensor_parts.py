@@ -48,7 +48,7 @@ def decode_tensors(space: Space, name: str, sent: Parts) -> object:
 
 
 def refuse_leftovers(space: Space, name: str, left: Parts) -> None:
-    """Raise NotInSpace for a part that was sent and is none."""
+    """Raise NotInSpace for a part that was sent and that the space does not have."""
     for unknown in (*left.tensors, *left.texts):
         if unknown == name or unknown.startswith(f"{name}/"):
             raise NotInSpace(space, unknown, "it has no such part")

@@ -52,7 +52,7 @@ class Frame(NamedTuple):
     """What watchers get of a sub-environment at one moment.
 
     Attributes:
-        number: tells it from every other frame of this environment.
+        number: no other frame of this environment has it.
         moves: how often the environment had moved.
         body: the answer for watchers, JSON.
         used: when it was last asked for, in the clock's seconds.

@@ -287,6 +287,16 @@ def test_a_key_opens_nothing_else(locked, watched):
         assert locked.get(f"{url}/watch/state/", query_string={"key": wrong}).status_code == 401
 
 
+def test_where_no_id_stands_only_the_token_opens(locked, watched):
+    _, key = watched
+    for instance_id in ("zzzz", "..", "%2e%2e", "0A", "0 "):
+        for name in ("", "state/", "presence/", "watch.css", "watch.js", "nothing.js"):
+            url = f"/v1/envs/{instance_id}/watch/{name}?key={key}"
+            answer = locked.get(url, headers={"Accept": "text/html"})
+            assert (answer.status_code, answer.json["code"]) == (401, "unauthorized"), url
+            assert locked.get(url, headers=bearer()).status_code != 401, url
+
+
 def test_a_page_with_a_dead_key_is_a_page_that_says_so(locked, watched):
     url, _ = watched
     page = locked.get(f"{url}/watch/?key=dead", headers={"Accept": "text/html"})

@@ -150,15 +150,15 @@ def test_a_time_limit_truncates_and_is_told(client, create):
     "how", [{}, *({"num_envs": 2, "vectorization_mode": mode} for mode in (None, "sync", "async"))]
 )
 def test_of_several_time_limits_the_smallest_is_told_which_is_what_is_played(client, create, how):
-    def told(**fields):
+    def time_limit(**fields):
         return client.get(create("MountainCar-v0", **fields, **how)).json["max_episode_steps"]
 
     limits = [wrapped("TimeLimit", max_episode_steps=steps) for steps in (1000, 700)]
-    assert told(wrappers=limits) == 200
-    assert told(wrappers=[*limits, wrapped("FlattenObservation")]) == 200
-    assert told(wrappers=limits, kwargs={"max_episode_steps": 2000}) == 700
-    assert told(wrappers=limits, kwargs={"max_episode_steps": -1}) == 700
-    assert told(kwargs={"max_episode_steps": -1}) is None
+    assert time_limit(wrappers=limits) == 200
+    assert time_limit(wrappers=[*limits, wrapped("FlattenObservation")]) == 200
+    assert time_limit(wrappers=limits, kwargs={"max_episode_steps": 2000}) == 700
+    assert time_limit(wrappers=limits, kwargs={"max_episode_steps": -1}) == 700
+    assert time_limit(kwargs={"max_episode_steps": -1}) is None
 
 
 def test_a_wrapped_episode_is_that_of_gymnasium(client, create):

@@ -9,7 +9,7 @@ from faulty_envs.counting import Counting
 
 
 class Drawing(Counting):
-    """Draws what it was told to draw, and notes the threads that draw and close it."""
+    """Draws what its kwarg says, and notes the threads that draw and close it."""
 
     threads = set()  # noqa: RUF012
 

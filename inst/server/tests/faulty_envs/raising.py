@@ -13,7 +13,7 @@ class RaisesInConstructor(Counting):
 
 class RaisesInReset(Counting):
     def reset(self, *, seed=None, options=None):
-        if not (options or {}).get("mend"):
+        if not (options or {}).get("fix"):
             raise RuntimeError("the cart is gone")
         return super().reset(seed=seed, options=options)
 

@@ -14,7 +14,7 @@ from faulty_envs.counting import Counting
 
 
 class Rogue(Counting):
-    """Does something to its process, by name, where it is told to."""
+    """Does something to its process, by name, where its kwarg says."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 

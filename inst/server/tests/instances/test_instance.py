@@ -60,7 +60,7 @@ def test_the_seed_of_creation_seeds_the_action_space_at_once(client, create, see
 def test_a_seed_is_not_lost_to_a_reset_that_failed(client, create):
     url = create("faulty_envs:RaisesInReset-v0", seed=5)
     assert client.post(f"{url}/reset/").status_code == 500
-    answer = client.post(f"{url}/reset/", json={"options": {"mend": True}}).json
+    answer = client.post(f"{url}/reset/", json={"options": {"fix": True}}).json
     assert answer["info"]["seed"] == 5
 
 
@@ -172,7 +172,7 @@ def test_an_environment_that_failed_may_go_on(client, faulty):
 
 def test_a_failed_reset_needs_another(client, faulty):
     url = faulty("RaisesInReset")
-    client.post(f"{url}/reset/", json={"options": {"mend": True}})
+    client.post(f"{url}/reset/", json={"options": {"fix": True}})
     assert client.post(f"{url}/reset/").status_code == 500
     assert client.post(f"{url}/step/", json={"action": 0}).json["code"] == "reset_needed"
 

@@ -345,7 +345,7 @@ def test_an_answer_for_one_whose_making_fails_never_reaches_its_next_request(qui
 
     def answer_for(*_):
         abandoned.set()
-        # Whoever makes it must not come back before this is done.
+        # The creating thread must not come back before this is done.
         waited.append(not came_back.wait(0.5))
 
     def create():

@@ -88,7 +88,7 @@ def test_a_reset_that_fails_is_no_episode(client, faulty, monitor_dir):
     url = faulty("RaisesInReset", length=1)
     start(client, url)
     assert client.post(f"{url}/reset/").status_code == 500
-    client.post(f"{url}/reset/", json={"options": {"mend": True}})
+    client.post(f"{url}/reset/", json={"options": {"fix": True}})
     client.post(f"{url}/step/", json={"action": 0})
     assert [row[0] for row in rows(monitor_dir / "run")[1:]] == ["0"]
 

@@ -75,10 +75,10 @@ print((resident() - before) // 2**20)
 @pytest.mark.skipif(memory._malloc_trim is None, reason="glibc keeps what is free, others do not")
 @pytest.mark.parametrize("script", [SMALL_PIECES, LARGE_BODIES], ids=["small", "large"])
 def test_what_threads_have_freed_does_not_stay(script):
-    told = subprocess.run(
+    measured = subprocess.run(
         [sys.executable, "-c", RESIDENT + script], stdout=subprocess.PIPE, text=True, check=True
     )
-    assert int(told.stdout) < 8
+    assert int(measured.stdout) < 8
 
 
 def test_the_watchdog_sees_to_it(monkeypatch, client, create, eventually):

@@ -2,7 +2,9 @@ import pytest
 from refusals import code_of
 
 from gym_server.errors import GymServerError
-from gym_server.protocol.fields import ANYTHING, BOOLEAN, INTEGER, REQUEST, TEXT, Field, read
+from gym_server.protocol.fields import ANYTHING, BOOLEAN, REQUEST, TEXT, Field, Kind, integer, read
+
+INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 
 
 @pytest.mark.parametrize("value", [5, 5.0, 0, 2**70])

@@ -50,8 +50,8 @@ def test_a_watcher_sees_the_frame_and_the_numbers_that_belong_to_it(client, crea
     play(client, url, 3)
     seen = state(client, url)
     assert frame_of(seen).shape == (400, 600, 3)
-    told = {name: seen[name] for name in ("env_id", "state", "episode", "step", "return")}
-    assert told == {
+    shown = {name: seen[name] for name in ("env_id", "state", "episode", "step", "return")}
+    assert shown == {
         "env_id": "CartPole-v1",
         "state": "running",
         "episode": 1,

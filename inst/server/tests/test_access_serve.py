@@ -1,4 +1,4 @@
-"""The real server, as its operator lets people in."""
+"""The real server with a token, on addresses and under names that others can reach."""
 
 import http.client
 import json
