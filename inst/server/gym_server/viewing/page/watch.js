@@ -172,7 +172,7 @@ function showReturns({ returns, num_envs: numEnvs, reward_threshold: goal }) {
   const key = returns.join();
   if (key === charted) return;
   charted = key;
-  const whose = numEnvs === null ? "" : " of all sub-environments";
+  const whose = numEnvs === null ? "" : ` of all ${number(numEnvs)}`;
   const many = returns.length === 1 ? "the last episode" : `the last ${returns.length} episodes`;
   $("caption").textContent = `Returns of ${returns.length ? many : "the last episodes"}${whose}`;
   const mean = returns.map(Number).reduce((sum, value) => sum + value, 0) / returns.length;
