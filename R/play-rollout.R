@@ -103,7 +103,7 @@
 #' # The second episode begins again.
 #' second <- played$episodes[2, ]
 #' env <- gym_make("CartPole-v1", num_envs = played$num_envs)
-#' env$reset(seed = second$seed)[second$sub-environment, ]
+#' env$reset(seed = second$seed)[second$sub_env, ]
 #' env$close()
 #'
 #' # Where each episode has a seed of its own, a single environment will do.
