@@ -6,7 +6,7 @@
 #'
 #' # What is shown
 #'
-#' - A network with one output and two actions: the output, brought to the range from 0 to
+#' - A network with one output and two actions: the output, scaled to the range from 0 to
 #'   1, which is rounded to the action; the border between the actions is at one half.
 #' - Any other policy with discrete actions: the action that is taken. A function is asked
 #'   as in [act()].
