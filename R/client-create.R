@@ -13,8 +13,8 @@
 #' forked one; each copy makes a connection of its own.
 #'
 #' Calls that change something on the server (creating, resetting, stepping,
-#' closing) carry a number. When a connection breaks before the answer has
-#' arrived the client repeats the call under the same number, and the server
+#' closing) carry an idempotency key. When a connection breaks before the answer has
+#' arrived the client repeats the call with the same key, and the server
 #' answers without doing it a second time.
 #'
 #' A server that has the protocol of gym-http-api alone, as the original one does, is played

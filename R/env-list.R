@@ -17,10 +17,10 @@
 #' env <- gym_make("CartPole-v1", name = "first try")
 #' env_list()
 #' env$close()
-env_list <- function(x = gym_client()) {
-  check_client(x)
-  close_queued(x)
-  instances <- get_answer(x, "/v1/instances/")$instances
+env_list <- function(client = gym_client()) {
+  check_client(client)
+  close_queued(client)
+  instances <- get_answer(client, "/v1/instances/")$instances
   data.frame(
     instance_id = listed_texts(instances, "instance_id", ""),
     name = listed_texts(instances, "name"),

@@ -3,7 +3,7 @@
 #' Those that the server can make, those that it could with an extra, see
 #' [gym_server_install()], and some that it cannot make at all.
 #'
-#' @inheritParams env_create
+#' @param client A client, by default that of [gym_client()].
 #' @param search A text to look for in the ids, whatever its case; where none has
 #'   it the nearest ids are listed. `NULL`, the default, lists all.
 #' @return A data frame with one row for each environment: `id` (a string),
@@ -20,11 +20,11 @@
 #' nrow(env_registry())
 #' env_registry(search = "cartpole")
 #' env_registry(search = "FrozenLaek")$id
-env_registry <- function(x = gym_client(), search = NULL) {
-  check_client(x)
+env_registry <- function(client = gym_client(), search = NULL) {
+  check_client(client)
   check_string(search, allow_null = TRUE)
   route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
-  environments <- get_answer(x, route)$environments
+  environments <- get_answer(client, route)$environments
   data.frame(
     id = listed_texts(environments, "id", ""),
     max_episode_steps = listed_counts(environments, "max_episode_steps"),

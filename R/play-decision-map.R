@@ -6,7 +6,7 @@
 #'
 #' # What is shown
 #'
-#' - A network with one output and two actions: the output, brought to the range from 0 to
+#' - A network with one output and two actions: the output, scaled to the range from 0 to
 #'   1, which is rounded to the action; the border between the actions is at one half.
 #' - Any other policy with discrete actions: the action that is taken. A function is asked
 #'   as in [act()].
@@ -81,6 +81,14 @@
 decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path = NULL,
                          xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
                          client = gym_client()) {
+  if (missing(policy)) {
+    gym_abort(
+      c("`policy` is missing.",
+        i = paste("The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;",
+                  "without one it is `decision_map(policy = policy)`.")),
+      class = "gym_error_argument", argument = "policy", value = NULL
+    )
+  }
   check_policy(policy)
   check_mappable(policy)
   check_limits(xlim)

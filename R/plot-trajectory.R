@@ -10,7 +10,9 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
     graphics::layout(1)
     graphics::par(old)
   })
-  cex <- panel_cex(grid)
+  # A size of letters that leaves room for the picture on small devices.
+  inches <- graphics::par("din") / rev(dim(grid))
+  cex <- max(0.4, min(0.85, inches[[1L]] / 2.8, 0.75 * inches[[2L]]))
   graphics::par(cex = cex)
   left <- left_margins(data, grid)
   # So that the plots of all columns are equally wide.
@@ -64,12 +66,6 @@ panel_title_cex <- function(titles, left) {
     cex <- 0.95 * cex
   }
   cex
-}
-
-# A size of letters that leaves room for the picture on small devices.
-panel_cex <- function(grid) {
-  inches <- graphics::par("din") / rev(dim(grid))
-  max(0.4, min(0.85, inches[[1L]] / 2.8, 0.75 * inches[[2L]]))
 }
 
 draw_panel <- function(data, i, at_bottom, title_cex) {

@@ -46,7 +46,7 @@ ask_beforehand <- function(policy, observation, playing, vector_env) {
   invisible()
 }
 
-#' Bring what a function returned into the form of a batch of actions
+#' Convert what a function returned to the form of a batch of actions
 #'
 #' Checks that there is one action for each sub-environment. The environment checks whether each is
 #' an action of its space.

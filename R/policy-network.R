@@ -10,7 +10,7 @@
 #' policy learns from [rollout()] and [search_random()] (before that it takes
 #' itself to be in an environment with the actions 0, 1, ...):
 #'
-#' - One output and two actions: the output, brought to the range from 0 to 1, is
+#' - One output and two actions: the output, scaled to the range from 0 to 1, is
 #'   rounded, as in the tutorial *Artificial Intelligence in R (I)* (2018). Exactly one
 #'   half gives the first action, as [round()] gives 0.
 #' - As many outputs as actions: the action with the largest output, of equal ones
@@ -225,7 +225,7 @@ box_action <- function(space, outputs, policy, one) {
   low <- rep(space$low, each = rows)
   high <- rep(space$high, each = rows)
   # The sum of two products, because high - low may be beyond the largest number. Rounding must not
-  # bring a value past a bound, which the environment would refuse.
+  # move a value past a bound, which the environment would refuse.
   values <- pmin(pmax(low * (1 - share) + high * share, low), high)
   if (space$dtype %in% integer_dtypes) {
     values <- round(values)

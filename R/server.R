@@ -202,7 +202,7 @@ session_server <- function(client, call = rlang::caller_env()) {
 # 1. The standard input of each server is closed, on which servers close their environments and end.
 # 2. Instances on other servers are closed, within half of the time.
 # 3. Servers that still run at half of the time are asked again, by a signal.
-# 4. A server that takes longer than the whole time, perhaps to finish a video, is left to itself.
+# 4. A server that takes longer than the whole time, perhaps to finish a video, is abandoned.
 end_session <- function(session) {
   if (isTRUE(session$ended)) {
     return()

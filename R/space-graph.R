@@ -21,11 +21,11 @@ decode_value.gym_space_graph <- function(space, json) {
   list(
     nodes = decode_stack(space$node_space, json$nodes),
     edges = if (!is.null(json$edges)) decode_stack(space$edge_space, json$edges),
-    edge_links = if (!is.null(json$edge_links)) decode_links(json$edge_links)
+    edge_links = if (!is.null(json$edge_links)) {
+      matrix(whole_from_json(json$edge_links), ncol = 2L, byrow = TRUE)
+    }
   )
 }
-
-decode_links <- function(json) matrix(whole_from_json(json), ncol = 2L, byrow = TRUE)
 
 #' @exportS3Method
 check_value.gym_space_graph <- function(space, value, path, call, bounds = FALSE) {

@@ -23,7 +23,7 @@ from packaging.utils import parse_wheel_filename
 SERVER = Path(__file__).parent.parent / "inst" / "server"
 EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video")
 PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
-# The Python that gym_server_install() has uv bring.
+# The Python that gym_server_install() has uv install.
 USUAL_PYTHON = (3, 12)
 
 

@@ -3,8 +3,8 @@
     python classic_server.py
 
 It has the routes of that protocol and no others, ignores fields that it does not know, refuses
-in JSON what it cannot do, and answers an unknown route as Flask does, in HTML. Steps are told as
-Gym told them before it knew of truncation. Prints its port, ends when its standard input closes.
+in JSON what it cannot do, and answers an unknown route as Flask does, in HTML. Steps are answered
+as Gym did before it had truncation. Prints its port, ends when its standard input closes.
 """
 
 import secrets

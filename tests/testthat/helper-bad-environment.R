@@ -1,5 +1,5 @@
 # A client of a server with one environment, two numbers to observe and two actions, whose
-# answers are what a test says: `about` are fields of what is told of it.
+# answers are what a test says: `about` are fields of its description.
 local_bad_environment <- function(..., frame = parent.frame()) {
   about <- list(
     env_id = "Bad-v0",

@@ -1,4 +1,4 @@
-# A real nginx before a server, set up by the file that the package brings.
+# A real nginx before a server, set up by the file in inst/examples.
 
 skip_if_no_nginx <- function() {
   for (program in c("nginx", "openssl")) {
@@ -61,7 +61,7 @@ local_proxy <- function(server, frame = parent.frame()) {
   )
 }
 
-# Whoever is asked while nginx starts does not answer.
+# Waits until nginx has started: before that it does not answer.
 await_answer <- function(client, seconds = 10) {
   deadline <- Sys.time() + seconds
   repeat {

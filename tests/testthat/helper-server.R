@@ -78,7 +78,7 @@ local_bad_server <- function(..., frame = parent.frame()) {
   local_python_server("bad_server.py", ..., frame = frame)
 }
 
-# A client of a server that answers what it is told, by path; `say()` on the client tells more.
+# A client of a server with canned answers by path; `say()` on the client adds more.
 local_canned_server <- function(answers = list(), frame = parent.frame()) {
   file <- withr::local_tempfile(.local_envir = frame)
   writeLines(jsonlite::toJSON(answers, auto_unbox = TRUE), file)

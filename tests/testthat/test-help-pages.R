@@ -53,10 +53,10 @@ test_that("texts name the tutorial, and do not take it for known as a post", {
              list.files(source_tree("vignettes"), "[.](Rmd|md|csv)$", full.names = TRUE),
              source_tree("README.md"))
   for (file in texts) {
-    told <- paste(readLines(file), collapse = " ")
-    expect_false(grepl("\\b[Tt]he post\\b", told), info = basename(file))
-    if (grepl("[Tt]he tutorial('s)?\\b", told) && grepl("[.]Rd$", file)) {
-      expect_match(told, "Artificial Intelligence in R (I)", fixed = TRUE, info = basename(file))
+    text <- paste(readLines(file), collapse = " ")
+    expect_false(grepl("\\b[Tt]he post\\b", text), info = basename(file))
+    if (grepl("[Tt]he tutorial('s)?\\b", text) && grepl("[.]Rd$", file)) {
+      expect_match(text, "Artificial Intelligence in R (I)", fixed = TRUE, info = basename(file))
     }
   }
 })

@@ -27,7 +27,7 @@ test_that("the output at each point is the network's, and rounds to its action",
   expect_identical(as.integer(map$grid$output > 0.5), act(policy, observations))
 })
 
-test_that("outputs of tanh are brought to the range from 0 to 1", {
+test_that("outputs of tanh are scaled to the range from 0 to 1", {
   policy <- policy_network(c(4, 1), c("tanh", "tanh"), list(matrix(c(0, 0, 10, 0), 1)))
   map <- pole_map(policy)
   expect_equal(map$grid$output, (tanh(10 * map$grid$pole_angle) + 1) / 2)
@@ -180,4 +180,9 @@ test_that("it says what it is in a few lines", {
            "Held: cart_position = 0, cart_velocity = 0"),
     fixed = TRUE
   )
+})
+
+test_that("a policy in the environment's place is told where it belongs", {
+  expect_error(decision_map(policy_network()), "decision_map(policy = policy)", fixed = TRUE,
+               class = "gym_error_argument")
 })

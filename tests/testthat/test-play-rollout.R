@@ -313,7 +313,7 @@ test_that("what was played survives an environment that cannot be closed", {
   env <- list(close = function() gym_abort("gone", class = "gym_error_connection"))
   expect_warning(close_or_warn(env), "could not be closed",
                  class = "gym_warning_close")
-  # After an error there is that error to hear of.
+  # After an error nothing but that error is reported.
   expect_silent(close_quietly(env))
 })
 

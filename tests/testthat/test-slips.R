@@ -1,4 +1,4 @@
-# What somebody is told who slips.
+# The errors and hints that common slips get.
 
 test_that("the error for an action that is none names those that there are", {
   env <- local_env()

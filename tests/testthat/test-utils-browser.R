@@ -38,7 +38,7 @@ test_that("nothing is opened in a script, unless the option says so", {
   expect_identical(opened$by, "option")
 })
 
-test_that("a browser that fails is none, and the option's own function is heard", {
+test_that("a browser that fails is none, and the error of the option's own function is shown", {
   fails <- function(address) stop("no display")
   withr::local_options(
     rlang_interactive = TRUE, gym.viewer = NULL, viewer = NULL, browser = fails

@@ -5,7 +5,7 @@ two requests, in microseconds: code that was asleep meanwhile is slower than in 
 
     record URL             the address of a proxy to the server at URL, which records
     recorded               the last request and answer, base64
-    round_trip PAUSE URL   the recorded step over a plain socket, each under a number of its own
+    round_trip PAUSE URL   the recorded step over a plain socket, each with a key of its own
     echo PAUSE             as many bytes to another process and back
     application PAUSE      the recorded step given to the WSGI application, and parts of that
 """
@@ -186,7 +186,7 @@ def _environ(path: str, headers: dict[str, str], body: bytes) -> dict:
 
 
 def _requests() -> Callable[[int], bytes]:
-    """Return a function that gives the recorded step again, each under a number of its own."""
+    """Return a function that gives the recorded step again, each with a key of its own."""
     steps = [_as_step(action) for action in range(2)]
     # Numbers count for each key, and here they begin anew.
     key = b"%08x" % random.getrandbits(32)

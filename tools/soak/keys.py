@@ -25,7 +25,7 @@ class Caller(Client):
     """A client that says itself what its requests are called."""
 
     def call(self, path: str, key: str, number: int, **fields: object) -> dict | bytes | None:
-        """Make a call under a key and number; return None where it was refused."""
+        """Make a call with an idempotency key; return None where it was refused."""
         self._key, self._number = key, number
         fields["request"] = {"key": key, "number": number}
         try:

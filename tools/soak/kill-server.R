@@ -47,7 +47,7 @@ while (killed < moments) {
   }
   if (!inherits(search, "gym_error_connection")) stop(search)
   killed <- killed + 1L
-  # What is played again is at most the block under way, of which some rounds had ended.
+  # What is played again is at most the batch under way, of which some rounds had ended.
   lost <- lost + (NROW(search$result$episodes) - episodes_kept() > 16L)
   same <- identical(figures(play(server, checkpoint = path)), figures(undisturbed))
   equal <- equal + same
