@@ -11,14 +11,14 @@
 #' An environment made with `render_mode = "human"` opens its page by itself, and so does
 #' the first [env_step()] with `render = TRUE`.
 #'
-#' In an interactive session the page opens in RStudio's viewer, else in the browser; in a script the
-#' address is printed, once an environment, as a message of class `gym_message_watch`.
+#' In an interactive session the page opens in RStudio's viewer, else in the browser; in a script
+#' the address is printed, once an environment, as a message of class `gym_message_watch`.
 #' `options(gym.viewer = )` changes that, in scripts too: a function, such as [utils::browseURL()],
 #' is called with the address, and `FALSE` opens and prints nothing. Where the server asks for a
 #' token, the address holds a key that opens this page and nothing else.
 #'
-#' How fast the page moves, and who can open it:
-#' `vignette("server", package = "gym")`, section "Watching".
+#' `vignette("server", package = "gym")`, section "Watching", tells how fast the page moves, and who
+#' can open it.
 #'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.
