@@ -50,6 +50,8 @@ class Statistics(Protocol):
 class EpisodeStatistics:
     """Counts the episodes of a single environment.
 
+    A class of its own, because plain numbers take 0.1 us a step, and arrays of one element 4.
+
     Attributes:
         returns: of the last episodes that ended; one that was cut short by a reset is none.
     """
