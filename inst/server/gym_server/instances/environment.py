@@ -21,7 +21,6 @@ class Environment(Protocol):
     Attributes:
         env_id: what it can be created by again.
         gym_env: Gymnasium's environment.
-        num_envs: how many sub-environments it has; None for a single environment.
         action_space: of a whole action, for all sub-environments together.
         observation_space: of a whole observation.
         single_action_space: of an action of one sub-environment.
@@ -36,7 +35,6 @@ class Environment(Protocol):
 
     env_id: str
     gym_env: Any
-    num_envs: int | None
     action_space: Space
     observation_space: Space
     single_action_space: Space

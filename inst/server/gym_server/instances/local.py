@@ -51,7 +51,7 @@ class LocalBackend:
         self._renderer = renderer
         self._single_action_space_info = spaces.describe(env.single_action_space)
         self._single_observation_space_info = spaces.describe(env.single_observation_space)
-        self._actions = ActionReader(env.single_action_space, env.num_envs or 1)
+        self._actions = ActionReader(env.single_action_space, config.num_envs or 1)
         self._observes_tensors = spaces.travels_as_tensors(env.single_observation_space)
         self.fps: object = (env.gym_env.metadata or {}).get("render_fps")
         self.moves = Moves()

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 class SingleEnvironment:
     """A single environment; see ``Environment`` for the methods."""
 
-    num_envs: int | None = None
     vectorization_mode: str | None = None
     autoreset_mode: str | None = None
     fails_as_a_whole = False

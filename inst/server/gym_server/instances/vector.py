@@ -41,7 +41,6 @@ class VectorEnvironment:
         """
         self.gym_env: Any = env
         self.env_id = env_id_of(config, env)
-        self.num_envs: int | None = env.num_envs
         self._num_envs = env.num_envs
         self.action_space = env.action_space
         self.observation_space = env.observation_space
