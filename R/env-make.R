@@ -98,7 +98,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
     create(call),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
-  env <- gym_env$new(client, instance_id)
+  env <- server_env$new(client, instance_id)
   env
 }
 
@@ -123,8 +123,8 @@ explain_unknown_argument <- function(cnd, given, call) {
   )
 }
 
-gym_env <- R6Class(
-  "gym_env",
+server_env <- R6Class(
+  c("gym_server_env", "gym_env"),
   cloneable = FALSE,
   lock_class = TRUE,
   public = list(

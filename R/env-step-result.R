@@ -9,7 +9,7 @@ flags <- c("terminated", "truncated")
 #' @noRd
 take_step <- function(env, n, call, ...) {
   out <- env$step(...)
-  if (!inherits(env, "gym_env")) {
+  if (!inherits(env, "gym_server_env")) {
     check_step_result(out, n, call)
   }
   out

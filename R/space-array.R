@@ -50,10 +50,10 @@ bound_from_json <- function(bound) {
 }
 
 #' @exportS3Method
-space_text.gym_space_box <- function(space) paste("Box", space$dtype, shape_text(space$shape))
+space_label.gym_space_box <- function(space) paste("Box", space$dtype, shape_text(space$shape))
 
 #' @exportS3Method
-space_text.gym_space_multidiscrete <- function(space) {
+space_label.gym_space_multidiscrete <- function(space) {
   n <- prod(space$shape)
   flat <- length(space$shape) == 1L && n <= 10L
   all_text <- function(bound) shape_text(rep(bound, length.out = n))
@@ -66,7 +66,7 @@ space_text.gym_space_multidiscrete <- function(space) {
 }
 
 #' @exportS3Method
-space_text.gym_space_multibinary <- function(space) {
+space_label.gym_space_multibinary <- function(space) {
   paste("MultiBinary", shape_text(space$shape))
 }
 

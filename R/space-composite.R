@@ -19,19 +19,19 @@ init_space.gym_space_dict <- function(space) {
 init_space.gym_space_oneof <- init_space.gym_space_tuple
 
 #' @exportS3Method
-space_text.gym_space_tuple <- function(space) {
-  parts <- vapply(space$spaces, space_text, "")
+space_label.gym_space_tuple <- function(space) {
+  parts <- vapply(space$spaces, space_label, "")
   paste0(space$name, " (", paste(parts, collapse = ", "), ")")
 }
 
 #' @exportS3Method
-space_text.gym_space_dict <- function(space) {
-  parts <- vapply(space$spaces, space_text, "")
+space_label.gym_space_dict <- function(space) {
+  parts <- vapply(space$spaces, space_label, "")
   paste0("Dict (", paste0(names(space$spaces), ": ", parts, recycle0 = TRUE, collapse = ", "), ")")
 }
 
 #' @exportS3Method
-space_text.gym_space_oneof <- space_text.gym_space_tuple
+space_label.gym_space_oneof <- space_label.gym_space_tuple
 
 # Tuple -----------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ init_space.gym_space_discrete <- function(space) {
 }
 
 #' @exportS3Method
-space_text.gym_space_discrete <- function(space) {
+space_label.gym_space_discrete <- function(space) {
   from <- if (space$start != 0) paste(" from", whole_text(space$start))
   paste0("Discrete ", whole_text(space$n), from)
 }

@@ -10,9 +10,9 @@ init_space.gym_space_graph <- function(space) {
 }
 
 #' @exportS3Method
-space_text.gym_space_graph <- function(space) {
-  edges <- if (!is.null(space$edge_space)) paste(", edges", space_text(space$edge_space))
-  paste0("Graph of nodes ", space_text(space$node_space), edges)
+space_label.gym_space_graph <- function(space) {
+  edges <- if (!is.null(space$edge_space)) paste(", edges", space_label(space$edge_space))
+  paste0("Graph of nodes ", space_label(space$node_space), edges)
 }
 
 #' @exportS3Method

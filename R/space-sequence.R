@@ -77,8 +77,8 @@ init_space.gym_space_sequence <- function(space) {
 }
 
 #' @exportS3Method
-space_text.gym_space_sequence <- function(space) {
-  paste0("Sequence of ", space_text(space$space), if (space$stack) ", stacked")
+space_label.gym_space_sequence <- function(space) {
+  paste0("Sequence of ", space_label(space$space), if (space$stack) ", stacked")
 }
 
 #' @exportS3Method

@@ -4,7 +4,7 @@
 init_space.gym_space_text <- function(space) space
 
 #' @exportS3Method
-space_text.gym_space_text <- function(space) {
+space_label.gym_space_text <- function(space) {
   paste0("Text of ", space$min_length, " to ", count_of(space$max_length, "character"))
 }
 

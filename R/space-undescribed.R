@@ -9,7 +9,7 @@ new_classic_space <- function(description) {
 }
 
 #' @exportS3Method
-space_text.gym_space_undescribed <- function(space) paste(space$name, "(not described)")
+space_label.gym_space_undescribed <- function(space) paste(space$name, "(not described)")
 
 #' @exportS3Method
 decode_value.gym_space_undescribed <- function(space, json) info_from_json(json)

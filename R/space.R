@@ -28,11 +28,11 @@ init_space.default <- function(space) {
 # In words ------------------------------------------------------------------------
 
 # A space in words, without the brackets in which format() puts the outermost space.
-space_text <- function(space) UseMethod("space_text")
+space_label <- function(space) UseMethod("space_label")
 
 #' @export
 format.gym_space <- function(x, ..., width = 100L) {
-  text <- shown_line(space_text(x), .Machine$integer.max)
+  text <- shown_line(space_label(x), .Machine$integer.max)
   if (nchar(text) > width) {
     text <- paste0(substr(text, 1L, width - 3L), "...")
   }
