@@ -153,7 +153,7 @@ stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
   length_of <- lengths(each)
   if (all(length_of == 1L)) {
-    unlist(each, use.names = FALSE)
+    unlist(each, recursive = FALSE, use.names = FALSE)
   } else if (optional && all(length_of == 0L)) {
     logical(length(outs))
   }
@@ -175,7 +175,7 @@ observation_stacker <- function(space) {
     if (!has_shape(values)) {
       return(NULL)
     }
-    numbers <- unlist(values, use.names = FALSE)
+    numbers <- unlist(values, recursive = FALSE, use.names = FALSE)
     if (length(shape) == 0L || !is.atomic(numbers)) {
       return(numbers)
     }
