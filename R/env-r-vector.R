@@ -228,7 +228,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
         row[which] <- seq_along(which)
         action <- batch_rows(task$action_space, action, row)
       }
-      result <- take_rows(raw_step(sub_env, action, call = call), sub_env, which, call)
+      out <- raw_step(sub_env, action, call = call)
+      result <- take_rows(out, sub_env, which, call)
       result$next_observation <- result$observation
       result
     },
