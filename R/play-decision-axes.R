@@ -21,7 +21,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }
-  names <- observation_names(place$env_id, paste0("obs_", seq_len(n)))
+  names <- number_names(space, n)
   list(
     names = names, usual = usual_ranges(place$env_id, names),
     low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)

@@ -154,7 +154,7 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
 #' @export
 predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object$policy, newdata, type, object$env_id)
+  predict_policy(object$policy, newdata, type)
 }
 
 # Printing and summarising ---------------------------------------------------------
