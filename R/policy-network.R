@@ -141,6 +141,14 @@ check_weights <- function(weights, sizes, name = "weights", call = rlang::caller
   }
 }
 
+# The weights as one vector, layer after layer, each matrix column after column.
+weight_vector <- function(policy) unlist(lapply(policy$weights, as.vector))
+
+with_weights <- function(policy, weights) {
+  policy$weights <- utils::relist(weights, policy$weights)
+  policy
+}
+
 # From an observation to an action -------------------------------------------------
 
 #' @export
@@ -153,7 +161,7 @@ act.gym_policy_network <- function(policy, observation, ...) {
 }
 
 #' @exportS3Method
-act_batch.gym_policy_network <- function(policy, observation, playing, vector_env) {
+act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
   outputs <- network_outputs(policy, number_rows(observation))
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
