@@ -84,7 +84,8 @@ test_that("each part of a result has a row for each sub-environment, also when t
     env <- local_env("CartPole-v1", num_envs = n, seed = 1)
     expect_identical(dim(env$reset()), c(n, 4L))
     out <- env$step(rep(1L, n))
-    expect_named(out, c("observation", "reward", "done", "info", "terminated", "truncated"))
+    expect_named(out, c("observation", "reward", "done", "info", "terminated", "truncated",
+                        "next_observation"))
     expect_identical(dim(out$observation), c(n, 4L))
     expect_identical(out$reward, rep(1, n))
     for (flag in c("done", "terminated", "truncated")) expect_identical(out[[flag]], logical(n))
