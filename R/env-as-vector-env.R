@@ -226,11 +226,20 @@ single_env <- function(env) {
 independent_sub_envs <- function(env) {
   n <- env$num_envs
   space <- env$single_observation_space
-  # The seeds of those that play; the others begin as they like.
+  was_reset <- FALSE
+  # The first time all are reset, because the others have no episode yet; and so it is always with
+  # an environment of the user's, which need not know masks.
   reset <- function(seeds, which) {
-    seed <- rep(seeds, length.out = n)
+    some <- was_reset && length(which) < n && inherits(env, "gym_server_env")
+    seed <- rep(if (some) NA_real_ else seeds, length.out = n)
     seed[which] <- seeds
-    batch_rows(space, env$reset(seed = seed), which)
+    observation <- if (some) {
+      env$reset(seed = seed, mask = seq_len(n) %in% which)
+    } else {
+      env$reset(seed = seed)
+    }
+    was_reset <<- TRUE
+    batch_rows(space, observation, which)
   }
   list(
     observation_space = space, action_space = env$single_action_space, num_envs = n,
