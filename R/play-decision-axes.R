@@ -147,9 +147,10 @@ play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
 
 path_points <- function(path, names, call = rlang::caller_env()) {
   if (inherits(path, "gym_rollout")) {
-    if (is.null(path$steps)) {
+    if (!is.data.frame(path$steps)) {
       gym_abort(
-        c("The rollout has no steps to show as a path.", i = "`rollout(steps = TRUE)` keeps them."),
+        c("The rollout has no table of steps to show as a path.",
+          i = "`rollout(steps = TRUE)` keeps one."),
         class = "gym_error_argument", argument = "path", value = path, call = call
       )
     }

@@ -46,10 +46,11 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, call = rlang:
 }
 
 check_steps <- function(x, call) {
-  if (is.null(x$steps)) {
+  if (!is.data.frame(x$steps)) {
+    kept <- if (is.null(x$steps)) "without its steps being kept" else "with its steps in arrays"
     gym_abort(
-      c("This rollout was played without its steps being kept.",
-        i = "`rollout(..., steps = TRUE)` keeps them."),
+      c(paste0("This rollout was played ", kept, "."),
+        i = "`rollout(..., steps = TRUE)` keeps them in a table."),
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
