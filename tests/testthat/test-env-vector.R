@@ -24,7 +24,8 @@ test_that("sub-environments play the same in R as in Python, in every vectorizat
       stdin = lines, env = c("current", PYTHONWARNINGS = "ignore")
     )
     flat <- function(out) {
-      as.numeric(c(row_major(out$observation), out$reward, out$terminated, out$truncated))
+      as.numeric(c(row_major(out$observation), out$reward, out$terminated, out$truncated,
+                   row_major(out$next_observation)))
     }
     played <- row_major(env$reset(seed = 7))
     ended <- 0L
@@ -155,6 +156,10 @@ test_that("with SameStep the step that ends an episode begins one and keeps its 
   expect_true(out$done[[1]])
   expect_identical(final[[1]], last$observation)
   expect_false(identical(out$observation[1, ], final[[1]]))
+  # What the step led to: the last observation where an episode ended, elsewhere what is observed.
+  expect_identical(out$next_observation[out$done, , drop = FALSE],
+                   do.call(rbind, final[out$done]))
+  expect_identical(out$next_observation[!out$done, ], out$observation[!out$done, ])
   expect_false(any(startsWith(names(out$info), "_")))
 })
 
