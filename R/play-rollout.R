@@ -44,8 +44,8 @@
 #'   FrozenLake, where it is named by its id.
 #' @param num_envs How many sub-environments to play in, a whole number, where the environment is
 #'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
-#' @param next_observation Keep the observation after each step as well, in columns whose names begin
-#'   with `next_`? `FALSE`, the default, or `TRUE`. It is the true one also where the step ended the
+#' @param next_observation Keep the observation after each step as well, in columns whose names
+#'   begin with `next_`? `FALSE`, the default, or `TRUE`. It is the true one also where the step ended the
 #'   episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
@@ -59,8 +59,8 @@
 #'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
 #'       by both at once is both where the limit is the environment's own).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
-#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action was taken
-#'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
+#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action
+#'       was taken on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
 #'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
 #'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
 #'       `reward` (double), `terminated`, `truncated` (logical).}
