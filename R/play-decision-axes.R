@@ -166,5 +166,9 @@ path_points <- function(path, names, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "path", value = path, call = call
     )
   }
-  data.frame(episode = path$episode %||% 1L, x = path[[names[[1L]]]], y = path[[names[[2L]]]])
+  # Each candidate's episodes are counted apart.
+  episode <- paste(path$candidate %||% 1L, path$episode %||% 1L)
+  data.frame(
+    episode = match(episode, unique(episode)), x = path[[names[[1L]]]], y = path[[names[[2L]]]]
+  )
 }

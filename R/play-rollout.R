@@ -17,6 +17,21 @@
 #' end. `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
 #' again.
 #'
+#' # Steps as arrays
+#'
+#' Those who write learners want the steps by time, of all sub-environments at once. With
+#' `steps = "arrays"` they are a list of arrays whose first dimension is the time and whose second
+#' are the sub-environments:
+#' * `observation` and, where asked for, `next_observation`: with the dimensions of an observation
+#'   after these two, such as 120 x 16 x 4,
+#' * `action`: with those of an action, none for a Discrete space,
+#' * `reward` (double), `terminated`, `truncated` (logical), `episode` and, with several policies,
+#'   `candidate` (integer): matrices.
+#'
+#' A sub-environment's episodes follow one another. Where it has played fewer steps than another
+#' the arrays have `NA` after its last one. For Tuple and Dict there is a list with an array for each
+#' part. Sequence, Graph and OneOf have no arrays.
+#'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
@@ -44,9 +59,9 @@
 #'   FrozenLake, where it is named by its id.
 #' @param num_envs How many sub-environments to play in, a whole number, where the environment is
 #'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
-#' @param next_observation Keep the observation after each step as well, in columns whose names begin
-#'   with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`, with `steps` only. It
-#'   is the true one also where the step ended the episode.
+#' @param next_observation Keep the observation after each step as well, in columns whose names
+#'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where steps
+#'   are kept. It is the true one also where the step ended the episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
@@ -59,11 +74,13 @@
 #'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
 #'       by both at once is both where the limit is the environment's own).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
-#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action was taken
-#'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
+#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action
+#'       was taken on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
 #'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
 #'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
-#'       `reward` (double), `terminated`, `truncated` (logical).}
+#'       `reward` (double), `terminated`, `truncated` (logical), and with
+#'       `next_observation = TRUE` the observation after the step. With `steps = "arrays"` an object
+#'       of class `gym_arrays`, see below.}
 #'     \item{frames}{`NULL`, or with `frames = TRUE` a list with the frames of each episode, an
 #'       object of class `gym_frames`. They are kept as PNG files, a few kilobytes each:
 #'       `frames[[2]][[1]]` unpacks the first of the second episode, as [env_render()] gives
@@ -94,9 +111,20 @@
 #' summary(random)
 #'
 #' # Any function of a matrix of observations can be a policy, and each step be kept.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
 #' head(as.data.frame(played))
+#'
+#' # The returns from each step on, discounted by 0.99, in all sub-environments at once.
+#' arrays <- rollout("CartPole-v1", follow_pole, episodes = 20, seed = 1, steps = "arrays")$steps
+#' arrays
+#' from_here <- arrays$reward
+#' ended <- arrays$terminated | arrays$truncated
+#' for (time in rev(seq_len(nrow(ended) - 1))) {
+#'   later <- ifelse(ended[time, ], 0, from_here[time + 1, ])
+#'   from_here[time, ] <- arrays$reward[time, ] + 0.99 * later
+#' }
+#' from_here[1, ]
 #'
 #' # The second episode begins again.
 #' second <- played$episodes[2, ]
