@@ -149,7 +149,7 @@ path_points <- function(path, names, call = rlang::caller_env()) {
   if (inherits(path, "gym_rollout")) {
     if (!is.data.frame(path$steps)) {
       gym_abort(
-        c("The rollout has no table of steps to show as a path.",
+        c("The rollout has no steps in a table to show as a path.",
           i = "`rollout(steps = TRUE)` keeps one."),
         class = "gym_error_argument", argument = "path", value = path, call = call
       )
