@@ -8,17 +8,17 @@
 #' @export
 predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object, newdata, type, object$env_id)
+  predict_policy(object, newdata, type)
 }
 
-predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
+predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   if (!inherits(policy, "gym_policy_network")) {
     gym_abort(
       paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
   }
-  observation <- observations_from(newdata, policy, env_id, call)
+  observation <- observations_from(newdata, policy, call)
   if (type == "action") {
     return(act(policy, observation))
   }
@@ -29,14 +29,12 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
 
 # The observations in a data frame: the columns with their names, or all columns where it has none
 # of these names.
-observations_from <- function(newdata, policy, env_id, call) {
+observations_from <- function(newdata, policy, call) {
   if (!is.data.frame(newdata)) {
     return(newdata)
   }
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  size <- if (discrete) 1L else policy$sizes[[1L]]
-  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
-  names <- observation_names(env_id, columns)
+  names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
   if (any(names %in% names(newdata))) {
     absent <- setdiff(names, names(newdata))
     if (length(absent)) {
