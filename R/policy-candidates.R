@@ -1,52 +1,62 @@
-# Candidates: networks of the same sizes with different weights, which play in the same batch.
-
-#' Make one policy of several candidates
+#' Make candidates of a matrix of weights
 #'
-#' @param policies A list of networks that differ only in their weights.
-#' @param candidate For each sub-environment the place in the list of the network that plays there.
-#' @return A policy for [act_batch()]: the network itself where there is only one.
-#' @noRd
-candidates_of <- function(policies, candidate) {
-  if (length(policies) == 1L) {
-    return(policies[[1L]])
+#' Candidates are networks of the same sizes and activations that differ in their weights.
+#' [rollout()] and [evaluate_policy()] play all of them at once, which is much faster than playing
+#' one after the other.
+#'
+#' @param policy A network, made by [policy_network()]: its sizes and activations are those of all
+#'   candidates. Its own weights are not used.
+#' @param weights A numeric matrix with the weights of a candidate in each row, in the order of
+#'   [coef()][coef.gym_policy_network]. Names of rows are the candidates' names.
+#' @return An object of class `gym_policy_candidates`, a list with the elements `policy` and
+#'   `weights`. [coef()][coef.gym_policy_network] gives the matrix.
+#' @section Errors: `gym_error_argument` when `policy` is no network, or `weights` not a matrix of
+#'   as many columns as the network has weights, without missing values.
+#' @export
+#' @examples
+#' policy <- policy_network(c(4, 1))
+#' candidates <- policy_candidates(policy, rbind(left = c(0, 0, -1, 0), right = c(0, 0, 1, 0)))
+#' candidates
+#' coef(candidates)["right", ]
+#'
+#' @examplesIf gym:::can_start_server()
+#' rollout("CartPole-v1", candidates, episodes = 5, seed = 1)
+policy_candidates <- function(policy, weights) {
+  if (!inherits(policy, "gym_policy_network")) {
+    abort_no_weights(policy, "policy", rlang::current_env())
   }
-  layers <- lapply(seq_along(policies[[1L]]$weights), function(layer) {
-    rows <- lapply(policies, function(policy) as.vector(policy$weights[[layer]]))
-    do.call(rbind, rows)[candidate, , drop = FALSE]
-  })
-  structure(
-    list(policy = policies[[1L]], layers = layers),
-    class = c("gym_policy_candidates", "gym_policy")
-  )
+  check_candidate_weights(weights, sum(lengths(policy$weights)))
+  storage.mode(weights) <- "double"
+  new_candidates(policy, weights)
 }
 
-#' @exportS3Method
-act_batch.gym_policy_candidates <- function(policy, observation, playing, vector_env) {
-  network <- policy$policy
-  signal <- network_inputs(network$observation_space, number_rows(observation))
-  all_play <- length(playing) == nrow(policy$layers[[1L]])
-  for (layer in seq_along(policy$layers)) {
-    weights <- policy$layers[[layer]]
-    if (!all_play) {
-      weights <- weights[playing, , drop = FALSE]
+check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {
+  if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights)) {
+    hint <- if (is.numeric(weights) && length(weights) == count && is.null(dim(weights))) {
+      "For a single candidate this is `rbind(weights)`."
     }
-    signal <- activate(sum_weighted(signal, weights), network$activation[[layer]])
+    gym_abort(
+      c(paste0("`weights` must be a numeric matrix with a candidate in each row, not ",
+               describe_argument(weights), "."),
+        i = hint),
+      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    )
   }
-  network_action(network$action_space, signal, network, one = FALSE)
+  if (ncol(weights) != count) {
+    turned <- nrow(weights) == count
+    gym_abort(
+      c(paste0("`weights` must have the ", count_of(count, "weight"), " of a candidate in each row, ",
+               "one a column, not ", count_of(ncol(weights), "column"), "."),
+        i = if (turned) "`t(weights)` has a candidate in each row."),
+      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    )
+  }
+  if (anyNA(weights)) {
+    abort_argument(weights, "without missing values", "weights", call)
+  }
 }
 
-#' Sum inputs with weights of their own for each row
-#'
-#' @param weights In each row the weight matrix of a layer, column after column: all
-#'   outputs of the first input, then those of the next.
-#' @return A matrix with one column for each output.
-#' @noRd
-sum_weighted <- function(signal, weights) {
-  n <- nrow(signal)
-  inputs <- ncol(signal)
-  outputs <- ncol(weights) %/% inputs
-  terms <- signal[, rep(seq_len(inputs), each = outputs)] * weights
-  sums <- .rowSums(terms, n * outputs, inputs)
-  dim(sums) <- c(n, outputs)
-  sums
+#' @export
+format.gym_policy_candidates <- function(x, ...) {
+  paste0(count_of(nrow(x$weights), "candidate"), " of ", format(x$policy))
 }

@@ -141,6 +141,14 @@ check_weights <- function(weights, sizes, name = "weights", call = rlang::caller
   }
 }
 
+# The weights as one vector, layer after layer, each matrix column after column.
+weight_vector <- function(policy) unlist(lapply(policy$weights, as.vector))
+
+with_weights <- function(policy, weights) {
+  policy$weights <- utils::relist(weights, policy$weights)
+  policy
+}
+
 # From an observation to an action -------------------------------------------------
 
 #' @export
