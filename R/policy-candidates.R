@@ -27,26 +27,26 @@ policy_candidates <- function(policy, weights) {
   }
   check_candidate_weights(weights, sum(lengths(policy$weights)))
   storage.mode(weights) <- "double"
-  new_candidates(policy, weights)
+  structure(
+    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
+  )
 }
 
 check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {
   if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights)) {
-    hint <- if (is.numeric(weights) && length(weights) == count && is.null(dim(weights))) {
-      "For a single candidate this is `rbind(weights)`."
-    }
+    single <- is.numeric(weights) && is.null(dim(weights))
     gym_abort(
       c(paste0("`weights` must be a numeric matrix with a candidate in each row, not ",
                describe_argument(weights), "."),
-        i = hint),
+        i = if (single) "For a single candidate this is `rbind(weights)`."),
       class = "gym_error_argument", argument = "weights", value = weights, call = call
     )
   }
   if (ncol(weights) != count) {
     turned <- nrow(weights) == count
     gym_abort(
-      c(paste0("`weights` must have the ", count_of(count, "weight"), " of a candidate in each row, ",
-               "one a column, not ", count_of(ncol(weights), "column"), "."),
+      c(paste0("`weights` must have the ", count_of(count, "weight"), " of a candidate in each ",
+               "row, one a column, not ", count_of(ncol(weights), "column"), "."),
         i = if (turned) "`t(weights)` has a candidate in each row."),
       class = "gym_error_argument", argument = "weights", value = weights, call = call
     )

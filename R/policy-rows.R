@@ -50,9 +50,3 @@ sum_weighted <- function(signal, weights) {
   dim(sums) <- c(n, outputs)
   sums
 }
-
-new_candidates <- function(policy, weights) {
-  structure(
-    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
-  )
-}
