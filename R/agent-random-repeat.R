@@ -74,13 +74,13 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
   check_flag(progress)
   call <- rlang::current_env()
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
-  with_vector_env(env, as.numeric(rounds) * episodes, client, function(vector_env) {
-    warn_of_own_limit(max_steps, vector_env, call)
+  play <- function(vector_env) {
     settings <- settings_in(vector_env, settings)
     check_target(settings, call)
-    policy <- policy_bind(policy, vector_env, call = call)
-    play_searches(vector_env, policy, settings, seeds, progress, call)
-  })
+    template <- policy_bind(settings$policy, vector_env, call = call)
+    play_searches(vector_env, template, settings, seeds, progress, call)
+  }
+  with_vector_env(env, as.numeric(rounds) * episodes, play, max_steps, client = client)
 }
 
 check_seeds <- function(seeds, call = rlang::caller_env()) {
@@ -148,7 +148,7 @@ play_searches <- function(vector_env, template, settings, seeds, progress, call)
 play_seed <- function(vector_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
-    with_random_seed(seed, play_search(vector_env, template, settings, progress = FALSE, call)),
+    play_search(vector_env, template, settings, progress = FALSE, call),
     gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd)
   )
 }

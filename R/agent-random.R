@@ -6,10 +6,11 @@
 #' CartPole. An environment named by its id is made for the purpose and closed afterwards,
 #' whatever happens.
 #'
-#' The weights of each round and the seeds of its episodes are drawn from R's generator, so that
-#' [set.seed()] alone fixes the whole search. Rounds are played side by side, and the first one that
-#' reaches the target ends the search all the same. A search that is interrupted returns what it
-#' has; one with a `checkpoint` goes on where it was when the same call is made again, also after a
+#' The weights of each round and the seeds of its episodes follow from one whole number, `seed`.
+#' Without one it is drawn from R's generator, so that [set.seed()] fixes the whole search, too.
+#' Rounds are played side by side, in batches of 51 in CartPole, and the first one that
+#' reaches the target ends the search all the same. A search that is interrupted returns the batches
+#' that were finished; one with a `checkpoint` goes on where it was when the same call is made again, also after a
 #' kill. `vignette("playing", package = "gym")` tells all of this in full, and where the tutorial's
 #' own script differs.
 #'
@@ -30,9 +31,9 @@
 #'   have a limit, but without one a policy that never fails plays forever. No episode goes on
 #'   beyond the environment's own limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)`
 #'   makes one with another.
-#' @param seed A whole number that fixes all that is drawn: the result is that of calling
-#'   `set.seed(seed)` beforehand, but the session's generator is afterwards as it was.
-#'   `NULL`, the default, draws from the session's generator.
+#' @param seed A whole number that fixes all that is drawn, whatever [RNGkind()] the session has;
+#'   the session's generator stays as it was. `NULL`, the default, draws one from the session's
+#'   generator.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param client The client of the server where an environment named by its id is made; the
 #'   default is the session's own, [gym_client()].
@@ -61,8 +62,8 @@
 #'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
 #'       where each episode has a seed of its own. [rollout()] says how to begin one again.}
 #'     \item{client}{The client of the environment.}
-#'     \item{template, max_rounds, max_steps, seed}{`policy`, `rounds`, `max_steps` and `seed` as
-#'       given.}
+#'     \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
+#'     \item{seed}{The seed, as given or drawn: with it the same call gives the same search.}
 #'     \item{elapsed}{The seconds that it took, a double.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }
@@ -100,10 +101,11 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     client <- if (is_playable(env)) env$client else client
     return(finished_search(file$saved, settings, client, file$path))
   }
-  with_vector_env(env, as.numeric(rounds) * episodes, client, function(vector_env) {
-    warn_of_own_limit(max_steps, vector_env, call)
+  settings$seed <- file$saved$seed %||% seed %||% draw_seed()
+  play <- function(vector_env) {
     settings <- settings_in(vector_env, settings)
-    bound <- policy_bind(policy, vector_env, call = call)
-    with_random_seed(seed, play_search(vector_env, bound, settings, progress, call, file))
-  })
+    bound <- policy_bind(settings$policy, vector_env, call = call)
+    play_search(vector_env, bound, settings, progress, call, file)
+  }
+  with_vector_env(env, as.numeric(rounds) * episodes, play, max_steps, client = client)
 }

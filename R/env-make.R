@@ -46,7 +46,7 @@
 #'     and what was chosen for them, see [env_create()]; `NULL` in a single environment,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
-#'     the latter three `NULL` where the environment has none,
+#'     the latter three `NULL` where the environment has none, and `wrappers` (their names),
 #'   * `$client`, `$instance_id`: for the classic calls.
 #' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
 #'   started; `gym_error_install` when a Python environment was to be installed for it, and
@@ -80,25 +80,32 @@
 gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                      wrappers = list(), client = gym_client(), vectorization_mode = NULL,
                      autoreset_mode = NULL, name = NULL) {
+  make_unseeded(
+    env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode, num_envs = num_envs,
+    wrappers = wrappers, client = client, vectorization_mode = vectorization_mode,
+    autoreset_mode = autoreset_mode, name = name, call = rlang::current_env()
+  )
+}
+
+# As gym_make(), but without a seed it draws none.
+make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
+                          wrappers = list(), client = gym_client(), vectorization_mode = NULL,
+                          autoreset_mode = NULL, name = NULL, call = rlang::caller_env()) {
   kwargs <- list(...)
-  check_dots_named(kwargs, "seed = 1")
-  check_client(client)
+  check_dots_named(kwargs, "seed = 1", call)
+  check_client(client, call = call)
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
-  create <- function(call) {
+  # No interrupt may come between creating the instance and keeping its id.
+  suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
       autoreset_mode, name, call = call
-    )
-  }
-  call <- rlang::current_env()
-  # No interrupt may come between creating the instance and keeping its id.
-  suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
-    create(call),
+    ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
-  env <- server_env$new(client, instance_id)
+  env <- server_env$new(client, instance_id, c(noted_wrappers(env_id), wrappers))
   env
 }
 
@@ -135,7 +142,7 @@ server_env <- R6Class(
     vectorization_mode = NULL,
     autoreset_mode = NULL,
     spec = NULL,
-    initialize = function(client, instance_id) {
+    initialize = function(client, instance_id, wrappers = list()) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
       private$connected <- client
@@ -145,6 +152,7 @@ server_env <- R6Class(
         self[[name]] <- private$instance[[name]]
       }
       self$spec <- private$instance$spec
+      self$spec$wrappers <- vapply(wrappers, function(wrapper) wrapper[[1L]], "")
     },
     reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()

@@ -7,15 +7,15 @@ flags <- c("terminated", "truncated")
 #' @param n How many sub-environments step.
 #' @param ... The arguments of `env$step()`.
 #' @noRd
-take_step <- function(env, n, call, ...) {
+take_step <- function(env, n, ...) {
   out <- env$step(...)
   if (!inherits(env, "gym_server_env")) {
-    check_step_result(out, n, call)
+    check_step_result(out, n)
   }
   out
 }
 
-check_step_result <- function(out, n, call) {
+check_step_result <- function(out, n, call = NULL) {
   if (!is.list(out)) {
     problem <- paste("`step()` of this environment must return a list, not", describe_argument(out))
     abort_step_result(problem, out, call)

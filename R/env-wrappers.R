@@ -43,6 +43,9 @@ gym_wrap <- function(env_id, wrapper, ...) {
   env_id
 }
 
+# The wrappers that gym_wrap() has noted for an id.
+noted_wrappers <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$wrappers
+
 #' @export
 format.gym_wrapped <- function(x, ...) {
   paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")

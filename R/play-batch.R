@@ -1,109 +1,138 @@
-# Episodes are played in batches: each sub-environment plays one episode of a batch. A
-# sub-environment whose episode has ended waits for the end of the batch. If it began another
-# episode at once, and playing stopped at the number of episodes asked for, short episodes would be
-# favoured.
+# A batch of episodes is played by a function that changes nothing: what comes of it depends on the
+# environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
+# played again, and it does not matter in which order batches are played, and by whom.
+#
+# Each sub-environment plays one episode at a time, and one whose episode has ended waits for the
+# others. If it began another episode at once, and playing stopped at the number of episodes asked
+# for, short episodes would be favoured.
 
-#' Make an empty history of episodes
+#' Play a batch of episodes
 #'
-#' @param wanted How many episodes, from the first, are to be played.
-#' @param on_end A function that is called when episodes have ended, with the history, the numbers
-#'   of these episodes and their returns. It may lower `wanted` in the history.
-#' @return A history, an environment: `wanted`; `begun`, how many episodes have begun;
-#'   `batches`, a list of environments, one for each batch, see [new_batch()]; `after_batch`, a
-#'   function that is called with the history when a batch has ended.
+#' Draws from the batch's own stream; the session's generator stays as it was. An error or an
+#' interrupt ends it without a result.
+#' @param vector_env As [as_vector_env()] returns it.
+#' @param policy The policy, bound to the environment: one, or several candidates.
+#' @param episodes A list of vectors with an element for each episode: `candidate` (which of the
+#'   policies plays it), `episode` (its number among those of the candidate) and `seed`.
+#' @param stream The stream that the policy draws from.
+#' @param max_steps After how many steps an episode is cut short.
+#' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
+#'   none; `each`, how many episodes a candidate plays.
+#' @param keep_steps Whether to keep each step.
+#' @param report A function that is called with how many episodes have ended so far.
+#' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
+#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps` and `frames`. Candidates
+#'   after one that has reached the target are left out.
 #' @noRd
-new_history <- function(wanted, on_end = function(history, episodes, returns) NULL) {
-  rlang::env(
-    wanted = wanted, begun = 0L, batches = list(), on_end = on_end,
-    after_batch = function(history) NULL
+play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
+                       each = 1L, keep_steps = FALSE, report = function(ended) NULL) {
+  n <- length(episodes$episode)
+  sub_env <- (seq_len(n) - 1L) %% vector_env$num_envs + 1L
+  batch <- rlang::env(
+    candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
+    sub_env = sub_env, return = numeric(n), length = integer(n), terminated = logical(n),
+    truncated = logical(n), ended = logical(n), needed = rep(TRUE, n), steps = list(),
+    frames = list(), target = target, each = each, report = report
   )
+  with_generator(new_generator(stream = stream), {
+    for (first in which(sub_env == 1L)) {
+      numbers <- seq(first, min(n, first + vector_env$num_envs - 1L))
+      numbers <- numbers[batch$needed[numbers]]
+      if (length(numbers)) {
+        play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps)
+      }
+    }
+  })
+  columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
+               "truncated")
+  c(lapply(mget(columns, batch), `[`, batch$needed), mget(c("steps", "frames"), batch))
 }
 
-#' Play batches of episodes until all that are wanted have ended
-#'
-#' @param vector_env As [vector_env_of()] returns it.
-#' @param history As [new_history()] returns it. It holds what was played also when an error or an
-#'   interrupt ends the playing.
-#' @param begin A function of the number of a batch and the numbers of its episodes. It returns a
-#'   list of `seeds`, as `vector_env$draw_seeds()` draws them, and `policy`, which plays the batch.
-#' @param max_steps After how many steps an episode is cut short, `NULL` for no limit.
-#' @param keep_steps Whether to keep each step in the history.
-#' @noRd
-play_episodes <- function(vector_env, history, begin, max_steps = NULL, keep_steps = FALSE) {
-  while (history$begun < history$wanted) {
-    n <- as.integer(min(vector_env$batch_size, history$wanted - history$begun))
-    batch <- length(history$batches) + 1L
-    begun <- begin(batch, history$begun + seq_len(n))
-    history$batches[[batch]] <- new_batch(history$begun + seq_len(n), begun$seeds)
-    history$begun <- history$begun + n
-    play_batch(
-      vector_env, history$batches[[batch]], begun$policy, history, max_steps %||% Inf, keep_steps
-    )
-    history$after_batch(history)
+# Plays some episodes of a batch, one in each sub-environment. They begin together, so that all that
+# are still playing have taken the same number of steps, which is `taken`.
+play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, keep_steps) {
+  space <- vector_env$observation_space
+  observation <- begin_episodes(vector_env, batch, playing)
+  keep_frame(batch, vector_env, playing)
+  if (batch$episode[[playing[[1L]]]] == 1L) {
+    ask_beforehand(policy, batch$candidate[playing], observation, vector_env)
   }
-}
-
-# What is known of the episodes of a batch: `episodes`, their numbers; `seeds`, those that the
-# sub-environments are reset with, of which more may be than play; and vectors with an element for
-# each episode.
-new_batch <- function(episodes, seeds) {
-  n <- length(episodes)
-  rlang::env(
-    episodes = episodes, seeds = seeds, seed = seeds[seq_len(n)], sub_env = seq_len(n),
-    return = numeric(n), length = integer(n), terminated = logical(n), truncated = logical(n),
-    steps = list(), frames = list()
-  )
-}
-
-# All episodes of a batch begin together. So all that are still playing have taken the same number
-# of steps, which is `taken`.
-play_batch <- function(vector_env, batch, policy, history, max_steps, keep_steps) {
-  playing <- batch$sub_env
-  observation <- batch_rows(vector_env$observation_space, vector_env$reset(batch$seeds), playing)
-  keep_frame(batch, vector_env)
-  if (batch$episodes[[1L]] == 1L) {
-    ask_beforehand(policy, observation, playing, vector_env)
-  }
+  which <- batch$sub_env[playing]
+  acting <- policy_rows(policy, batch$candidate[playing])
   returns <- numeric(length(playing))
   taken <- 0L
-  while (length(playing)) {
-    action <- act_batch(policy, observation, playing, vector_env)
-    out <- vector_env$step(action, playing)
+  repeat {
+    action <- act_batch(acting, observation, length(playing), vector_env)
+    out <- vector_env$step(action, which)
     taken <- taken + 1L
-    keep_frame(batch, vector_env)
+    keep_frame(batch, vector_env, playing)
     returns <- returns + out$reward
     if (keep_steps) {
-      batch$steps[[taken]] <- list(
-        sub_env = playing, observation = observation, action = action, reward = out$reward,
-        terminated = out$terminated, truncated = out$truncated
+      batch$steps[[length(batch$steps) + 1L]] <- list(
+        at = playing, observation = observation, action = action, reward = out$reward,
+        terminated = out$terminated, truncated = out$truncated,
+        next_observation = out$next_observation
       )
     }
     observation <- out$observation
     ended <- out$terminated | out$truncated | taken >= max_steps
     if (any(ended)) {
       end_episodes(batch, playing[ended], returns[ended], taken, lapply(out[flags], `[`, ended))
-      history$on_end(history, batch$episodes[playing[ended]], returns[ended])
-      going <- which(!ended & batch$episodes[playing] <= history$wanted)
+      going <- which(!ended & batch$needed[playing])
+      if (!length(going)) {
+        return(invisible())
+      }
       playing <- playing[going]
+      which <- which[going]
       returns <- returns[going]
-      observation <- batch_rows(vector_env$observation_space, observation, going)
+      observation <- batch_rows(space, observation, going)
+      acting <- policy_rows(policy, batch$candidate[playing])
     }
   }
 }
 
-# Frames are kept of environments without sub-environments only: each of their batches is one
-# episode.
-keep_frame <- function(batch, vector_env) {
+# Resets the sub-environments of the episodes that begin. Where all must be reset together, those
+# that play none are left out of what it returns.
+begin_episodes <- function(vector_env, batch, playing) {
+  seeds <- batch$seed[playing]
+  sub_envs <- batch$sub_env[playing]
+  if (vector_env$one_seed) {
+    batch_rows(vector_env$observation_space, vector_env$reset(seeds[[1L]]), sub_envs)
+  } else {
+    vector_env$reset(seeds, sub_envs)
+  }
+}
+
+# Frames are kept where there is one sub-environment, which plays one episode after the other.
+keep_frame <- function(batch, vector_env, playing) {
   if (!is.null(vector_env$frame)) {
-    batch$frames[[length(batch$frames) + 1L]] <- vector_env$frame()
+    frames <- if (length(batch$frames) >= playing) batch$frames[[playing]]
+    batch$frames[[playing]] <- c(frames, list(vector_env$frame()))
   }
 }
 
 # An episode that the environment neither terminated nor truncated was cut short by `max_steps`,
 # which counts as truncated.
-end_episodes <- function(batch, sub_env, returns, length, out) {
-  batch$return[sub_env] <- returns
-  batch$length[sub_env] <- length
-  batch$terminated[sub_env] <- out$terminated
-  batch$truncated[sub_env] <- out$truncated | !out$terminated
+end_episodes <- function(batch, at, returns, length, out) {
+  batch$return[at] <- returns
+  batch$length[at] <- length
+  batch$terminated[at] <- out$terminated
+  batch$truncated[at] <- out$truncated | !out$terminated
+  batch$ended[at] <- TRUE
+  batch$report(sum(batch$ended))
+  if (!is.null(batch$target)) {
+    drop_needless_candidates(batch, unique(batch$candidate[at]))
+  }
+}
+
+# A candidate whose mean return reaches the target makes all later ones needless, which are not
+# played on. Candidates before it are, because one of them may reach the target, too.
+drop_needless_candidates <- function(batch, candidates) {
+  for (candidate in candidates) {
+    own <- batch$candidate == candidate
+    if (sum(own) == batch$each && all(batch$ended[own]) &&
+          isTRUE(mean(batch$return[own]) >= batch$target)) {
+      batch$needed <- batch$needed & batch$candidate <= candidate
+    }
+  }
 }

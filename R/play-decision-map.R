@@ -223,7 +223,7 @@ policy_actions <- function(place, values, outputs) {
   observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))
   vector_env <- place[c("observation_space", "action_space")]
   vector_env$call <- rlang::caller_env()
-  act_batch(place$policy, observation, seq_len(nrow(values)), vector_env)
+  act_batch(place$policy, observation, nrow(values), vector_env)
 }
 
 # Printing -------------------------------------------------------------------------

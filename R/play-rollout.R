@@ -6,9 +6,10 @@
 #' episode.
 #'
 #' An episode's return is the sum of its rewards, its length the number of its
-#' steps. Each episode is seeded: the seeds are drawn from R's generator before the
-#' first episode begins, and so are, while they play, the actions of a random
-#' policy. So [set.seed()] alone fixes everything.
+#' steps. Everything that is drawn, the seeds of the episodes and the actions of a random policy,
+#' follows from one whole number, `seed`. Without one it is drawn from R's generator, which moves by
+#' this one draw only; so [set.seed()] fixes everything, too, but for a policy that is made in the
+#' call, whose weights are the caller's to draw.
 #'
 #' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
 #' side by side, each in a sub-environment of its own; with `frames = TRUE` one after the other. The
@@ -21,34 +22,44 @@
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
 #'   function of many observations that returns as many actions: for the usual
 #'   environments a function of a matrix with an observation in each row, one for each episode
-#'   that still plays, see [act()].
-#' @param episodes How many episodes to play, a whole number of at least 1; the
-#'   default is 1.
+#'   that still plays, see [act()]. Or several of them, the candidates, which are played side by
+#'   side: a list of policies, or [policy_candidates()].
+#' @param episodes How many episodes to play, with each of the candidates, a whole number of at
+#'   least 1; the default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of
 #'   at least 1. Such an episode counts as truncated. `NULL`, the default, leaves it
 #'   to the environment; most have a limit of their own, but without one a policy
 #'   that never fails plays forever. No episode goes on beyond the environment's own limit;
 #'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one with another.
-#' @param seed A whole number that fixes all that is drawn: the result is that of
-#'   calling `set.seed(seed)` beforehand, but the session's generator is afterwards as
-#'   it was. `NULL`, the default, draws from the session's generator.
+#' @param seed A whole number that fixes all that is drawn, whatever [RNGkind()] the session has;
+#'   the session's generator stays as it was. `NULL`, the default, draws one from the session's
+#'   generator.
 #' @param steps Keep each step as well? `FALSE`, the default, or `TRUE`.
 #' @param client The client of the server where an environment named by its id is
 #'   made; the default is the session's own, [gym_client()].
 #' @param frames Keep pictures of the episodes as well? `FALSE`, the default, or `TRUE`, for
 #'   [animate()] and [plot(type = "filmstrip")][plot.gym_rollout()]: one before the first
 #'   step and one after each. Takes an environment that can be drawn, without sub-environments.
+#' @param ... The environment's own arguments, by name, such as `is_slippery = FALSE` for
+#'   FrozenLake, where it is named by its id.
+#' @param num_envs How many sub-environments to play in, a whole number, where the environment is
+#'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
+#' @param next_observation Keep the observation after each step as well, in columns whose names begin
+#'   with `next_`? `FALSE`, the default, or `TRUE`. It is the true one also where the step ended the
+#'   episode.
+#' @param progress Show a progress bar? By default in interactive sessions only.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
 #'   \describe{
-#'     \item{episodes}{A data frame with one row for each episode: `episode`, `seed`,
+#'     \item{episodes}{A data frame with one row for each episode: `candidate` (integer, with
+#'       several policies only; `episode` then counts those of each), `episode`, `seed`,
 #'       `sub_env` (integers; 1 where there are no sub-environments), `return` (double), `length`
 #'       (integer, in steps), `terminated` (logical: ended by the environment's own
 #'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
 #'       by both at once is both where the limit is the environment's own).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
-#'       step: `episode`, `step` (integers), the observation that the action was taken
+#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action was taken
 #'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
 #'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
 #'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
@@ -61,7 +72,9 @@
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
 #'       where each episode has a seed of its own.}
-#'     \item{seed}{As given.}
+#'     \item{seed}{The seed, as given or drawn: with it the same call gives the same result.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the batches of episodes
+#'       that were finished.}
 #'   }
 #'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
 #'   the episodes.
@@ -69,7 +82,9 @@
 #'   (before anything is made), a policy that does not fit the environment, or a function
 #'   that does not return one action for each observation;
 #'   `gym_error_http` when the server refuses the environment or an action;
-#'   `gym_error_connection` when it does not answer.
+#'   `gym_error_connection` when it does not answer. An error in the middle has the class
+#'   `gym_error_rollout`, too, and the batches of episodes before it are the element `result` of the
+#'   condition.
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export
@@ -95,49 +110,88 @@
 #' env$reset(seed = lake$episodes$seed[2])
 #' env$close()
 rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, steps = FALSE,
-                    client = gym_client(), frames = FALSE) {
+                    client = gym_client(), frames = FALSE, ..., num_envs = NULL,
+                    next_observation = FALSE, progress = rlang::is_interactive()) {
   check_environment(env)
+  policy <- check_policies(policy)
   check_count(episodes)
   check_count(max_steps, allow_null = TRUE)
   check_seed(seed)
   check_flag(steps)
   check_flag(frames)
-  call <- rlang::current_env()
-  with_random_seed(seed, {
-    # A policy that is made in the call draws its weights under the seed, too.
-    check_policy(policy)
-    play <- function(vector_env) {
-      warn_of_own_limit(max_steps, vector_env, call)
-      policy <- policy_bind(policy, vector_env, call = call)
-      history <- new_history(episodes)
-      # The seeds of all batches are drawn before the first episode, so that a policy that draws is
-      # played in the same episodes as one that does not.
-      batches <- ceiling(episodes / vector_env$batch_size)
-      seeds <- replicate(batches, vector_env$draw_seeds(), simplify = FALSE)
-      begin <- function(batch, episodes) list(seeds = seeds[[batch]], policy = policy)
-      play_episodes(vector_env, history, begin, max_steps, keep_steps = steps)
-      new_rollout(history, policy, vector_env, seed, steps)
-    }
-    with_vector_env(env, episodes, client, play, frames)
-  })
+  check_count(num_envs, allow_null = TRUE)
+  check_flag(next_observation)
+  check_flag(progress)
+  check_dots_named(list(...), "is_slippery = FALSE")
+  seed <- seed %||% draw_seed()
+  candidates <- count_candidates(policy) %||% 1L
+  play <- function(vector_env) {
+    play_rollout(
+      vector_env, policy, candidates, episodes, max_steps, seed, steps, next_observation, progress
+    )
+  }
+  with_vector_env(
+    env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
+    client = client
+  )
 }
 
-# Tables --------------------------------------------------------------------------
+play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, seed, keep_steps,
+                         next_observation, progress) {
+  policy <- policy_bind(policy, vector_env, call = vector_env$call)
+  history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
+  result <- function(interrupted = FALSE) {
+    new_rollout(history, policy, vector_env, seed, keep_steps, next_observation, interrupted)
+  }
+  total <- candidates * episodes
+  show <- if (progress) progress_bar(total, "Episode") else function(ended) NULL
+  interrupted <- tryCatch(
+    until_interrupted(
+      play_batches(
+        vector_env, history, function(candidates) policy_subset(policy, candidates),
+        report = function(ended) show(count_played(history) + ended),
+        max_steps = max_steps %||% Inf, keep_steps = keep_steps
+      ),
+      "Interrupted after {finished} of {total} episode{?s}; what was finished is returned.",
+      function() count_played(history), total
+    ),
+    error = function(cnd) {
+      if (!count_played(history)) {
+        rlang::cnd_signal(cnd)
+      }
+      played <- count_of(count_played(history), "episode")
+      abort_with_result(
+        cnd, "The rollout", result(), played, "gym_error_rollout", vector_env$call
+      )
+    }
+  )
+  result(interrupted)
+}
 
-new_rollout <- function(history, policy, vector_env, seed, keep_steps) {
-  episodes <- episodes_table(history)
+count_played <- function(history) {
+  sum(vapply(history$batches, function(batch) length(batch$episode), 0L))
+}
+
+new_rollout <- function(history, policy, vector_env, seed, keep_steps, next_observation,
+                        interrupted) {
+  several <- !is.null(count_candidates(policy))
+  episodes <- episodes_table(history$batches, several)
   fps <- vector_env$spec$render_fps
   structure(
     list(
       episodes = episodes,
-      steps = if (keep_steps) steps_table(history, episodes, vector_env),
+      steps = if (keep_steps && nrow(episodes)) {
+        steps_table(history$batches, episodes, vector_env, several, next_observation)
+      },
       frames = if (!is.null(vector_env$frame)) {
-        lapply(history$batches, function(batch) new_frames(batch$frames, fps))
+        lapply(unlist(lapply(history$batches, function(batch) batch$frames), recursive = FALSE),
+               new_frames, fps = fps)
       },
       policy = policy,
       env_id = environment_label(vector_env),
-      num_envs = vector_env$num_envs,
-      seed = seed
+      num_envs = if (vector_env$one_seed) vector_env$num_envs,
+      seed = seed,
+      interrupted = interrupted
     ),
     class = "gym_rollout"
   )

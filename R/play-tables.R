@@ -1,14 +1,15 @@
 # The tables of a rollout: a row for each episode, a row for each step.
 
-#' Put the episodes of a history into a table
-#' @param n How many, from the first.
+#' Put the episodes of batches into a table
+#' @param several Whether there are several candidates, so that a column tells them apart.
 #' @noRd
-episodes_table <- function(history, n = history$begun) {
+episodes_table <- function(batches, several = FALSE) {
   column <- function(name, type) {
-    c(type, unlist(lapply(history$batches, function(batch) batch[[name]])))[seq_len(n)]
+    c(type, unlist(lapply(batches, function(batch) batch[[name]])))
   }
-  data.frame(
-    episode = seq_len(n),
+  episodes <- data.frame(
+    candidate = column("candidate", integer()),
+    episode = column("episode", integer()),
     seed = column("seed", integer()),
     sub_env = column("sub_env", integer()),
     return = column("return", numeric()),
@@ -16,34 +17,50 @@ episodes_table <- function(history, n = history$begun) {
     terminated = column("terminated", logical()),
     truncated = column("truncated", logical())
   )
+  if (several) episodes else episodes[-1L]
 }
 
-#' Put the steps of a history into a table, episode after episode
+#' Put the steps of batches into a table, episode after episode
+#' @param episodes The table of their episodes.
+#' @param next_observation Whether the table has the observation after each step, too.
 #' @noRd
-steps_table <- function(history, episodes, vector_env) {
-  steps <- do.call(c, lapply(history$batches, function(batch) {
-    lapply(batch$steps, function(step) c(list(episode = batch$episodes[step$sub_env]), step))
-  }))
+steps_table <- function(batches, episodes, vector_env, several = FALSE, next_observation = FALSE) {
+  steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
   column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
   values <- function(name, space) bind_batches(space, lapply(steps, function(step) step[[name]]))
   observed <- vector_env$observation_space
-  observations <- observation_columns(
-    observed, values("observation", observed), vector_env$spec$id
-  )
+  named <- function(name) {
+    observation_columns(observed, values(name, observed), vector_env$spec$id)
+  }
   acted <- vector_env$action_space
-  actions <- value_columns(acted, values("action", acted), "action")
-  episode <- column("episode")
-  # Stable, so that an episode's steps stay in their order.
-  by_episode <- order(episode, method = "radix")
   columns <- c(
-    list(episode = episode), observations, actions,
+    named("observation"), value_columns(acted, values("action", acted), "action"),
     list(
       reward = as.numeric(column("reward")), terminated = column("terminated"),
       truncated = column("truncated")
-    )
+    ),
+    if (next_observation) {
+      after <- named("next_observation")
+      stats::setNames(after, paste0("next_", names(after)))
+    }
   )
+  # Stable, so that an episode's steps stay in their order.
+  by_episode <- order(step_rows(batches), method = "radix")
   columns <- lapply(columns, `[`, by_episode)
   columns$truncated[cumsum(episodes$length)] <- episodes$truncated
-  step <- list(step = sequence(episodes$length))
-  data.frame(append(columns, step, after = 1L), check.names = FALSE)
+  of_step <- rep(seq_along(episodes$length), episodes$length)
+  keys <- list(
+    candidate = if (several) episodes$candidate[of_step], episode = episodes$episode[of_step],
+    step = sequence(episodes$length)
+  )
+  data.frame(c(keys[lengths(keys) > 0L], columns), check.names = FALSE)
+}
+
+# For each step, in the order in which they were played, the row of its episode in the table of
+# episodes.
+step_rows <- function(batches) {
+  before <- c(0L, cumsum(vapply(batches, function(batch) length(batch$episode), 0L)))
+  unlist(lapply(seq_along(batches), function(i) {
+    before[[i]] + unlist(lapply(batches[[i]]$steps, function(step) step$at))
+  }))
 }

@@ -27,9 +27,7 @@ policy_candidates <- function(policy, weights) {
   }
   check_candidate_weights(weights, sum(lengths(policy$weights)))
   storage.mode(weights) <- "double"
-  structure(
-    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
-  )
+  new_candidates(policy, weights)
 }
 
 check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {

@@ -19,15 +19,21 @@ check_takes_observations <- function(policy, arg, call) {
 #' A function that cannot answer about a single observation would otherwise fail only when a single
 #' episode is left and most has been played. Where a single episode is played, the first step asks
 #' about a single observation anyway.
-#' @param observation The first observations, one for each of the sub-environments `playing`.
+#' @param candidate Which of several policies is asked about each of the observations.
+#' @param observation The first observations.
 #' @noRd
-ask_beforehand <- function(policy, observation, playing, vector_env) {
-  if (!is.function(policy) || length(playing) == 1L) {
-    return(invisible())
+ask_beforehand <- function(policy, candidate, observation, vector_env) {
+  for (i in which(!duplicated(candidate))) {
+    policy_asked <- policy_subset(policy, candidate[[i]])
+    if (is.function(policy_asked) && sum(candidate == candidate[[i]]) > 1L) {
+      ask_about_one(policy_asked, batch_rows(vector_env$observation_space, observation, i), vector_env)
+    }
   }
-  one <- batch_rows(vector_env$observation_space, observation, 1L)
+}
+
+ask_about_one <- function(policy, one, vector_env) {
   tryCatch(
-    keep_random_state(act_batch(policy, one, playing[[1L]], vector_env)),
+    keep_random_state(act_batch(policy, one, 1L, vector_env)),
     gym_error = function(cnd) rlang::cnd_signal(cnd),
     error = function(cnd) {
       gym_abort(
@@ -43,7 +49,6 @@ ask_beforehand <- function(policy, observation, playing, vector_env) {
       )
     }
   )
-  invisible()
 }
 
 #' Convert what a function returned to the form of a batch of actions

@@ -1,7 +1,7 @@
 # From a batch of observations to what a model predicts, and from there to actions.
 
 #' @exportS3Method
-act_batch.gym_policy_model <- function(policy, observation, playing, vector_env) {
+act_batch.gym_policy_model <- function(policy, observation, n, vector_env) {
   columns <- observation_columns(policy$observation_space, observation, policy$env_id)
   model_actions(policy, columns, vector_env$call)
 }

@@ -161,7 +161,7 @@ act.gym_policy_network <- function(policy, observation, ...) {
 }
 
 #' @exportS3Method
-act_batch.gym_policy_network <- function(policy, observation, playing, vector_env) {
+act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
   outputs <- network_outputs(policy, number_rows(observation))
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }

@@ -72,8 +72,8 @@ act.gym_policy_random <- function(policy, observation, ...) {
 }
 
 #' @exportS3Method
-act_batch.gym_policy_random <- function(policy, observation, playing, vector_env) {
-  sample_batch(policy$action_space, length(playing))
+act_batch.gym_policy_random <- function(policy, observation, n, vector_env) {
+  sample_batch(policy$action_space, n)
 }
 
 #' @exportS3Method

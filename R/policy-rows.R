@@ -1,36 +1,82 @@
-# Candidates: networks of the same sizes with different weights, which play in the same batch.
+# Several policies that play in the same batch, the candidates: networks of the same sizes with
+# different weights, or a list of policies of any kind.
 
-#' Make one policy of several candidates
+#' Give the policy of some candidates
 #'
-#' @param policies A list of networks that differ only in their weights.
-#' @param candidate For each sub-environment the place in the list of the network that plays there.
-#' @return A policy for [act_batch()]: the network itself where there is only one.
+#' @param candidates Their numbers, in increasing order.
+#' @return A policy that has these candidates alone; of a single one the policy itself.
 #' @noRd
-candidates_of <- function(policies, candidate) {
-  if (length(policies) == 1L) {
-    return(policies[[1L]])
+policy_subset <- function(policy, candidates) UseMethod("policy_subset")
+
+#' @exportS3Method
+policy_subset.default <- function(policy, candidates) policy
+
+#' @exportS3Method
+policy_subset.gym_policy_candidates <- function(policy, candidates) {
+  policy$weights <- policy$weights[candidates, , drop = FALSE]
+  if (nrow(policy$weights) == 1L) {
+    with_weights(policy$policy, policy$weights[1L, ])
+  } else {
+    policy
   }
-  layers <- lapply(seq_along(policies[[1L]]$weights), function(layer) {
-    rows <- lapply(policies, function(policy) as.vector(policy$weights[[layer]]))
-    do.call(rbind, rows)[candidate, , drop = FALSE]
-  })
+}
+
+#' @exportS3Method
+policy_subset.gym_policy_list <- function(policy, candidates) {
+  policies <- unclass(policy)[candidates]
+  if (length(policies) == 1L) policies[[1L]] else policy_list(policies)
+}
+
+#' Give the policy that acts for rows of observations
+#'
+#' @param candidate Which candidate acts for each row.
+#' @return A policy for [act_batch()].
+#' @noRd
+policy_rows <- function(policy, candidate) UseMethod("policy_rows")
+
+#' @exportS3Method
+policy_rows.default <- function(policy, candidate) policy
+
+# How many candidates there are, `NULL` for a policy that is none of several.
+count_candidates <- function(policy) {
+  if (inherits(policy, "gym_policy_candidates")) {
+    nrow(policy$weights)
+  } else if (inherits(policy, "gym_policy_list")) {
+    length(policy)
+  }
+}
+
+# Networks -----------------------------------------------------------------------------
+
+new_candidates <- function(policy, weights) {
   structure(
-    list(policy = policies[[1L]], layers = layers),
-    class = c("gym_policy_rows", "gym_policy")
+    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
   )
 }
 
 #' @exportS3Method
-act_batch.gym_policy_rows <- function(policy, observation, playing, vector_env) {
+policy_bind.gym_policy_candidates <- function(policy, env, call = rlang::caller_env()) {
+  policy$policy <- policy_bind(policy$policy, env, call)
+  policy
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_candidates <- function(policy, candidate) {
   network <- policy$policy
+  ends <- cumsum(lengths(network$weights))
+  layers <- Map(
+    function(from, to) policy$weights[candidate, from:to, drop = FALSE],
+    c(0L, ends[-length(ends)]) + 1L, ends
+  )
+  structure(list(network = network, layers = layers), class = c("gym_policy_rows", "gym_policy"))
+}
+
+#' @exportS3Method
+act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
+  network <- policy$network
   signal <- network_inputs(network$observation_space, number_rows(observation))
-  all_play <- length(playing) == nrow(policy$layers[[1L]])
   for (layer in seq_along(policy$layers)) {
-    weights <- policy$layers[[layer]]
-    if (!all_play) {
-      weights <- weights[playing, , drop = FALSE]
-    }
-    signal <- activate(sum_weighted(signal, weights), network$activation[[layer]])
+    signal <- activate(sum_weighted(signal, policy$layers[[layer]]), network$activation[[layer]])
   }
   network_action(network$action_space, signal, network, one = FALSE)
 }
@@ -49,4 +95,42 @@ sum_weighted <- function(signal, weights) {
   sums <- .rowSums(terms, n * outputs, inputs)
   dim(sums) <- c(n, outputs)
   sums
+}
+
+# Lists --------------------------------------------------------------------------------
+
+policy_list <- function(policies) {
+  structure(policies, class = c("gym_policy_list", "gym_policy"))
+}
+
+#' @exportS3Method
+policy_bind.gym_policy_list <- function(policy, env, call = rlang::caller_env()) {
+  policy_list(lapply(unclass(policy), policy_bind, env = env, call = call))
+}
+
+#' @export
+format.gym_policy_list <- function(x, ...) {
+  paste0(length(x), " policies: ", paste(vapply(unclass(x), policy_text, ""), collapse = "; "))
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_list <- function(policy, candidate) {
+  structure(
+    list(policies = unclass(policy), rows = split(seq_along(candidate), candidate)),
+    class = c("gym_policy_list_rows", "gym_policy")
+  )
+}
+
+#' @exportS3Method
+act_batch.gym_policy_list_rows <- function(policy, observation, n, vector_env) {
+  observed <- vector_env$observation_space
+  actions <- Map(
+    function(candidate, rows) {
+      own <- batch_rows(observed, observation, rows)
+      act_batch(policy$policies[[candidate]], own, length(rows), vector_env)
+    },
+    as.integer(names(policy$rows)), policy$rows
+  )
+  together <- bind_batches(vector_env$action_space, actions)
+  batch_rows(vector_env$action_space, together, order(unlist(policy$rows)))
 }

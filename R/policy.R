@@ -110,6 +110,20 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   invisible(x)
 }
 
+# A policy, or a list of policies, which become candidates.
+check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!is.list(x) || is.object(x)) {
+    return(check_policy(x, arg, call))
+  }
+  if (!length(x)) {
+    abort_argument(x, "a policy, or a list of at least one", arg, call)
+  }
+  for (i in seq_along(x)) {
+    check_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
+  }
+  policy_list(x)
+}
+
 abort_no_policy <- function(x, arg, call) {
   own <- if (is.object(x)) class(x)[[1L]]
   gym_abort(
@@ -173,21 +187,21 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
   )
 }
 
-#' Choose an action for each sub-environment that is playing
+#' Choose an action for each of many observations
 #'
 #' @param policy A policy that is bound to the environment.
-#' @param observation A batch of observations, one for each of the sub-environments `playing`.
-#' @param playing The numbers of these sub-environments.
-#' @param vector_env As [vector_env_of()] returns it.
-#' @return A batch of actions, one for each of these sub-environments.
+#' @param observation A batch of observations.
+#' @param n How many observations there are.
+#' @param vector_env As [as_vector_env()] returns it.
+#' @return A batch of actions, one for each observation.
 #' @noRd
-act_batch <- function(policy, observation, playing, vector_env) UseMethod("act_batch")
+act_batch <- function(policy, observation, n, vector_env) UseMethod("act_batch")
 
 #' @exportS3Method
-act_batch.default <- function(policy, observation, playing, vector_env) {
+act_batch.default <- function(policy, observation, n, vector_env) {
   plain <- is.function(policy) && !has_act_method(policy)
   actions <- if (plain) policy(observation) else act(policy, observation)
-  batch_actions(actions, length(playing), vector_env)
+  batch_actions(actions, n, vector_env)
 }
 
 # Observations as rows of numbers -------------------------------------------------

@@ -31,10 +31,7 @@ search_arguments <- function(env, settings) {
   double <- function(x) if (!is.null(x)) as.numeric(x)
   list(
     env = environment_traits(env),
-    policy = keep_random_state({
-      set.seed(1, "Mersenne-Twister", "Inversion", "Rejection")
-      policy_resample(settings$policy)
-    }),
+    policy = with_generator(new_generator(1), policy_resample(settings$policy)),
     rounds = settings$rounds, episodes = settings$episodes,
     target = double(settings$target), max_steps = double(settings$max_steps),
     seed = double(settings$seed)
@@ -121,18 +118,12 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
 # Resuming -------------------------------------------------------------------------
 
 #' Go on with a search from its file
-#'
-#' R's generator goes on from where the file has it, too.
 #' @noRd
 resume_history <- function(history, saved, vector_env, settings, path, call) {
   check_same_server(path, saved$server, settings_of_server(vector_env, settings), call)
   restore_history(history, saved)
-  finished <- count_finished(history)
+  finished <- length(history$means)
   inform_resumed("Going on from {.path {path}}, with {finished} of {settings$rounds} round{?s}.")
-  # The state is NULL if the session had drawn nothing and the search had not begun.
-  if (!is.null(saved$generator)) {
-    restore_random_state(saved$generator)
-  }
 }
 
 # Settings that the server decides, beside the arguments.
@@ -144,16 +135,13 @@ settings_of_server <- function(vector_env, settings) {
 }
 
 #' Put the history of a search back to where its file has it
-#' @param history As [new_candidates()] returns it.
+#' @param history As [new_candidate_history()] returns it.
 #' @return The history, with what was played.
 #' @noRd
 restore_history <- function(history, saved) {
-  there <- saved$history
-  for (name in c("wanted", "begun", "policies", "returns", "means", "unfinished")) {
-    history[[name]] <- there[[name]]
-  }
-  history$batches <- list(list2env(there$episodes, parent = emptyenv()))
-  report_finished(history)
+  list2env(saved$history, history)
+  history$streams <- restore_streams(saved$streams)
+  history$on_finished(length(history$means), history$best$mean)
   history
 }
 
@@ -170,14 +158,13 @@ finished_search <- function(saved, settings, client, path) {
   )
   settings[names(saved$server)] <- saved$server
   settings["client"] <- list(client)
-  settings$policy <- saved$template
-  if (is.null(settings$seed)) {
-    # The generator's state after the search.
-    restore_random_state(saved$generator)
-  }
-  history <- new_candidates(settings$rounds, settings$episodes, settings$target, function(...) NULL)
+  settings$policy <- saved$policy
+  settings$seed <- saved$seed
+  history <- new_candidate_history(
+    settings$rounds, settings$episodes, settings$target, NULL, function(...) NULL
+  )
   restore_history(history, saved)
-  new_search(history, settings, proc.time()[["elapsed"]] - saved$elapsed)
+  new_search(history, saved$template, settings, proc.time()[["elapsed"]] - saved$elapsed)
 }
 
 # Writing --------------------------------------------------------------------------
@@ -191,22 +178,23 @@ rest_per_writing <- 9
 #' The file is written anew after each batch of episodes. It grows, and where a batch is a single
 #' episode, writing might take longer than playing: then it is not written after each batch, and
 #' the episodes since the last time would be played again.
-#' @param history As [new_candidates()] returns it.
+#' @param history As [new_candidate_history()] returns it.
+#' @param template The policy of which candidates are drawn, bound to the environment.
 #' @param started When the search began, minus the time that it took before.
 #' @noRd
-keep_history <- function(history, checkpoint, vector_env, settings, started, call) {
-  write <- function(history) {
+keep_history <- function(history, template, checkpoint, vector_env, settings, started, call) {
+  write <- function() {
     state <- list(
       arguments = checkpoint$arguments, server = settings_of_server(vector_env, settings),
-      template = settings$policy, history = saved_history(history),
-      generator = globalenv()$.Random.seed, elapsed = proc.time()[["elapsed"]] - started,
-      finished = history$begun >= history$wanted
+      policy = settings$policy, template = template, seed = settings$seed,
+      history = saved_history(history), streams = saved_streams(history$streams),
+      elapsed = proc.time()[["elapsed"]] - started, finished = is_finished(history)
     )
     write_checkpoint(checkpoint$path, state)
   }
   if (is.null(checkpoint$saved)) {
     tryCatch(
-      write(history),
+      write(),
       error = function(cnd) {
         abort_checkpoint(checkpoint$path, "cannot be written", conditionMessage(cnd), call)
       }
@@ -214,13 +202,13 @@ keep_history <- function(history, checkpoint, vector_env, settings, started, cal
   }
   rest_until <- -Inf
   failed <- FALSE
-  history$after_batch <- function(history) {
+  history$keep <- function() {
     began <- proc.time()[["elapsed"]]
-    if (vector_env$batch_size == 1L && began < rest_until && history$begun < history$wanted) {
+    if (vector_env$batch_size == 1L && began < rest_until && !is_finished(history)) {
       return()
     }
     tryCatch(
-      write(history),
+      write(),
       error = function(cnd) {
         # A full disk must not end a search that has played for hours.
         if (!failed) warn_not_written(checkpoint$path, cnd)
@@ -232,6 +220,10 @@ keep_history <- function(history, checkpoint, vector_env, settings, started, cal
   }
 }
 
+is_finished <- function(history) {
+  history$ended || length(history$means) >= history$candidates
+}
+
 warn_not_written <- function(path, cnd) {
   rlang::warn(
     c(paste0("The checkpoint \"", path, "\" cannot be written; the search goes on without."),
@@ -240,20 +232,13 @@ warn_not_written <- function(path, cnd) {
   )
 }
 
-# The file is written between batches, when no episode is under way. It has the policies that the
-# result or the next batch needs.
+# The file is written between batches, when no episode is under way.
 saved_history <- function(history) {
-  finished <- count_finished(history)
-  policies <- history$policies
-  needless <- setdiff(seq_len(finished), which.max(history$means[seq_len(finished)]))
-  policies[needless] <- list(NULL)
-  columns <- c("seed", "sub_env", "return", "length", "terminated", "truncated")
-  episodes <- lapply(stats::setNames(nm = columns), function(name) {
+  columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
+               "truncated")
+  together <- lapply(stats::setNames(nm = columns), function(name) {
     unlist(lapply(history$batches, function(batch) batch[[name]]))
   })
-  list(
-    wanted = history$wanted, begun = history$begun, policies = policies,
-    returns = history$returns, means = history$means,
-    unfinished = history$unfinished, episodes = episodes
-  )
+  kept <- c("played_batches", "means", "unfinished", "best", "weights", "ended", "seeds")
+  c(mget(kept, history), list(batches = list(together)))
 }

@@ -20,9 +20,8 @@
 #' All networks play episodes of the same seeds, so that neighbours differ by their
 #' weights and not by chance. For that each sub-environment must have a seed of its own: an
 #' environment named by its id is made so. One that is given with sub-environments that share a seed
-#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) begins each batch of
-#' episodes in the same way, but the networks of a batch play different ones; the
-#' element `common` of the result is `FALSE` then.
+#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) plays different
+#' episodes for each network; the element `common` of the result is `FALSE` then.
 #'
 #' @param search A search, as [search_random()] returns it. An environment that was given to it
 #'   as an object has to be open still.
@@ -75,18 +74,18 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   check_count(episodes)
   check_seed(seed)
   check_flag(progress)
+  streams <- new_streams(seed %||% draw_seed())
+  directions <- with_generator(streams$agent, draw_directions(search$policy$weights))
+  plane <- new_plane(search$policy, directions, size, span)
   env <- search$env %||% search$env_id
-  play <- function(vector_env) {
-    with_random_seed(seed, {
-      directions <- draw_directions(search$policy$weights)
-      plane <- new_plane(search$policy, directions, size, span)
-      play_plane(vector_env, plane, search, as.integer(episodes), progress)
-    })
+  if (!is_playable(env)) {
+    env <- make_seeded_sub_envs(env, as.numeric(size)^2 * episodes, client)
+    on.exit(close_or_warn(env))
   }
-  with_vector_env(
-    env, as.numeric(size)^2 * episodes, client, play, make = make_seeded_vector_env,
-    batch_size = NULL
-  )
+  play <- function(vector_env) {
+    play_plane(vector_env, plane, search, as.integer(episodes), streams, progress)
+  }
+  with_vector_env(env, as.numeric(size)^2 * episodes, play)
 }
 
 check_odd <- function(size, call = rlang::caller_env()) {
@@ -126,7 +125,7 @@ as_long_as <- function(direction, layer) {
   direction * (sqrt(rowSums(layer^2)) / sqrt(rowSums(direction^2)))
 }
 
-# A list: `grid`, the points, and `policies`, the network at each of them.
+# A list: `grid`, the points, and `policy`, the networks at them as candidates.
 new_plane <- function(policy, directions, size, span) {
   steps <- span * seq(-1, 1, length.out = size)
   # The middle is exactly the best policy, without a rounding error.
@@ -137,9 +136,10 @@ new_plane <- function(policy, directions, size, span) {
       function(layer, first, second) layer + a * first + b * second,
       policy$weights, directions[[1L]], directions[[2L]]
     )
-    policy
+    weight_vector(policy)
   }
-  list(grid = grid, policies = Map(move, grid$a, grid$b), directions = directions)
+  weights <- do.call(rbind, Map(move, grid$a, grid$b))
+  list(grid = grid, policy = new_candidates(policy, weights), directions = directions)
 }
 
 # Playing it ----------------------------------------------------------------------
@@ -149,50 +149,45 @@ new_plane <- function(policy, directions, size, span) {
 landscape_sub_envs <- 128L
 
 # Each sub-environment has a seed of its own, so that all networks can play the same episodes.
-make_seeded_vector_env <- function(env_id, episodes, client) {
+make_seeded_sub_envs <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_sub_envs))
-  make_if_supported(env_id, n, "sync", "Disabled", client) %||% gym_make(env_id, client = client)
+  if_supported(
+    make_unseeded(
+      env_id, num_envs = n, vectorization_mode = "sync", autoreset_mode = "Disabled",
+      client = client
+    )
+  ) %||% make_unseeded(env_id, client = client)
 }
 
 #' Play the episodes of all points, side by side
 #' @return As [search_landscape()].
 #' @noRd
-play_plane <- function(vector_env, plane, search, episodes, progress) {
+play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
   started <- proc.time()[["elapsed"]]
   points <- nrow(plane$grid)
-  show <- function(finished, best) NULL
-  if (progress) {
-    bar <- progress_bar(points, "Network")
-    show <- function(finished, best) bar(finished)
-  }
-  history <- new_candidates(points, episodes, target = NULL, on_finished = show)
-  history$unfinished <- rep(episodes, points)
-  common <- is.null(vector_env$num_envs)
-  seeds <- if (common) draw_environment_seeds(episodes) else vector_env$draw_seeds()
-  begin <- function(batch, numbers) {
-    point <- candidate_of(history, numbers)
-    list(
-      seeds = if (common) {
-        rep_len(seeds[(numbers - 1L) %% episodes + 1L], vector_env$batch_size)
-      } else {
-        seeds
-      },
-      policy = candidates_of(plane$policies[unique(point)], match(point, unique(point)))
-    )
-  }
-  interrupted <- until_interrupted(
-    play_episodes(vector_env, history, begin, search$max_steps),
-    "Interrupted after {finished} of {total} network{?s}; the rest of the landscape is empty.",
-    function() count_finished(history), points
+  show <- if (progress) progress_bar(points, "Network") else function(finished) NULL
+  history <- new_candidate_history(
+    points, episodes, target = NULL, streams, function(finished, best) show(finished),
+    common_seeds = TRUE
   )
-  finished <- seq_len(count_finished(history))
+  interrupted <- until_interrupted(
+    play_batches(
+      vector_env, history, function(candidates) policy_subset(plane$policy, candidates),
+      after = enter_returns, max_steps = search$max_steps %||% Inf
+    ),
+    "Interrupted after {finished} of {total} network{?s}; the rest of the landscape is empty.",
+    function() length(history$means), points
+  )
+  finished <- seq_along(history$means)
   plane$grid$mean_return <- NA_real_
-  plane$grid$mean_return[finished] <- history$means[finished]
+  plane$grid$mean_return[finished] <- history$means
   structure(
     list(
       grid = plane$grid, best = plane$grid$mean_return[[(points + 1L) / 2L]],
       directions = plane$directions, policy = search$policy, env_id = search$env_id,
-      target = search$target, episodes = episodes, seeds = unique(seeds), common = common,
+      target = search$target, episodes = episodes,
+      seeds = unique(unlist(lapply(history$batches, function(batch) batch$seed))),
+      common = !vector_env$one_seed,
       elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted
     ),
     class = "gym_landscape"

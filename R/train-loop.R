@@ -39,106 +39,64 @@ settings_in <- function(vector_env, settings) {
 #' @noRd
 play_search <- function(vector_env, template, settings, progress, call, checkpoint = NULL) {
   started <- proc.time()[["elapsed"]]
-  show <- function(finished, best) NULL
-  if (progress) {
-    bar <- progress_bar(settings$rounds, "Round", "best mean return -, ")
-    show <- function(finished, best) {
-      bar(finished, paste0("best mean return ", number_text(best), ", "))
-    }
-  }
-  history <- new_candidates(settings$rounds, settings$episodes, settings$target, show)
+  show <- search_progress(settings$rounds, progress)
+  history <- new_candidate_history(
+    settings$rounds, settings$episodes, settings$target, new_streams(settings$seed), show
+  )
+  finished <- function() length(history$means)
   if (!is.null(checkpoint)) {
     saved <- checkpoint$saved
     if (!is.null(saved)) {
-      settings$policy <- saved$template
       started <- started - saved$elapsed
       resume_history(history, saved, vector_env, settings, checkpoint$path, call)
     }
-    keep_history(history, checkpoint, vector_env, settings, started, call)
-  }
-  begin <- function(batch, episodes) {
-    list(seeds = vector_env$draw_seeds(), policy = draw_policies(history, template, episodes))
+    keep_history(history, template, checkpoint, vector_env, settings, started, call)
   }
   interrupted <- tryCatch(
     until_interrupted(
-      play_episodes(vector_env, history, begin, settings$max_steps),
+      play_batches(
+        vector_env, history, function(candidates) draw_candidates(history, template, candidates),
+        after = after_search_batch,
+        report = function(ended) {
+          show(finished() + (length(history$unfinished) + ended) %/% history$episodes,
+               history$best$mean)
+        },
+        max_steps = settings$max_steps %||% Inf, target = settings$target
+      ),
       "The search was interrupted after {finished} of {total} round{?s};
        it returns what it has so far.",
-      function() count_finished(history), settings$rounds
+      finished, settings$rounds
     ),
     error = function(cnd) {
       abort_search(
-        cnd, new_search(history, settings, started), call, checkpoint = checkpoint$path
+        cnd, new_search(history, template, settings, started), call, checkpoint = checkpoint$path
       )
     }
   )
-  new_search(history, settings, started, interrupted)
+  new_search(history, template, settings, started, interrupted)
 }
 
-#' Play until the end or an interrupt
-#'
-#' @param play Code that plays.
-#' @param text A message for an interrupt, for cli, with `{finished}` and `{total}`.
-#' @param count_finished A function that returns how many of the `total` are finished.
-#' @return Whether there was an interrupt, logical.
-#' @noRd
-until_interrupted <- function(play, text, count_finished, total) {
-  tryCatch(
-    {
-      play
-      FALSE
-    },
-    interrupt = function(cnd) {
-      finished <- count_finished()
-      cli::cli_inform(c("!" = text), class = "gym_message_interrupted")
-      TRUE
-    }
-  )
+after_search_batch <- function(history, played) {
+  history$ended <- enter_returns(history, played)
+  history$keep()
+  history$ended
 }
 
-#' Show a progress bar until the calling function ends
-#'
-#' @param unit What is counted, a word such as `"Round"`.
-#' @param note What stands before the time that is left.
-#' @return A function of how many are finished and the new `note`.
-#' @noRd
-progress_bar <- function(total, unit, note = "", frame = parent.frame()) {
-  bar <- cli::cli_progress_bar(
-    total = total,
-    format = paste(
-      unit, "{cli::pb_current} of {cli::pb_total} {cli::pb_bar}",
-      "{cli::pb_extra$note}{cli::pb_eta_str}"
-    ),
-    extra = list(note = note),
-    .envir = frame
-  )
-  function(finished, note = "") {
-    cli::cli_progress_update(
-      id = bar, set = finished, extra = list(note = note), .envir = frame
-    )
+# A function of how many rounds have finished and the best mean return so far, `NULL` for none.
+search_progress <- function(rounds, progress, frame = parent.frame()) {
+  if (!progress) {
+    return(function(finished, best) NULL)
+  }
+  bar <- progress_bar(rounds, "Round", "best mean return -, ", frame)
+  function(finished, best) {
+    bar(finished, paste0("best mean return ", if (is.null(best)) "-" else number_text(best), ", "))
   }
 }
 
-# The error keeps the classes and fields of the one in the middle: code that expects a lost
-# connection need not know that it was lost in a search.
 abort_search <- function(cnd, result, call, played = count_of(nrow(result$rounds), "round"),
                          checkpoint = NULL) {
-  own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
-           "use_cli_format")
-  fields <- unclass(cnd)[setdiff(names(cnd), own)]
-  rlang::exec(
-    gym_abort,
-    c(
-      paste0("The search ended early, after ", played, "."),
-      i = "What was played is the element `result` of this condition.",
-      i = if (!is.null(checkpoint)) {
-        paste0("The same call goes on from \"", checkpoint, "\" when what is wrong is fixed.")
-      }
-    ),
-    class = c("gym_error_search", grep("^gym_error_", class(cnd), value = TRUE)),
-    result = result,
-    !!!fields,
-    parent = cnd,
-    call = call
-  )
+  hint <- if (!is.null(checkpoint)) {
+    paste0("The same call goes on from \"", checkpoint, "\" when what is wrong is fixed.")
+  }
+  abort_with_result(cnd, "The search", result, played, "gym_error_search", call, hint)
 }

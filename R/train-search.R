@@ -2,21 +2,19 @@
 
 #' Make a result of a search
 #'
-#' @param history Its candidates, as [new_candidates()] keeps them. Only those count before which
-#'   none is unfinished.
+#' @param history Its candidates, as [new_candidate_history()] keeps them. Those that have finished
+#'   count.
+#' @param template The policy of which they were drawn, bound to the environment.
 #' @noRd
-new_search <- function(history, settings, started, interrupted = FALSE) {
-  n <- count_finished(history)
-  episodes <- search_episodes_table(history, n)
-  rounds <- rounds_table(history, episodes, n)
-  best <- which.max(rounds$mean_return)
-  found <- length(best) == 1L
+new_search <- function(history, template, settings, started, interrupted = FALSE) {
+  episodes <- search_episodes_table(history)
+  best <- history$best
   structure(
     list(
-      policy = if (found) history$policies[[best]],
-      solved = found && reaches(rounds$mean_return[[best]], settings$target),
-      round = if (found) best else NA_integer_,
-      rounds = rounds,
+      policy = if (!is.null(best)) with_weights(template, best$weights),
+      solved = !is.null(best) && reaches(best$mean, settings$target),
+      round = if (is.null(best)) NA_integer_ else as.integer(best$candidate),
+      rounds = rounds_table(history, episodes),
       episodes = episodes,
       target = settings$target,
       env_id = settings$env_id,
@@ -34,16 +32,17 @@ new_search <- function(history, settings, started, interrupted = FALSE) {
   )
 }
 
-search_episodes_table <- function(history, n) {
-  episodes <- episodes_table(history, n * history$episodes_each)
-  episodes$episode <- rep(seq_len(history$episodes_each), n)
-  data.frame(round = rep(seq_len(n), each = history$episodes_each), episodes)
+search_episodes_table <- function(history) {
+  episodes <- episodes_table(history$batches, several = TRUE)
+  names(episodes)[[1L]] <- "round"
+  episodes[seq_len(length(history$means) * history$episodes), ]
 }
 
-rounds_table <- function(history, episodes, n) {
-  steps <- colSums(matrix(episodes$length, ncol = n))
+rounds_table <- function(history, episodes) {
+  rounds <- length(history$means)
+  steps <- colSums(matrix(episodes$length, ncol = rounds))
   data.frame(
-    round = seq_len(n), mean_return = history$means[seq_len(n)], steps = as.integer(steps)
+    round = seq_len(rounds), mean_return = history$means, steps = as.integer(steps)
   )
 }
 

@@ -23,7 +23,7 @@ test_that("weights that do not fit are refused", {
   policy <- policy_network(c(4, 2, 1))
   set <- function(value) coef(policy) <- value
   expect_error(set(1:9),
-               "`value` must be a vector of 10 numbers, not an integer vector of length 9", fixed = TRUE,
+               "must be a vector of 10 numbers, not an integer vector of length 9", fixed = TRUE,
                class = "gym_error_argument")
   expect_error(set(c(1:9, NA)), "without missing values", class = "gym_error_argument")
   expect_error(set(c(1:9, NaN)), "without missing values", class = "gym_error_argument")

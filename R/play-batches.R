@@ -1,0 +1,108 @@
+# How many episodes of many candidates are cut into batches, and played batch after batch.
+#
+# The rule: episodes are taken candidate after candidate. A batch has as many whole candidates as
+# there is room for, and at least one; a candidate with more episodes than that is cut into batches
+# of its own. How much room there is (`batch_size`) depends on the environment: 256 episodes where
+# Gymnasium or a vectorised environment in R plays all at once, 16 elsewhere, and for an environment
+# that was given as an object as many as it has sub-environments. An environment that remembers
+# something over episodes plays all of them in one batch.
+#
+# So how many cores there are, who plays a batch and how long it takes never decide what is played.
+
+#' Cut episodes into batches
+#'
+#' @param batch_size How many episodes make a batch, `Inf` for all.
+#' @param candidates,episodes How many candidates there are, and how many episodes each plays.
+#' @return A function of the number of a batch, which returns a list with an element for each of its
+#'   episodes in `candidate` and `episode` (integers), and `NULL` after the last batch.
+#' @noRd
+cut_batches <- function(batch_size, candidates, episodes) {
+  if (episodes <= batch_size) {
+    per_batch <- min(candidates, batch_size %/% episodes)
+    function(batch) {
+      first <- (batch - 1) * per_batch + 1
+      if (first <= candidates) {
+        numbers <- as.integer(seq(first, min(candidates, first + per_batch - 1)))
+        list(
+          candidate = rep(numbers, each = episodes),
+          episode = rep(seq_len(episodes), length(numbers))
+        )
+      }
+    }
+  } else {
+    pieces <- ceiling(episodes / batch_size)
+    function(batch) {
+      candidate <- as.integer((batch - 1) %/% pieces + 1)
+      first <- ((batch - 1) %% pieces) * batch_size + 1
+      if (candidate <= candidates) {
+        numbers <- as.integer(seq(first, min(episodes, first + batch_size - 1)))
+        list(candidate = rep(candidate, length(numbers)), episode = numbers)
+      }
+    }
+  }
+}
+
+#' Make an empty history of batches
+#'
+#' @param candidates,episodes How many candidates there are, and how many episodes each plays.
+#' @param streams As [new_streams()] makes them.
+#' @param common_seeds Whether all candidates begin their episodes with the same seeds, where each
+#'   episode has a seed of its own.
+#' @return An environment: these, and `batches`, what [play_batch()] returned for each batch so far.
+#' @noRd
+new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
+  rlang::env(
+    candidates = candidates, episodes = as.integer(episodes), streams = streams,
+    common_seeds = common_seeds, seeds = NULL, played_batches = 0, batches = list()
+  )
+}
+
+#' Play batches until all episodes have been played
+#'
+#' @param history As [new_history()] returns it. It has the batches that were played also when an
+#'   error or an interrupt ends the playing.
+#' @param policy_of A function of the numbers of the candidates of a batch, which returns the policy
+#'   that plays it; `candidate` then counts from 1 in this policy.
+#' @param after A function that is called when a batch was played, with the history and what came of
+#'   the batch. It returns `TRUE` when no more need be played.
+#' @param report A function that is called with how many episodes have ended in the present batch.
+#' @param ... Further arguments of [play_batch()].
+#' @noRd
+play_batches <- function(vector_env, history, policy_of, after = function(history, played) FALSE,
+                         report = function(ended) NULL, ...) {
+  batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size
+  cut <- cut_batches(batch_size, history$candidates, history$episodes)
+  while (!is.null(episodes <- cut(history$played_batches + 1))) {
+    episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
+    stream <- take_stream(history$streams)
+    # The policy of a batch has its candidates alone.
+    candidates <- unique(episodes$candidate)
+    policy <- policy_of(candidates)
+    numbers <- episodes$candidate
+    episodes$candidate <- match(numbers, candidates)
+    played <- play_batch(
+      vector_env, policy, episodes, stream, each = history$episodes, report = report, ...
+    )
+    played$candidate <- candidates[played$candidate]
+    history$batches[[length(history$batches) + 1L]] <- played
+    history$played_batches <- history$played_batches + 1
+    if (after(history, played)) {
+      break
+    }
+  }
+}
+
+# Where one generator serves all sub-environments, those that begin together share a seed.
+draw_episode_seeds <- function(vector_env, history, episodes) {
+  draw <- function(n) with_generator(history$streams$seeds, draw_environment_seeds(n))
+  n <- length(episodes$episode)
+  if (vector_env$one_seed) {
+    at_once <- vector_env$num_envs
+    rep(draw(ceiling(n / at_once)), each = at_once, length.out = n)
+  } else if (history$common_seeds) {
+    history$seeds <- history$seeds %||% draw(history$episodes)
+    history$seeds[episodes$episode]
+  } else {
+    draw(n)
+  }
+}
