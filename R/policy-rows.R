@@ -46,6 +46,16 @@ count_candidates <- function(policy) {
   }
 }
 
+# Their names, which must tell them apart; `NULL` where they have none.
+candidate_names <- function(policy) {
+  names <- if (inherits(policy, "gym_policy_candidates")) {
+    rownames(policy$weights)
+  } else if (inherits(policy, "gym_policy_list")) {
+    names(policy)
+  }
+  if (length(names) && all(nzchar(names)) && !anyDuplicated(names)) names
+}
+
 # Networks -----------------------------------------------------------------------------
 
 new_candidates <- function(policy, weights) {
@@ -110,7 +120,13 @@ policy_bind.gym_policy_list <- function(policy, env, call = rlang::caller_env())
 
 #' @export
 format.gym_policy_list <- function(x, ...) {
-  paste0(length(x), " policies: ", paste(vapply(unclass(x), policy_text, ""), collapse = "; "))
+  few <- unclass(x)[seq_len(min(length(x), 4L))]
+  texts <- vapply(few, policy_text, "")
+  if (!is.null(candidate_names(x))) {
+    texts <- paste0(names(few), " (", texts, ")")
+  }
+  more <- if (length(x) > 4L) paste0("; and ", length(x) - 4L, " more")
+  paste0(length(x), if (length(x) == 1L) " policy: " else " policies: ", paste(texts, collapse = "; "), more)
 }
 
 #' @exportS3Method
