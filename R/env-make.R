@@ -28,6 +28,10 @@
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
 #'   after how many steps its episodes are cut off, instead of its own limit; -1 for none.
+#' @param seed The seed of the first reset that is given none, and of the sampling of actions: a
+#'   whole number of at least 0, for a vector environment also one for each sub-environment, see
+#'   [env_reset()]. `NULL`, the default, draws one from R's generator, so that [set.seed()] fixes
+#'   it.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
@@ -157,11 +161,15 @@ server_env <- R6Class(
     reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()
       check_flag(return_info)
-      reset_instance(self$client, private$instance, seed, options, return_info, mask)
+      reset_instance(
+        self$client, private$instance, seed, options, return_info, mask, named = TRUE
+      )
     },
     step = function(action, which = NULL) {
       private$check_open()
-      step_instance(private$connected, private$instance, action, render = FALSE, which)
+      step_instance(
+        private$connected, private$instance, action, render = FALSE, which, named = TRUE
+      )
     },
     render = function(which = 1) {
       private$check_open()

@@ -29,9 +29,7 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
   column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
   values <- function(name, space) bind_batches(space, lapply(steps, function(step) step[[name]]))
   observed <- vector_env$observation_space
-  named <- function(name) {
-    observation_columns(observed, values(name, observed), vector_env$spec$id)
-  }
+  named <- function(name) observation_columns(observed, values(name, observed))
   acted <- vector_env$action_space
   columns <- c(
     named("observation"), value_columns(acted, values("action", acted), "action"),

@@ -2,7 +2,7 @@
 
 #' @exportS3Method
 act_batch.gym_policy_model <- function(policy, observation, n, vector_env) {
-  columns <- observation_columns(policy$observation_space, observation, policy$env_id)
+  columns <- observation_columns(policy$observation_space, observation)
   model_actions(policy, columns, vector_env$call)
 }
 
@@ -40,7 +40,7 @@ observed_columns <- function(policy, observation, call) {
     one <- rows$one
     observation <- shape_values(as.vector(t(rows$values)), c(nrow(rows$values), space$shape))
   }
-  list(columns = observation_columns(space, observation, policy$env_id), one = one)
+  list(columns = observation_columns(space, observation), one = one)
 }
 
 abort_unplayed <- function(policy, call) {

@@ -8,10 +8,10 @@
 #' @export
 predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object, newdata, type, object$env_id)
+  predict_policy(object, newdata, type)
 }
 
-predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
+predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   if (inherits(policy, "gym_policy_model")) {
     return(predict_model(policy, newdata, type, call))
   }
@@ -22,7 +22,7 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
   }
-  observation <- observations_from(newdata, policy, env_id, call)
+  observation <- observations_from(newdata, policy, call)
   if (type == "action") {
     return(act(policy, observation))
   }
@@ -33,14 +33,12 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
 
 # The observations in a data frame: the columns with their names, or all columns where it has none
 # of these names.
-observations_from <- function(newdata, policy, env_id, call) {
+observations_from <- function(newdata, policy, call) {
   if (!is.data.frame(newdata)) {
     return(newdata)
   }
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  size <- if (discrete) 1L else policy$sizes[[1L]]
-  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
-  names <- observation_names(env_id, columns)
+  names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
   if (any(names %in% names(newdata))) {
     absent <- setdiff(names, names(newdata))
     if (length(absent)) {

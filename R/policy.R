@@ -74,7 +74,8 @@ act.function <- function(policy, observation, ...) {
   if (!is.atomic(observation) || !is.null(dim(observation))) {
     return(policy(observation))
   }
-  action <- policy(matrix(observation, nrow = 1L))
+  row <- matrix(observation, nrow = 1L, dimnames = list(NULL, names(observation)))
+  action <- policy(row)
   if (is.list(action)) {
     return(action)
   }
