@@ -16,8 +16,15 @@ look_at_environment <- function(check, seed) {
   }
   second <- play_and_look(check, seed + 1)
   look_at_end(check, list(first, second))
-  look_at_repetition(check, first, seed)
-  look_beyond_end(check, first, seed)
+  remembers <- intersect(check$env$spec$wrappers, remembering_wrappers)
+  if (length(remembers)) {
+    note_finding(check, "seeds", paste0(
+      remembers[[1L]], " remembers earlier episodes: the same seed gives other numbers later."
+    ), severity = "note")
+  } else {
+    look_at_repetition(check, first, seed)
+    look_at_reset_without_seed(check, seed)
+  }
   look_at_render(check, seed)
 }
 
@@ -211,24 +218,26 @@ look_at_step <- function(check, out, place) {
          " there is none.")
   }
   n <- check$env[["num_envs"]] %||% 1L
-  element <- function(name, fits, must) {
-    if (!name %in% absent && !fits) {
-      note(name, "`", name, "` must be ", must, if (n > 1L) " for each sub-environment",
-           ", and is ", describe_argument(out[[name]]), " in ", place, ".")
+  rules <- list(
+    reward = list(are_rewards, "one finite number"), terminated = list(are_flags, "TRUE or FALSE"),
+    truncated = list(are_flags, "TRUE or FALSE"),
+    info = list(function(x, n) is.null(x) || is.list(x), "a list")
+  )
+  for (name in setdiff(names(rules), absent)) {
+    if (!rules[[name]][[1L]](out[[name]], n)) {
+      note(name, "`", name, "` must be ", rules[[name]][[2L]],
+           if (n > 1L && name != "info") " for each sub-environment", ", and is ",
+           describe_argument(out[[name]]), " in ", place, ".")
     }
   }
-  reward <- out$reward
-  element("reward", is.numeric(reward) && length(reward) == n && all(is.finite(reward)),
-          "one finite number")
-  for (flag in flags) {
-    element(flag, is.logical(out[[flag]]) && length(out[[flag]]) == n && !anyNA(out[[flag]]),
-            "TRUE or FALSE")
-  }
-  element("info", is.null(out$info) || is.list(out$info), "a list")
   if (!"observation" %in% absent) {
     look_at_observation(check, "step", out$observation, paste("The observation of", place))
   }
 }
+
+are_rewards <- function(x, n) is.numeric(x) && length(x) == n && all(is.finite(x))
+
+are_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 
 # The end -------------------------------------------------------------------------------
 
@@ -251,19 +260,19 @@ look_at_end <- function(check, episodes) {
 
 # A step after the end may be an error or have any result, but the next episode must not depend on
 # it.
-look_beyond_end <- function(check, first, seed) {
-  if (!first$ended) {
+look_beyond_end <- function(check, episode, seed) {
+  if (!episode$ended) {
     return()
   }
   env <- check$env
-  action <- first$actions[[length(first$actions)]]
+  action <- episode$actions[[length(episode$actions)]]
   tryCatch(suppressWarnings(env$step(action)), error = function(cnd) NULL)
   place <- paste0("`reset(seed = ", seed, ")` after a step beyond the end of an episode")
   again <- call_and_look(check, "reset", place, env$reset(seed = seed))
-  if (!has_raised(again) && !identical(again, first$observation) && !is_noted(check, "seeds")) {
+  if (!has_raised(again) && !identical(again, episode$observation) && !is_noted(check, "seeds")) {
     note_finding(check, "end", paste0(
       place, " gives another first observation than before: ",
-      difference_text(again, first$observation), "."
+      difference_text(again, episode$observation), "."
     ))
   }
 }
@@ -275,17 +284,14 @@ is_noted <- function(check, topic) {
 # Seeds ---------------------------------------------------------------------------------
 
 look_at_repetition <- function(check, first, seed) {
-  remembers <- intersect(check$env$spec$wrappers, remembering_wrappers)
-  if (length(remembers)) {
-    note_finding(check, "seeds", paste0(
-      remembers[[1L]], " remembers earlier episodes: the same seed gives other numbers later."
-    ), severity = "note")
-    return()
-  }
   again <- play_and_look(check, seed, first$actions)
   if (!is.null(again)) {
     look_at_difference(check, first, again, seed)
+    look_beyond_end(check, again, seed)
   }
+}
+
+look_at_reset_without_seed <- function(check, seed) {
   # The seed that an environment was made with may be that of its first `reset()` without one.
   call_and_look(check, "reset", "`reset()` without a seed", check$env$reset())
   following <- lapply(1:2, function(time) {
@@ -361,6 +367,8 @@ look_at_render <- function(check, seed) {
 can_be_drawn <- function(env) {
   if (inherits(env, "gym_server_env")) {
     known_instance(env$client, env$instance_id)$draws
+  } else if (inherits(env, "gym_r_env")) {
+    !is.null(sub_env_of(env)$render)
   } else {
     is.function(env[["render"]])
   }

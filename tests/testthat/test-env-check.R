@@ -79,7 +79,7 @@ test_that("an observation that does not fit its space is found", {
   far <- walk()
   reset <- far$reset
   far$reset <- function(seed = NULL) reset(seed) + 7
-  expect_finding(far, "reset", "The first observation, 7, does not fit the space <Discrete 5>")
+  expect_finding(far, "reset", "The first observation, 10, does not fit the space <Discrete 5>")
   env <- steps_with(function(env, out) {
     out$observation <- c(out$observation, 1)
     out
@@ -93,8 +93,9 @@ test_that("an observation that does not fit its space is found", {
 })
 
 test_that("what a step must not return is found", {
-  expect_finding(steps_with(function(env, out) "far"), "step",
-                 "`step()` must return a list, and returned \"far\" in step 1 of the", max_steps = 5)
+  check <- check_env(steps_with(function(env, out) "far"), max_steps = 5)
+  expect_identical(check$severity, c("wrong", "note"))
+  expect_match(check$finding[[1]], "must return a list, and returned \"far\" in step 1 of the")
   for (name in c("observation", "reward", "terminated", "truncated")) {
     env <- steps_with(function(env, out) out[names(out) != name])
     check <- check_env(env, max_steps = 5)
