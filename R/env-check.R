@@ -56,6 +56,12 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     check_environment(env)
   }
   check <- rlang::env(env = env, found = list(), lengths = integer(), limit = max_steps)
+  if (inherits(env, "gym_r_env")) {
+    check$env <- without_checks(env)
+    # It must be reset before it is played again.
+    sub_env <- sub_env_of(env)
+    on.exit(sub_env$taken <- NA_integer_, add = TRUE)
+  }
   keep_random_state(look_at_environment(check, seed))
   new_check(check)
 }

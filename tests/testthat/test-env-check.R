@@ -242,3 +242,68 @@ test_that("what is no environment is an error, and arguments that cannot be used
   expect_error(check_env(walk(), max_steps = 0), "`max_steps`", class = "gym_error_argument")
   expect_error(check_env(walk(), seed = -1), "`seed`", class = "gym_error_argument")
 })
+
+# Environments written in R, which check themselves what they return ----------------------
+
+corridor <- function(reset = NULL, step = NULL, ...) {
+  gym_env(
+    reset %||% function(self) self$position <- sample.int(3, 1),
+    step %||% function(self, action) {
+      self$position <- self$position + sample.int(2, 1) - 1
+      list(observation = self$position, reward = -1, terminated = self$position == 4)
+    },
+    observation_space = space_discrete(5), action_space = space_discrete(2), id = "Corridor", ...
+  )
+}
+
+test_that("nothing is found in an environment written in R in which nothing is wrong", {
+  expect_identical(nrow(check_env(corridor())), 0L)
+  expect_identical(nrow(check_env(corridor(render = function(self) plot(self$position)))), 0L)
+  limited <- corridor(max_episode_steps = 2)
+  expect_identical(nrow(check_env(limited)), 0L)
+  expect_identical(max(attr(check_env(limited), "lengths")), 2L)
+})
+
+test_that("all mistakes of an environment written in R are found, not only the first", {
+  env <- corridor(
+    reset = function(self) self$position <- 17,
+    step = function(self, action) {
+      list(observation = 9, reward = NA, terminated = 0, truncated = TRUE, info = 1)
+    },
+    render = function(self) stop("no ink")
+  )
+  check <- check_env(env)
+  expect_identical(check$topic, c("reset", "step", "step", "step", "step", "render"))
+  expect_match(check$finding[[6]], "`render()` of Corridor raised an error: no ink.", fixed = TRUE)
+})
+
+test_that("an environment written in R must be reset after it was checked", {
+  env <- corridor()
+  check_env(env)
+  expect_error(env$step(1), "reset", class = "gym_error_argument")
+})
+
+test_that("an environment in R that remembers over episodes is found out", {
+  count <- 0
+  env <- corridor(reset = function(self) {
+    count <<- count + 1
+    self$position <- count %% 4
+  })
+  expect_finding(env, "seeds", "The same seed, 1, and the same actions gave different first")
+})
+
+test_that("the mistakes of vectorised functions are found", {
+  moves <- function(reward) {
+    gym_env(
+      function(self) self$at <- matrix(runif(2 * self$num_envs), ncol = 2),
+      function(self, action) {
+        self$at <- pmin(self$at + 0.1, 1)
+        list(observation = self$at, reward = reward(self$num_envs), terminated = self$at[, 1] == 1)
+      },
+      observation_space = space_box(0, 1, 2), action_space = space_discrete(2),
+      vectorized = TRUE, num_envs = 3
+    )
+  }
+  expect_identical(nrow(check_env(moves(function(n) rep(1, n)))), 0L)
+  expect_finding(moves(function(n) 1), "step", "`reward` must be one finite number for each")
+})
