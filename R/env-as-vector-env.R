@@ -65,6 +65,9 @@ as_vector_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALS
 as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
                                     client = gym_client()) {
   check_environment(x)
+  if (is_registered(x)) {
+    return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
+  }
   env <- make_vector_env(x, num_envs, list(...), max_envs, frames, client)
   vector_env <- vector_env_of(env, frames, batch_size = num_envs %||% sync_sub_envs)
   vector_env$close <- function(wait = TRUE) {
@@ -226,11 +229,20 @@ single_env <- function(env) {
 independent_sub_envs <- function(env) {
   n <- env$num_envs
   space <- env$single_observation_space
-  # The seeds of those that play; the others begin as they like.
+  was_reset <- FALSE
+  # The first time all are reset, because the others have no episode yet; and so it is always with
+  # an environment of the user's, which need not know masks.
   reset <- function(seeds, which) {
-    seed <- rep(seeds, length.out = n)
+    some <- was_reset && length(which) < n && inherits(env, "gym_server_env")
+    seed <- rep(if (some) NA_real_ else seeds, length.out = n)
     seed[which] <- seeds
-    batch_rows(space, env$reset(seed = seed), which)
+    observation <- if (some) {
+      env$reset(seed = seed, mask = seq_len(n) %in% which)
+    } else {
+      env$reset(seed = seed)
+    }
+    was_reset <<- TRUE
+    batch_rows(space, observation, which)
   }
   list(
     observation_space = space, action_space = env$single_action_space, num_envs = n,
@@ -260,10 +272,13 @@ joint_sub_envs <- function(env) {
     if (length(which) == n) {
       return(out)
     }
+    # The two are nearly always the same, which identical() sees at once.
+    same <- identical(out$observation, out$next_observation)
+    observation <- batch_rows(observed, out$observation, which)
     list(
-      observation = batch_rows(observed, out$observation, which), reward = out$reward[which],
+      observation = observation, reward = out$reward[which],
       terminated = out$terminated[which], truncated = out$truncated[which],
-      next_observation = batch_rows(observed, out$next_observation, which)
+      next_observation = if (same) observation else batch_rows(observed, out$next_observation, which)
     )
   }
   reset <- if (one_seed) {

@@ -28,6 +28,10 @@
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
 #'   after how many steps its episodes are cut off, instead of its own limit; -1 for none.
+#' @param seed The seed of the first reset that is given none, and of the sampling of actions: a
+#'   whole number of at least 0, for a vector environment also one for each sub-environment, see
+#'   [env_reset()]. `NULL`, the default, draws one from R's generator, so that [set.seed()] fixes
+#'   it.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
@@ -93,6 +97,13 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
                           autoreset_mode = NULL, name = NULL, call = rlang::caller_env()) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1", call)
+  if (is_registered(env_id)) {
+    return(make_registered_env(
+      env_id, kwargs, seed, num_envs, render_mode = render_mode, wrappers = wrappers,
+      vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
+      call = call
+    ))
+  }
   check_client(client, call = call)
   env <- NULL
   instance_id <- NULL

@@ -3,9 +3,17 @@
 
 check_observation <- function(task, observation, where, call) {
   space <- task$observation_space
+  if (is.atomic(observation) && is.null(dim(observation))) {
+    # As the batch that it makes alone, which is checked more quickly.
+    alone <- observation
+    dim(alone) <- if (length(space$shape) == 1L) c(1L, length(alone))
+    if (task$fits_observations(alone, 1L)) {
+      return(invisible())
+    }
+  }
   tryCatch(
     check_value(space, observation, "", NULL, bounds = TRUE),
-    gym_error_space = function(cnd) abort_observation(cnd, space, where, call)
+    gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
   )
 }
 
@@ -18,12 +26,12 @@ check_observations <- function(task, observations, which, where, call) {
     space <- task$observation_space
     tryCatch(
       check_batch(space, batch_space(space, n), observations, n, NULL, which, bounds = TRUE),
-      gym_error_space = function(cnd) abort_observation(cnd, space, where, call)
+      gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
 }
 
-abort_observation <- function(cnd, space, where, call) {
+refuse_observation <- function(cnd, space, where, call) {
   gym_abort(
     c(
       paste0(where, " returned an observation that is not in its space ", format(space), "."),
@@ -73,6 +81,28 @@ step_place <- function(sub_env, sub_env_number = NULL) {
 
 # Everything but the observation.
 check_step_parts <- function(out, n, where, call) {
+  check_step_names(out, where, call)
+  must_be <- function(name, one, each) {
+    wanted <- if (n == 1L) one else paste(each, n, "sub-environments")
+    problem <- paste0(where, " returned a `", name, "` that is ", describe_argument(out[[name]]),
+                      ", and not ", wanted)
+    abort_step(problem, out, call)
+  }
+  if (!is_reward(out$reward, n)) {
+    must_be("reward", "one number", "a number for each of")
+  }
+  if (!is_flags(out$terminated, n)) {
+    must_be("terminated", "TRUE or FALSE", "TRUE or FALSE for each of")
+  }
+  if (!is.null(out$truncated) && !is_flags(out$truncated, n)) {
+    must_be("truncated", "TRUE or FALSE", "TRUE or FALSE for each of")
+  }
+  if (!is.null(out$info) && !is.list(out$info)) {
+    must_be("info", "a list", "a list for")
+  }
+}
+
+check_step_names <- function(out, where, call) {
   if (!is.list(out)) {
     abort_step(paste0(where, " returned ", describe_argument(out), ", which is no list"), out, call)
   }
@@ -82,26 +112,11 @@ check_step_parts <- function(out, n, where, call) {
     problem <- paste0(where, " returned a list without `", absent[[1L]], "`", has)
     abort_step(problem, out, call)
   }
-  must_be <- function(name, what) {
-    each <- if (n == 1L) what[[1L]] else paste(what[[2L]], n, "sub-environments")
-    problem <- paste0(where, " returned a `", name, "` that is ", describe_argument(out[[name]]),
-                      ", and not ", each)
-    abort_step(problem, out, call)
-  }
-  if (!is_reward(out$reward, n)) {
-    must_be("reward", c("one number", "a number for each of"))
-  }
-  for (flag in c("terminated", if (!is.null(out$truncated)) "truncated")) {
-    if (!is.logical(out[[flag]]) || length(out[[flag]]) != n || anyNA(out[[flag]])) {
-      must_be(flag, c("TRUE or FALSE", "TRUE or FALSE for each of"))
-    }
-  }
-  if (!is.null(out$info) && !is.list(out$info)) {
-    must_be("info", c("a list", "a list for"))
-  }
 }
 
 is_reward <- function(x, n) (is.numeric(x) || is.logical(x)) && length(x) == n && !anyNA(x)
+
+is_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 
 abort_step <- function(problem, out, call) {
   gym_abort(

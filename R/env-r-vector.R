@@ -1,8 +1,7 @@
 # Environments written in R as vector environments, in which episodes are played.
 
-# How many sub-environments, and so how many episodes of a batch, there are where nobody chose. These
-# numbers must not depend on how many episodes are asked for: then the first episodes are the same
-# however many follow.
+# How many episodes make a batch where nobody chose. These numbers must not depend on how many
+# episodes are asked for: then the first episodes are the same however many follow.
 r_sub_envs <- 16L
 vectorized_sub_envs <- 256L
 
@@ -125,37 +124,40 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
 #' @return A function of a list of results. It returns `NULL` where one of them may be wrong.
 #' @noRd
 result_stacker <- function(task) {
-  stack <- observation_stacker(task$observation_space)
+  space <- task$observation_space
+  stack <- observation_stacker(space)
+  if (is.null(stack)) {
+    return(function(outs) NULL)
+  }
   function(outs) {
     n <- length(outs)
-    if (is.null(stack) || !all(vapply(outs, is.list, NA))) {
+    if (!all(vapply(outs, is.list, NA))) {
       return(NULL)
     }
-    reward <- stack_singles(outs, "reward", n)
-    terminated <- stack_singles(outs, "terminated", n)
-    truncated <- stack_singles(outs, "truncated", n) %||% (
-      if (!length(unlist(lapply(outs, .subset2, "truncated")))) logical(n)
-    )
-    if (!is_reward(reward, n) || !is_flags(terminated, n) || !is_flags(truncated, n)) {
-      return(NULL)
+    reward <- stack_singles(outs, "reward")
+    terminated <- stack_singles(outs, "terminated")
+    truncated <- stack_singles(outs, "truncated", optional = TRUE)
+    good <- is_reward(reward, n) && is_flags(terminated, n) && is_flags(truncated, n)
+    observation <- if (good) stack(lapply(outs, .subset2, "observation"), n)
+    if (!is.null(observation) && task$fits_observations(observation, n)) {
+      list(
+        observation = tidy_batch(space, observation),
+        reward = as.numeric(reward), terminated = terminated, truncated = truncated
+      )
     }
-    observation <- stack(lapply(outs, .subset2, "observation"), n)
-    if (is.null(observation) || !task$fits_observations(observation, n)) {
-      return(NULL)
-    }
-    list(
-      observation = tidy_batch(task$observation_space, observation),
-      reward = as.numeric(reward), terminated = terminated, truncated = truncated
-    )
   }
 }
 
-stack_singles <- function(outs, name, n) {
+# NULL where one of them is not single. Where all lack what is optional all are FALSE.
+stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
-  if (all(lengths(each) == 1L)) unlist(each, use.names = FALSE)
+  length_of <- lengths(each)
+  if (all(length_of == 1L)) {
+    unlist(each, use.names = FALSE)
+  } else if (optional && all(length_of == 0L)) {
+    logical(length(outs))
+  }
 }
-
-is_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 
 # NULL for spaces whose values have to be looked at one by one.
 observation_stacker <- function(space) {

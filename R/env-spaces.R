@@ -128,11 +128,19 @@ close_quietly <- function(env) tryCatch(env$close(), gym_error = function(cnd) N
 
 check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
-  if (!named && !is_playable(x) && !inherits(x, "gym_wrapped")) {
+  if (!named && !is_playable(x) && !has_vector_env_method(x)) {
     must <- "the id of an environment or an environment made by `gym_make()`"
     abort_argument(x, must, arg, call)
   }
   invisible(x)
+}
+
+# Is there a method of `as_vector_env()` for the object's own class?
+has_vector_env_method <- function(x) {
+  methods <- lapply(if (is.object(x)) .class2(x), function(class) {
+    utils::getS3method("as_vector_env", class, optional = TRUE)
+  })
+  !all(vapply(methods, is.null, NA))
 }
 
 is_playable <- function(x) {

@@ -180,7 +180,7 @@ new_rollout <- function(history, policy, vector_env, seed, keep_steps, next_obse
   structure(
     list(
       episodes = episodes,
-      steps = if (keep_steps) {
+      steps = if (keep_steps && nrow(episodes)) {
         steps_table(history$batches, episodes, vector_env, several, next_observation)
       },
       frames = if (!is.null(vector_env$frame)) {

@@ -18,8 +18,8 @@ quick_check.gym_space_discrete <- function(space) {
   low <- bounds$low
   high <- bounds$high
   function(values, n) {
-    length(values) == n && is_plain(values) && is.null(dim(values)) && min(values) >= low &&
-      max(values) <= high && (!is.double(values) || all(values == trunc(values)))
+    length(values) == n && is.null(dim(values)) && is_plain(values) &&
+      min(values) >= low && max(values) <= high && is_all_whole(values)
   }
 }
 
@@ -30,10 +30,8 @@ quick_check.gym_space_array <- function(space) {
   takes_logical <- space$dtype == "bool" || space$name %in% c("MultiBinary", "MultiDiscrete")
   must_be_whole <- space$dtype %in% integer_dtypes
   function(values, n) {
-    is_plain(values) && (!is.logical(values) || takes_logical) &&
-      has_batch_shape(values, n, shape) &&
-      (length(values) == 0L || is_within(values, n)) &&
-      (!must_be_whole || !is.double(values) || all(values == trunc(values)))
+    is_plain(values, takes_logical) && has_batch_shape(values, n, shape) &&
+      is_within(values, n) && (!must_be_whole || is_all_whole(values))
   }
 }
 
@@ -57,8 +55,12 @@ quick_check.gym_space_tuple <- function(space) {
 #' @exportS3Method
 quick_check.gym_space_dict <- quick_check.gym_space_tuple
 
-# Numbers without a class, none of them missing.
-is_plain <- function(x) (is.numeric(x) || is.logical(x)) && !is.object(x) && !anyNA(x)
+# Numbers without a class, at least one and none of them missing.
+is_plain <- function(x, takes_logical = TRUE) {
+  (is.numeric(x) || takes_logical && is.logical(x)) && length(x) > 0L && !is.object(x) && !anyNA(x)
+}
+
+is_all_whole <- function(x) !is.double(x) || all(x == trunc(x))
 
 has_batch_shape <- function(values, n, shape) {
   if (length(shape) == 0L || is.null(dim(values))) {

@@ -20,9 +20,8 @@
 #' All networks play episodes of the same seeds, so that neighbours differ by their
 #' weights and not by chance. For that each sub-environment must have a seed of its own: an
 #' environment named by its id is made so. One that is given with sub-environments that share a seed
-#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) begins each batch of
-#' episodes in the same way, but the networks of a batch play different ones; the
-#' element `common` of the result is `FALSE` then.
+#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) plays different
+#' episodes for each network; the element `common` of the result is `FALSE` then.
 #'
 #' @param search A search, as [search_random()] returns it. An environment that was given to it
 #'   as an object has to be open still.
@@ -79,7 +78,7 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   directions <- with_generator(streams$agent, draw_directions(search$policy$weights))
   plane <- new_plane(search$policy, directions, size, span)
   env <- search$env %||% search$env_id
-  if (!is_playable(env)) {
+  if (!is_playable(env) && !is_registered(env)) {
     env <- make_seeded_sub_envs(env, as.numeric(size)^2 * episodes, client)
     on.exit(close_or_warn(env))
   }

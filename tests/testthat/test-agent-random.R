@@ -67,19 +67,44 @@ test_that("each round draws fresh weights, the first too", {
   expect_true(all(abs(weights) <= 1))
 })
 
-test_that("set.seed() alone fixes a search, and seed = gives the same", {
-  figures <- function(search) search[c("policy", "rounds", "episodes", "round")]
+test_that("set.seed() alone fixes a search, whose seed gives it again and moves no generator", {
+  figures <- function(search) search[c("policy", "rounds", "episodes", "round", "seed")]
   env <- fake_environment(reward = first_action)
   set.seed(5)
-  beforehand <- figures(search_random(env, rounds = 4))
-  set.seed(99)
+  first <- figures(search_random(env, rounds = 4))
+  set.seed(5)
+  expect_identical(figures(search_random(env, rounds = 4)), first)
   state <- .Random.seed
-  expect_identical(figures(search_random(env, rounds = 4, seed = 5)), beforehand)
+  expect_identical(figures(search_random(env, rounds = 4, seed = first$seed)), first)
   expect_identical(.Random.seed, state)
   # A template's own weights make no difference, wherever they were drawn.
   policy <- policy_network()
-  expect_identical(figures(search_random(env, policy, rounds = 4, seed = 5)), beforehand)
-  expect_false(identical(figures(search_random(env, rounds = 4, seed = 6)), beforehand))
+  expect_identical(figures(search_random(env, policy, rounds = 4, seed = first$seed)), first)
+  expect_false(identical(figures(search_random(env, rounds = 4, seed = 6)), first))
+})
+
+test_that("a search draws one number from the session's generator, the policy in its call none", {
+  env <- fake_environment(reward = first_action)
+  set.seed(5)
+  draw_seed()
+  wanted <- .Random.seed
+  set.seed(5)
+  search_random(env, policy_network(), rounds = 2)
+  expect_identical(.Random.seed, wanted)
+})
+
+test_that("a seed means one search under every RNGkind()", {
+  env <- fake_environment(reward = first_action)
+  withr::local_preserve_seed()
+  play <- function(...) {
+    suppressWarnings(RNGkind(...))
+    search_random(env, rounds = 3, target = Inf, seed = 1)[c("policy", "episodes")]
+  }
+  first <- play("Mersenne-Twister", "Inversion", "Rejection")
+  expect_identical(play("Wichmann-Hill", "Box-Muller", "Rounding"), first)
+  expect_identical(play("Marsaglia-Multicarry", "Ahrens-Dieter"), first)
+  expect_identical(play("L'Ecuyer-CMRG", "Kinderman-Ramage"), first)
+  expect_identical(RNGkind()[1:2], c("L'Ecuyer-CMRG", "Kinderman-Ramage"))
 })
 
 test_that("a shorter search is the beginning of a longer one", {

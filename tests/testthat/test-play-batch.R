@@ -116,7 +116,8 @@ test_that("max_steps cuts short all episodes that have not ended", {
 
 test_that("fewer episodes are the beginning of more", {
   for (env in every_kind(4, ends = of_some_length, reward = by_action)) {
-    play <- function(n) rollout(env, policy_network(), episodes = n, seed = 1)$episodes
+    policy <- policy_network()
+    play <- function(n) rollout(env, policy, episodes = n, seed = 1)$episodes
     expect_identical(play(3), play(11)[1:3, ])
     expect_identical(play(6), play(11)[1:6, ])
   }

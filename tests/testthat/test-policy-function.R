@@ -142,10 +142,11 @@ test_that("asking a function beforehand moves no generator and is done once a ro
   asked <- 0L
   played <- rollout(fake_vector_env(2), draws, 6, seed = 1, steps = TRUE)
   expect_identical(asked, 3L * 3L + 1L)
-  set.seed(1)
-  replicate(3, draw_environment_seeds(2L))
-  expect_identical(played$steps$action, {
-    drawn <- replicate(9, sample(0:1, 2, replace = TRUE))
-    as.vector(aperm(array(drawn, c(2, 3, 3)), c(2, 1, 3)))
+  # Each batch draws from a stream of its own.
+  streams <- new_streams(1)
+  drawn <- lapply(1:3, function(batch) {
+    generator <- new_generator(stream = take_stream(streams))
+    with_generator(generator, t(replicate(3, sample(0:1, 2, replace = TRUE))))
   })
+  expect_identical(played$steps$action, unlist(drawn))
 })

@@ -17,7 +17,7 @@ play_mirror <- function(env, tensors) {
   instance$sends_tensors <- tensors && !empty
   seen <- list()
   problems <- character()
-  observation <- env$reset()
+  observation <- env$reset(seed = 1)
   repeat {
     seen[[length(seen) + 1L]] <- observation
     out <- env$step(observation)

@@ -46,17 +46,20 @@ test_that("rounds after one that has reached the target are not waited for", {
 
 test_that("a round may begin in one batch and end in another", {
   for (mode in modes) {
-    returns <- c(1, 2, 3, 4, 5, 21, 20, 20, 19, 20, 90)
-    env <- scripted_vector_env(4, returns, lengths = rep(c(3L, 1L), length.out = 11), mode)
+    # Each batch takes as many of these as there are sub-environments, and plays the first of them.
+    returns <- c(1, 2, 3, 4, 5, 0, 0, 0, 21, 20, 20, 19, 20, 0, 0, 0, 90)
+    env <- scripted_vector_env(4, returns, lengths = rep(c(3L, 1L), length.out = 17), mode)
     search <- search_random(env, rounds = 4, episodes = 5, target = 20)
     expect_identical(search$rounds$mean_return, c(3, 20))
-    expect_identical(search$episodes$return, returns[1:10])
-    expect_identical(search$episodes$sub_env, c(1:4, 1:4, 1:2))
+    expect_identical(search$episodes$return, returns[c(1:5, 9:13)])
+    expect_identical(search$episodes$sub_env, rep(c(1:4, 1L), 2))
+    expect_identical(search$round, 2L)
   }
 })
 
 test_that("without a target all rounds are played", {
-  env <- scripted_vector_env(4, returns = 1:9, lengths = rep(1:3, 3))
+  returns <- c(1:3, 0, 4:6, 0, 7:9, 0)
+  env <- scripted_vector_env(4, returns, lengths = rep(1:4, 3))
   search <- search_random(env, rounds = 3, episodes = 3)
   expect_identical(search$rounds$mean_return, c(2, 5, 8))
   expect_false(search$solved)
@@ -90,22 +93,9 @@ test_that("the policy returned is the one that was played in its round", {
   expect_identical(again, played$return)
 })
 
-test_that("set.seed() alone fixes a search in a vector environment, and seed = gives the same", {
-  play <- function(...) {
-    figures(search_random(fake_vector_env(8, "vector_entry_point", reward = first_action), ...))
-  }
-  set.seed(5)
-  beforehand <- play(rounds = 4)
-  set.seed(99)
-  state <- .Random.seed
-  expect_identical(play(rounds = 4, seed = 5), beforehand)
-  expect_identical(.Random.seed, state)
-  expect_false(identical(play(rounds = 4, seed = 6), beforehand))
-})
-
-test_that("an interrupt keeps the finished rounds up to the first unfinished one", {
-  play <- function(lengths, at) {
-    env <- scripted_vector_env(8, returns = 1:8, lengths = lengths)
+test_that("an interrupt keeps the rounds of the batches that were finished", {
+  play <- function(at) {
+    env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
     step <- env$step
     env$step <- function(...) {
       at <<- at - 1L
@@ -114,30 +104,22 @@ test_that("an interrupt keeps the finished rounds up to the first unfinished one
     }
     suppressMessages(search_random(env, rounds = 9, episodes = 2, target = Inf))
   }
-  search <- play(c(1, 2, 2, 1, 9, 1, 1, 1), at = 2)
+  # The first batch of two rounds takes two steps.
+  search <- play(at = 3)
   expect_true(search$interrupted)
   expect_identical(search$rounds$mean_return, c(1.5, 3.5))
   expect_identical(search$round, 2L)
-  none <- play(c(9, 1, 1, 1, 1, 1, 1, 1), at = 2)
+  none <- play(at = 1)
   expect_identical(nrow(none$rounds), 0L)
   expect_identical(nrow(none$episodes), 0L)
   expect_null(none$policy)
 })
 
-test_that("a target reached behind an unfinished round does not solve an interrupted search", {
-  env <- scripted_vector_env(4, returns = c(1, 1, 50, 50), lengths = c(9, 9, 1, 1))
-  step <- env$step
-  env$step <- function(...) if (env$sub_env_steps > 8L) rlang::interrupt() else step(...)
-  suppressMessages(search <- search_random(env, rounds = 9, episodes = 2, target = 20))
-  expect_false(search$solved)
-  expect_identical(nrow(search$rounds), 0L)
-})
-
 test_that("an error in the middle carries the rounds that were finished", {
-  env <- scripted_vector_env(8, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
+  env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
   step <- env$step
   env$step <- function(...) {
-    if (env$sub_env_steps > 10L) gym_abort("lost", class = "gym_error_connection")
+    if (env$sub_env_steps > 8L) gym_abort("lost", class = "gym_error_connection")
     step(...)
   }
   cnd <- tryCatch(search_random(env, episodes = 2, target = Inf), gym_error_search = identity)
@@ -146,32 +128,19 @@ test_that("an error in the middle carries the rounds that were finished", {
   expect_match(conditionMessage(cnd), "after 2 rounds")
 })
 
-test_that("the progress bar counts the rounds in their order", {
+test_that("the progress bar counts the rounds of a batch in their order, with the best so far", {
   env <- scripted_vector_env(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
   shown <- list()
-  history <- new_candidates(4L, 2L, NULL, function(finished, best) {
-    shown[[length(shown) + 1L]] <<- c(finished, best)
-  })
-  template <- policy_bind(policy_network(), vector_env_of(env))
-  begin <- function(batch, episodes) {
-    list(seeds = draw_environment_seeds(4L), policy = draw_policies(history, template, episodes))
-  }
-  play_episodes(vector_env_of(env), history, begin)
-  expect_identical(shown, list(c(2, 3.5), c(4, 7.5)))
-})
-
-test_that("an interrupt finds no round that has ended without a mean", {
-  history <- new_candidates(2, 1, NULL, function(finished, best) NULL)
-  history$unfinished <- c(1L, 1L)
-  rm("means", envir = history)
-  makeActiveBinding("means", function(value) {
-    if (missing(value)) numeric() else rlang::interrupt()
-  }, history)
-  interrupted <- tryCatch(
-    end_candidate_episodes(history, 1L, 5), interrupt = function(cnd) "interrupt"
+  local_functions(
+    progress_bar = function(...) {
+      function(finished, note) shown[[length(shown) + 1L]] <<- list(as.numeric(finished), note)
+    }
   )
-  expect_identical(interrupted, "interrupt")
-  expect_equal(count_finished(history), 0)
+  search_random(env, rounds = 4, episodes = 2, target = Inf, progress = TRUE)
+  finished <- vapply(shown, function(one) one[[1L]], 0)
+  expect_false(is.unsorted(finished))
+  expect_identical(shown[[length(shown)]], list(4, "best mean return 7.5, "))
+  expect_true(any(vapply(shown, identical, NA, list(2, "best mean return 3.5, "))))
 })
 
 test_that("there may be more rounds than R's integers count episodes", {

@@ -1,0 +1,86 @@
+test_that("an id is made as a vector environment, and closed by it", {
+  client <- local_server()
+  poles <- as_vector_env("CartPole-v1", client = client)
+  expect_s3_class(poles, "gym_vector_env")
+  expect_identical(poles$num_envs, 256L)
+  expect_identical(poles$batch_size, 256L)
+  expect_true(poles$one_seed)
+  expect_identical(dim(poles$reset(1)), c(256L, 4L))
+  out <- poles$step(c(1L, 0L), c(2L, 5L))
+  expect_identical(dim(out$observation), c(2L, 4L))
+  expect_identical(dim(out$next_observation), c(2L, 4L))
+  poles$close()
+  expect_length(env_list_all(client), 0)
+  lakes <- as_vector_env("FrozenLake-v1", max_envs = 3, is_slippery = FALSE, client = client)
+  expect_identical(lakes$num_envs, 3L)
+  expect_identical(lakes$batch_size, 16L)
+  expect_false(lakes$one_seed)
+  expect_identical(lakes$reset(1:3, 1:3), c(0L, 0L, 0L))
+  # 2 is to the right, 1 is down; the ice is not slippery.
+  expect_identical(lakes$step(c(2L, 1L), c(1L, 3L))$observation, c(1L, 4L))
+  lakes$close()
+  expect_length(env_list_all(client), 0)
+})
+
+test_that("a sub-environment may be reset alone, and the others take no step", {
+  lakes <- as_vector_env("FrozenLake-v1", num_envs = 3, is_slippery = FALSE, client = test_client())
+  withr::defer(lakes$close())
+  lakes$reset(1:3, 1:3)
+  lakes$step(c(2L, 2L, 2L), 1:3)
+  expect_identical(lakes$reset(7L, 2L), 0L)
+  expect_identical(lakes$step(c(2L, 2L, 2L), 1:3)$observation, c(2L, 1L, 2L))
+})
+
+test_that("what was made before is played as it is, and stays open", {
+  env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync")
+  seen <- as_vector_env(env)
+  expect_identical(seen$num_envs, 3L)
+  seen$close()
+  expect_true(env$is_open)
+  expect_error(as_vector_env(env, num_envs = 4), "`num_envs` is for an environment that is made",
+               class = "gym_error_argument")
+  expect_error(as_vector_env(1), class = "gym_error_argument")
+})
+
+test_that("what remembers earlier episodes has one sub-environment, and says what remembers", {
+  client <- test_client()
+  wrapped <- "CartPole-v1" |>
+    gym_wrap("NormalizeObservation") |>
+    gym_wrap("TimeLimit", max_episode_steps = 9)
+  seen <- as_vector_env(wrapped, client = client)
+  withr::defer(seen$close())
+  expect_identical(seen$remembers, "NormalizeObservation")
+  expect_identical(seen$num_envs, 1L)
+  made <- local_env(wrapped)
+  expect_identical(made$spec$wrappers, c("NormalizeObservation", "TimeLimit"))
+  expect_identical(as_vector_env(made)$remembers, "NormalizeObservation")
+})
+
+test_that("another class of environments is played by its own method", {
+  counter <- structure(list(), class = "a_counter")
+  as_counters <- function(x, num_envs = NULL, ...) {
+    at <- integer(2)
+    structure(
+      list(
+        observation_space = discrete_space(9L), action_space = discrete_space(2L),
+        spec = list(id = "Counter"), num_envs = 2L, batch_size = 2L, one_seed = FALSE,
+        remembers = character(), close = function(wait = TRUE) NULL,
+        reset = function(seeds, which) {
+          at[which] <<- 0L
+          at[which]
+        },
+        step = function(action, which) {
+          at[which] <<- at[which] + action
+          list(observation = at[which], reward = action, terminated = at[which] >= 3L,
+               truncated = logical(length(which)), next_observation = at[which])
+        }
+      ),
+      class = "gym_vector_env"
+    )
+  }
+  registerS3method("as_vector_env", "a_counter", as_counters, asNamespace("gym"))
+  played <- rollout(counter, function(observation) rep(1L, length(observation)), 5)
+  expect_identical(played$episodes$length, rep(3L, 5))
+  expect_identical(played$episodes$sub_env, c(1:2, 1:2, 1L))
+  expect_identical(played$env_id, "Counter")
+})

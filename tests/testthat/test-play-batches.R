@@ -1,0 +1,96 @@
+# The rule as a table: for each batch "candidate:episode ...".
+batches <- function(...) {
+  cut <- cut_batches(...)
+  found <- list()
+  while (!is.null(one <- cut(length(found) + 1))) {
+    found[[length(found) + 1L]] <- paste0(one$candidate, ":", one$episode, collapse = " ")
+  }
+  unlist(found)
+}
+
+test_that("a batch has as many whole candidates as there is room for", {
+  expect_identical(
+    batches(5, candidates = 5, episodes = 2),
+    c("1:1 1:2 2:1 2:2", "3:1 3:2 4:1 4:2", "5:1 5:2")
+  )
+  expect_identical(batches(16, candidates = 2, episodes = 1), "1:1 2:1")
+})
+
+test_that("a candidate with more episodes than a batch has is cut into batches of its own", {
+  expect_identical(
+    batches(2, candidates = 2, episodes = 3), c("1:1 1:2", "1:3", "2:1 2:2", "2:3")
+  )
+  expect_identical(batches(1, candidates = 1, episodes = 2), c("1:1", "1:2"))
+})
+
+test_that("what remembers is played in one batch", {
+  expect_identical(batches(Inf, candidates = 2, episodes = 2), "1:1 1:2 2:1 2:2")
+})
+
+test_that("the first batches are the same however many candidates there are", {
+  few <- batches(7, candidates = 5, episodes = 3)
+  many <- batches(7, candidates = 50, episodes = 3)
+  expect_identical(many[seq_len(2)], few[seq_len(2)])
+})
+
+# What a list of batches is made of when each is played in this order, some of them twice.
+play_in_order <- function(make, policy, order) {
+  env <- make()
+  vector_env <- as_vector_env(env)
+  vector_env$call <- rlang::current_env()
+  policy <- policy_bind(policy, vector_env)
+  cut <- cut_batches(vector_env$batch_size, 1L, 20L)
+  streams <- new_streams(1)
+  tasks <- list()
+  history <- new_history(1L, 20L, streams)
+  while (!is.null(episodes <- cut(length(tasks) + 1))) {
+    episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
+    tasks[[length(tasks) + 1L]] <- list(episodes = episodes, stream = take_stream(streams))
+  }
+  played <- vector("list", length(tasks))
+  for (i in order(rep(seq_along(tasks), length.out = length(tasks)))[order]) {
+    played[[i]] <- play_batch(
+      vector_env, policy, tasks[[i]]$episodes, tasks[[i]]$stream, keep_steps = TRUE
+    )
+  }
+  played
+}
+
+drawing <- function(observation) {
+  as.integer(stats::runif(nrow(observation)) < stats::plogis(observation[, 1]))
+}
+
+test_that("a batch is the same in whatever order batches are played, and when one is played again", {
+  ends <- function(seed, step, action) step == 1L + seed %% 7L
+  reward <- function(seed, step, action) seed %% 3 + 10 * action
+  for (mode in c("sync", "async", "vector_entry_point")) {
+    make <- function() fake_vector_env(4, mode, ends = ends, reward = reward)
+    wanted <- play_in_order(make, drawing, 1:5)
+    expect_identical(play_in_order(make, drawing, 5:1), wanted)
+    expect_identical(play_in_order(make, drawing, c(2, 2, 4, 1, 3, 4, 5, 1)), wanted)
+  }
+})
+
+test_that("so it is in Gymnasium's environments", {
+  client <- test_client()
+  for (mode in c("vector_entry_point", "sync")) {
+    env <- local_env("CartPole-v1", num_envs = 4, vectorization_mode = mode, client = client)
+    make <- function() env
+    wanted <- play_in_order(make, drawing, 1:5)
+    expect_identical(play_in_order(make, drawing, c(5, 3, 3, 1, 2, 4)), wanted)
+  }
+})
+
+test_that("a batch that was interrupted in the middle and played again is as if it had not been", {
+  ends <- function(seed, step, action) step == 1L + seed %% 7L
+  env <- fake_vector_env(4, ends = ends)
+  whole <- rollout(env, drawing, 8, seed = 1, steps = TRUE)
+  step <- env$step
+  left <- 3L
+  env$step <- function(...) {
+    left <<- left - 1L
+    if (left == 0L) rlang::interrupt() else step(...)
+  }
+  suppressMessages(rollout(env, drawing, 8, seed = 1, steps = TRUE))
+  expect_identical(rollout(env, drawing, 8, seed = 1, steps = TRUE), whole)
+})
