@@ -113,8 +113,8 @@ look_at_step <- function(check, out, place) {
   }
   n <- check$env[["num_envs"]] %||% 1L
   rules <- list(
-    reward = list(are_rewards, "one finite number"), terminated = list(are_flags, "TRUE or FALSE"),
-    truncated = list(are_flags, "TRUE or FALSE"),
+    reward = list(are_rewards, "one finite number"), terminated = list(is_flags, "TRUE or FALSE"),
+    truncated = list(is_flags, "TRUE or FALSE"),
     info = list(function(x, n) is.null(x) || is.list(x), "a list")
   )
   for (name in setdiff(names(rules), absent)) {
@@ -130,8 +130,6 @@ look_at_step <- function(check, out, place) {
 }
 
 are_rewards <- function(x, n) is.numeric(x) && length(x) == n && all(is.finite(x))
-
-are_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 
 # Environments written in R --------------------------------------------------------------
 

@@ -28,6 +28,20 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
   }
 }
 
+# The names of the wrappers that remember something over episodes. Then one sub-environment plays
+# all of them, or one vectorised environment.
+remembered_over_episodes <- function(task) {
+  as.character(intersect(task$spec$wrappers, remembering_wrappers))
+}
+
+check_wrappable <- function(env, call) {
+  if (!inherits(env, "gym_r_env")) {
+    must <- paste("the id of an environment, or one made by `gym_env()` or of a class that",
+                  "inherits from `GymEnv`")
+    abort_argument(env, must, "env_id", call)
+  }
+}
+
 # Around an object of a class of the user's.
 wrapped_env <- R6Class(
   "gym_wrapped_env",
@@ -191,12 +205,13 @@ wrap_normalize_reward <- function(task, gamma = 0.99, epsilon = 1e-8, call) {
     playing <- playing_sub_envs(n)
     discounted <- numeric(n)
     inner <- change_reward(inner, function(out) {
-      if (length(out$reward) != n || !are_flags(out$terminated, n)) {
+      if (length(out$reward) != n || !is_flags(out$terminated, n)) {
         return(out$reward)
       }
       # As in Gymnasium, the discounted sum of rewards begins anew after a terminated episode only.
       which <- playing$which
-      discounted[which] <<- discounted[which] * gamma * !out$terminated[which] + out$reward[which]
+      goes_on <- !out$terminated[which]
+      discounted[which] <<- discounted[which] * gamma * goes_on + out$reward[which]
       update_moments(moments, matrix(discounted[which]))
       out$reward / sqrt(moments$var + epsilon)
     })
@@ -373,7 +388,7 @@ follow_ends <- function(inner, playing) {
   inner$step <- function(action) {
     out <- step(action)
     n <- length(playing$all)
-    if (n > 1L && is.list(out) && are_flags(out$terminated, n)) {
+    if (n > 1L && is.list(out) && is_flags(out$terminated, n)) {
       ended <- out$terminated | (out$truncated %||% FALSE)
       playing$which <- setdiff(playing$which, which(ended))
     }
