@@ -17,6 +17,8 @@
 #'   leaves it to the environment (50 in CartPole; 30 where it does not say).
 #' @param ... For methods.
 #' @param episode Which episode of the rollout to show, a whole number; the default is the first.
+#' @param candidate Whose episode where several policies were played, a whole number; the default
+#'   is the first.
 #' @param width The picture's width in pixels, a whole number; `NULL`, the default, is that of
 #'   the environment's frames (600 in CartPole).
 #' @param every Show every frame, 1, every second one, 2, and so on, at the same pace; the last one
@@ -52,10 +54,10 @@ animate.default <- function(x, file = NULL, fps = NULL, ...) {
 #' @rdname animate
 #' @export
 animate.gym_rollout <- function(x, file = NULL, fps = NULL, ..., episode = 1, width = NULL,
-                                every = NULL) {
+                                every = NULL, candidate = 1) {
   check_dots_empty(...)
   check_animation(file, fps, width, every)
-  new_animation(episode_frames(x, episode), file, fps, width, every)
+  new_animation(episode_frames(x, episode, candidate), file, fps, width, every)
 }
 
 #' @rdname animate
@@ -79,7 +81,7 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
   played <- rollout(
     env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE
   )
-  new_animation(episode_frames(played, 1), file, fps, width, every)
+  new_animation(episode_frames(played), file, fps, width, every)
 }
 
 #' @rdname animate
@@ -124,8 +126,8 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
 
 #' Take the frames of an episode out of a rollout
 #' @noRd
-episode_frames <- function(x, episode, call = rlang::caller_env()) {
-  check_count(episode, max = nrow(x$episodes), call = call)
+episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_env()) {
+  row <- episode_row(x, episode, candidate, call)
   if (is.null(x$frames)) {
     gym_abort(
       c("This rollout was played without frames.",
@@ -133,7 +135,7 @@ episode_frames <- function(x, episode, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
-  x$frames[[episode]]
+  x$frames[[row]]
 }
 
 new_animation <- function(frames, file, fps, width, every) {

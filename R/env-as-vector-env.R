@@ -275,10 +275,11 @@ joint_sub_envs <- function(env) {
     # The two are nearly always the same, which identical() sees at once.
     same <- identical(out$observation, out$next_observation)
     observation <- batch_rows(observed, out$observation, which)
+    after <- if (same) observation else batch_rows(observed, out$next_observation, which)
     list(
       observation = observation, reward = out$reward[which],
       terminated = out$terminated[which], truncated = out$truncated[which],
-      next_observation = if (same) observation else batch_rows(observed, out$next_observation, which)
+      next_observation = after
     )
   }
   reset <- if (one_seed) {

@@ -92,6 +92,12 @@ ask_instance <- function(client, instance_id, call) {
   instance$single_observation_space <- read_values(
     space_of(answer$observation_space), "Its `observation_space`"
   )
+  instance$single_observation_space$names <- observation_names(
+    answer$env_id, instance$single_observation_space, wrapper_names(answer$wrappers)
+  )
+  instance$name_observation <- naming(
+    instance$single_observation_space, batch = !is.null(answer$num_envs)
+  )
   instance$actions <- sent_space(instance$single_action_space, answer$num_envs)
   instance$observations <- sent_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
@@ -111,6 +117,11 @@ ask_instance <- function(client, instance_id, call) {
   instance
 }
 
+# The names of the wrappers in an answer, which classic servers do not send.
+wrapper_names <- function(wrappers) {
+  as.character(unlist(lapply(wrappers, function(wrapper) wrapper["name"])))
+}
+
 # The space of all sub-environments together is made only when it is asked for: the bounds of
 # thousands of pictures take much memory.
 instance_space <- function(instance, which = c("action_space", "observation_space")) {
@@ -124,8 +135,11 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
   )
 }
 
+#' Start an episode
+#' @param named Whether observations are to carry their names: those of the classic calls do not.
+#' @noRd
 reset_instance <- function(client, instance, seed, options, return_info = FALSE, mask = NULL,
-                           call = rlang::caller_env()) {
+                           named = FALSE, call = rlang::caller_env()) {
   check_mask(mask, instance, call)
   close_queued(client)
   fields <- c(
@@ -142,6 +156,7 @@ reset_instance <- function(client, instance, seed, options, return_info = FALSE,
   instance$done <- FALSE
   check_answer_info(answer)
   observation <- decode_observation(instance$observations, answer)
+  if (named) observation <- with_names(instance, observation)
   if (return_info) {
     list(observation = observation, info = info_from(instance, answer))
   } else {
@@ -160,6 +175,11 @@ decode_observation <- function(space, answer, name = "observation") {
   )
 }
 
+with_names <- function(instance, observation) {
+  name_observation <- instance$name_observation
+  if (is.null(name_observation)) observation else name_observation(observation)
+}
+
 info_from <- function(instance, answer) {
   if (is.null(instance$num_envs)) {
     info_from_json(answer$info %||% empty_object)
@@ -168,11 +188,11 @@ info_from <- function(instance, answer) {
   }
 }
 
-step_instance <- function(client, instance, action, render, which = NULL,
+step_instance <- function(client, instance, action, render, which = NULL, named = FALSE,
                           call = rlang::caller_env()) {
   fields <- c(render = if (render) "true" else "false")
   if (!is.null(which) || !is.null(instance$num_envs)) {
-    return(step_vector_env(client, instance, action, fields, which, call))
+    return(step_vector_env(client, instance, action, fields, which, named, call))
   }
   space <- instance$actions
   # A classic server's error does not say that an action was wrong, so bounds are checked here.
@@ -194,8 +214,9 @@ step_instance <- function(client, instance, action, render, which = NULL,
   } else if (isFALSE(instance$done)) {
     instance$done <- answer$done
   }
+  observation <- decode_observation(instance$observations, answer)
   list(
-    observation = decode_observation(instance$observations, answer),
+    observation = if (named) with_names(instance, observation) else observation,
     reward = number_from(answer$reward, "reward"),
     done = answer$done,
     info = info_from_json(answer$info),

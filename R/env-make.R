@@ -168,11 +168,15 @@ server_env <- R6Class(
     reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()
       check_flag(return_info)
-      reset_instance(self$client, private$instance, seed, options, return_info, mask)
+      reset_instance(
+        self$client, private$instance, seed, options, return_info, mask, named = TRUE
+      )
     },
     step = function(action, which = NULL) {
       private$check_open()
-      step_instance(private$connected, private$instance, action, render = FALSE, which)
+      step_instance(
+        private$connected, private$instance, action, render = FALSE, which, named = TRUE
+      )
     },
     render = function(which = 1) {
       private$check_open()

@@ -25,8 +25,37 @@ observation_parts <- list(
 )
 observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 
-# The names of the columns where the environment is unknown or a wrapper has changed what it shows.
-observation_names <- function(env_id, columns) {
+# Wrappers after which a number is no longer what the documentation calls by its name.
+changing_wrappers <- c("DiscretizeObservation", "NormalizeObservation", "RescaleObservation")
+
+#' Name the numbers or parts of what is observed
+#' @param space The observation space of one sub-environment.
+#' @param wrappers The names of the wrappers around the environment.
+#' @return Strings, `NULL` where they are unknown, or a wrapper has changed what is observed.
+#' @noRd
+observation_names <- function(env_id, space, wrappers = character()) {
   parts <- observation_parts[[environment_family(env_id), exact = TRUE]]
-  if (length(parts) == length(columns)) parts else columns
+  if (is.null(parts) || any(wrappers %in% changing_wrappers)) {
+    return(NULL)
+  }
+  n <- if (inherits(space, "gym_space_discrete")) {
+    1L
+  } else if (inherits(space, "gym_space_tuple")) {
+    length(space$spaces)
+  } else if (inherits(space, "gym_space_box") && length(space$shape) == 1L) {
+    space$shape
+  }
+  if (identical(n, length(parts))) parts
+}
+
+#' Put a batch of observations into the columns of a table
+#' @return A named list of columns.
+#' @noRd
+observation_columns <- function(space, observations, env_id) {
+  columns <- value_columns(space, observations, "obs")
+  if (is_stackable(space)) {
+    names(columns) <- paste0("obs_", seq_along(columns), recycle0 = TRUE)
+  }
+  names(columns) <- observation_names(env_id, names(columns))
+  columns
 }

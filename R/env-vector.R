@@ -21,7 +21,7 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_vector_env <- function(client, instance, action, fields, which, call) {
+step_vector_env <- function(client, instance, action, fields, which, named, call) {
   check_which(which, instance, call)
   n <- instance$num_envs
   actions <- instance$actions
@@ -42,16 +42,24 @@ step_vector_env <- function(client, instance, action, fields, which, call) {
   check_answer_results(result, n)
   check_answer_info(answer)
   info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
+  observation <- decode_observation(observations, answer)
+  if (named) observation <- with_names(instance, observation)
+  next_observation <- observation
   if (length(answer$final_sub_envs)) {
-    info$final_obs <- final_observations(instance, answer, n)
+    final <- final_observations(instance, answer, n, named)
+    info$final_obs <- final_by_sub_env(instance$single_observation_space, final, n)
+    next_observation <- replace_rows(
+      instance$single_observation_space, observation, n, final$sub_envs, final$values
+    )
   }
   list(
-    observation = decode_observation(observations, answer),
+    observation = observation,
     reward = result$reward,
     done = result$terminated | result$truncated,
     info = info,
     terminated = result$terminated,
-    truncated = result$truncated
+    truncated = result$truncated,
+    next_observation = next_observation
   )
 }
 
@@ -63,16 +71,23 @@ results_by_sub_env <- function(answer) {
   )
 }
 
-# A list: the last observation of each sub-environment that ended, NULL for the others.
-final_observations <- function(instance, answer, n) {
+# The last observations of the sub-environments that ended within the step: their numbers from 1, and
+# a batch of these observations.
+final_observations <- function(instance, answer, n, named) {
   ended <- unlist(answer$final_sub_envs)
   check_final_sub_envs(ended, n)
-  ended <- ended + 1L
-  space <- instance$single_observation_space
-  values <- decode_observation(batch_space(space, length(ended)), answer, "final_obs")
-  final <- vector("list", n)
-  final[ended] <- lapply(seq_along(ended), function(i) batch_value(space, values, i))
-  final
+  batch <- batch_space(instance$single_observation_space, length(ended))
+  values <- decode_observation(batch, answer, "final_obs")
+  list(sub_envs = ended + 1L, values = if (named) with_names(instance, values) else values)
+}
+
+# A list: the last observation of each sub-environment that ended, NULL for the others.
+final_by_sub_env <- function(space, final, n) {
+  each <- vector("list", n)
+  each[final$sub_envs] <- lapply(seq_along(final$sub_envs), function(i) {
+    batch_value(space, final$values, i)
+  })
+  each
 }
 
 # The server draws an action for each sub-environment.

@@ -18,14 +18,15 @@
 #' @param max_steps After how many steps an episode is cut short.
 #' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
 #'   none; `each`, how many episodes a candidate plays.
-#' @param keep_steps Whether to keep each step.
+#' @param keep_steps,keep_next Whether to keep each step, and the observation after it.
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
 #'   `return`, `length`, `terminated`, `truncated`; and the lists `steps` and `frames`. Candidates
 #'   after one that has reached the target are left out.
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
-                       each = 1L, keep_steps = FALSE, report = function(ended) NULL) {
+                       each = 1L, keep_steps = FALSE, keep_next = FALSE,
+                       report = function(ended) NULL) {
   n <- length(episodes$episode)
   sub_env <- (seq_len(n) - 1L) %% vector_env$num_envs + 1L
   batch <- rlang::env(
@@ -39,7 +40,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
       numbers <- seq(first, min(n, first + vector_env$num_envs - 1L))
       numbers <- numbers[batch$needed[numbers]]
       if (length(numbers)) {
-        play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps)
+        play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps, keep_next)
       }
     }
   })
@@ -50,7 +51,8 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
 
 # Plays some episodes of a batch, one in each sub-environment. They begin together, so that all that
 # are still playing have taken the same number of steps, which is `taken`.
-play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, keep_steps) {
+play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, keep_steps,
+                              keep_next) {
   space <- vector_env$observation_space
   observation <- begin_episodes(vector_env, batch, playing)
   keep_frame(batch, vector_env, playing)
@@ -71,7 +73,7 @@ play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, kee
       batch$steps[[length(batch$steps) + 1L]] <- list(
         at = playing, observation = observation, action = action, reward = out$reward,
         terminated = out$terminated, truncated = out$truncated,
-        next_observation = out$next_observation
+        next_observation = if (keep_next) out$next_observation
       )
     }
     observation <- out$observation

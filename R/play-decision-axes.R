@@ -21,7 +21,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }
-  names <- observation_names(place$env_id, paste0("obs_", seq_len(n)))
+  names <- number_names(space, n)
   list(
     names = names, usual = usual_ranges(place$env_id, names),
     low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)
@@ -147,9 +147,10 @@ play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
 
 path_points <- function(path, names, call = rlang::caller_env()) {
   if (inherits(path, "gym_rollout")) {
-    if (is.null(path$steps)) {
+    if (!is.data.frame(path$steps)) {
       gym_abort(
-        c("The rollout has no steps to show as a path.", i = "`rollout(steps = TRUE)` keeps them."),
+        c("The rollout has no steps in a table to show as a path.",
+          i = "`rollout(steps = TRUE)` keeps one."),
         class = "gym_error_argument", argument = "path", value = path, call = call
       )
     }
@@ -165,5 +166,9 @@ path_points <- function(path, names, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "path", value = path, call = call
     )
   }
-  data.frame(episode = path$episode %||% 1L, x = path[[names[[1L]]]], y = path[[names[[2L]]]])
+  # Each candidate's episodes are counted apart.
+  episode <- paste(path$candidate %||% 1L, path$episode %||% 1L)
+  data.frame(
+    episode = match(episode, unique(episode)), x = path[[names[[1L]]]], y = path[[names[[2L]]]]
+  )
 }

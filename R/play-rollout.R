@@ -17,6 +17,21 @@
 #' end. `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
 #' again.
 #'
+#' # Steps as arrays
+#'
+#' Those who write learners want the steps by time, of all sub-environments at once. With
+#' `steps = "arrays"` they are a list of arrays whose first dimension is the time and whose second
+#' are the sub-environments:
+#' * `observation` and, where asked for, `next_observation`: with the dimensions of an observation
+#'   after these two, such as 120 x 16 x 4,
+#' * `action`: with those of an action, none for a Discrete space,
+#' * `reward` (double), `terminated`, `truncated` (logical), `episode` and, with several policies,
+#'   `candidate` (integer): matrices.
+#'
+#' A sub-environment's episodes follow one another. Where it has played fewer steps than another
+#' the arrays have `NA` after its last one. For Tuple and Dict there is a list with an array for each
+#' part. Sequence, Graph and OneOf have no arrays.
+#'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a
@@ -34,7 +49,7 @@
 #' @param seed A whole number that fixes all that is drawn, whatever [RNGkind()] the session has;
 #'   the session's generator stays as it was. `NULL`, the default, draws one from the session's
 #'   generator.
-#' @param steps Keep each step as well? `FALSE`, the default, or `TRUE`.
+#' @param steps Keep each step as well? `FALSE`, the default, `TRUE` for a table, or `"arrays"`.
 #' @param client The client of the server where an environment named by its id is
 #'   made; the default is the session's own, [gym_client()].
 #' @param frames Keep pictures of the episodes as well? `FALSE`, the default, or `TRUE`, for
@@ -44,9 +59,9 @@
 #'   FrozenLake, where it is named by its id.
 #' @param num_envs How many sub-environments to play in, a whole number, where the environment is
 #'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
-#' @param next_observation Keep the observation after each step as well, in columns whose names begin
-#'   with `next_`? `FALSE`, the default, or `TRUE`. It is the true one also where the step ended the
-#'   episode.
+#' @param next_observation Keep the observation after each step as well, in columns whose names
+#'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where steps
+#'   are kept. It is the true one also where the step ended the episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
@@ -59,11 +74,13 @@
 #'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
 #'       by both at once is both where the limit is the environment's own).}
 #'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
-#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action was taken
-#'       on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
+#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action
+#'       was taken on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
 #'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
 #'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
-#'       `reward` (double), `terminated`, `truncated` (logical).}
+#'       `reward` (double), `terminated`, `truncated` (logical), and with
+#'       `next_observation = TRUE` the observation after the step. With `steps = "arrays"` an object
+#'       of class `gym_arrays`, see below.}
 #'     \item{frames}{`NULL`, or with `frames = TRUE` a list with the frames of each episode, an
 #'       object of class `gym_frames`. They are kept as PNG files, a few kilobytes each:
 #'       `frames[[2]][[1]]` unpacks the first of the second episode, as [env_render()] gives
@@ -94,9 +111,20 @@
 #' summary(random)
 #'
 #' # Any function of a matrix of observations can be a policy, and each step be kept.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
 #' head(as.data.frame(played))
+#'
+#' # The returns from each step on, discounted by 0.99, in all sub-environments at once.
+#' arrays <- rollout("CartPole-v1", follow_pole, episodes = 20, seed = 1, steps = "arrays")$steps
+#' arrays
+#' from_here <- arrays$reward
+#' ended <- arrays$terminated | arrays$truncated
+#' for (time in rev(seq_len(nrow(ended) - 1))) {
+#'   later <- ifelse(ended[time, ], 0, from_here[time + 1, ])
+#'   from_here[time, ] <- arrays$reward[time, ] + 0.99 * later
+#' }
+#' from_here[1, ]
 #'
 #' # The second episode begins again.
 #' second <- played$episodes[2, ]
@@ -117,10 +145,9 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_count(episodes)
   check_count(max_steps, allow_null = TRUE)
   check_seed(seed)
-  check_flag(steps)
+  check_steps_wanted(steps, next_observation)
   check_flag(frames)
   check_count(num_envs, allow_null = TRUE)
-  check_flag(next_observation)
   check_flag(progress)
   check_dots_named(list(...), "is_slippery = FALSE")
   seed <- seed %||% draw_seed()
@@ -136,12 +163,29 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   )
 }
 
-play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, seed, keep_steps,
+check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {
+  if (!is_flag(steps) && !identical(steps, "arrays")) {
+    abort_argument(steps, "TRUE, FALSE or \"arrays\"", "steps", call)
+  }
+  check_flag(next_observation, call = call)
+  if (next_observation && isFALSE(steps)) {
+    gym_abort(
+      c("`next_observation = TRUE` needs the steps to be kept.",
+        i = "Add `steps = TRUE`, or `steps = \"arrays\"`."),
+      class = "gym_error_argument", argument = "next_observation", value = TRUE, call = call
+    )
+  }
+}
+
+play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, seed, steps,
                          next_observation, progress) {
+  if (identical(steps, "arrays")) {
+    check_fits_arrays(vector_env)
+  }
   policy <- policy_bind(policy, vector_env, call = vector_env$call)
   history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
   result <- function(interrupted = FALSE) {
-    new_rollout(history, policy, vector_env, seed, keep_steps, next_observation, interrupted)
+    new_rollout(history, policy, vector_env, seed, steps, next_observation, interrupted)
   }
   total <- candidates * episodes
   show <- if (progress) progress_bar(total, "Episode") else function(ended) NULL
@@ -150,7 +194,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
       play_batches(
         vector_env, history, function(candidates) policy_subset(policy, candidates),
         report = function(ended) show(count_played(history) + ended),
-        max_steps = max_steps %||% Inf, keep_steps = keep_steps
+        max_steps = max_steps %||% Inf, keep_steps = !isFALSE(steps), keep_next = next_observation
       ),
       "Interrupted after {finished} of {total} episode{?s}; what was finished is returned.",
       function() count_played(history), total
@@ -172,16 +216,16 @@ count_played <- function(history) {
   sum(vapply(history$batches, function(batch) length(batch$episode), 0L))
 }
 
-new_rollout <- function(history, policy, vector_env, seed, keep_steps, next_observation,
-                        interrupted) {
+new_rollout <- function(history, policy, vector_env, seed, steps, next_observation, interrupted) {
   several <- !is.null(count_candidates(policy))
   episodes <- episodes_table(history$batches, several)
   fps <- vector_env$spec$render_fps
+  keep <- if (identical(steps, "arrays")) steps_arrays else steps_table
   structure(
     list(
       episodes = episodes,
-      steps = if (keep_steps && nrow(episodes)) {
-        steps_table(history$batches, episodes, vector_env, several, next_observation)
+      steps = if (!isFALSE(steps) && nrow(episodes)) {
+        keep(history$batches, episodes, vector_env, several, next_observation)
       },
       frames = if (!is.null(vector_env$frame)) {
         lapply(unlist(lapply(history$batches, function(batch) batch$frames), recursive = FALSE),
@@ -199,7 +243,7 @@ new_rollout <- function(history, policy, vector_env, seed, keep_steps, next_obse
 
 #' @export
 as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...) {
-  x$steps %||% x$episodes
+  if (is.data.frame(x$steps)) x$steps else x$episodes
 }
 
 #' @rdname rollout
@@ -208,7 +252,7 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
 #' @export
 predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object$policy, newdata, type, object$env_id)
+  predict_policy(object$policy, newdata, type)
 }
 
 # Printing and summarising ---------------------------------------------------------
@@ -216,6 +260,9 @@ predict.gym_rollout <- function(object, newdata, type = c("action", "output"), .
 #' @export
 print.gym_rollout <- function(x, ...) {
   cat(rollout_lines(x), sep = "\n")
+  if (!is.null(x$episodes$candidate)) {
+    print_candidates(evaluate_episodes(x$episodes, x$policy))
+  }
   invisible(x)
 }
 
@@ -225,7 +272,7 @@ rollout_lines <- function(x) {
     paste0("Rollout in ", x$env_id, ": ", count_of(length(returns), "episode"), ", ",
            count_of(sum(x$episodes$length), "step")),
     paste0("Policy: ", policy_text(x$policy)),
-    paste0("Return: ", returns_text(returns))
+    if (is.null(x$episodes$candidate)) paste0("Return: ", returns_text(returns))
   )
 }
 
@@ -249,7 +296,8 @@ returns_text <- function(returns) {
 #'   `returns` and `lengths` (the quartiles and the mean, named numeric vectors of
 #'   length 6), `mean` and `se` (the mean return and its standard error, doubles; the
 #'   latter `NA` for a single episode), `terminated` and `truncated` (how many
-#'   episodes ended so, integers).
+#'   episodes ended so, integers), `candidates` (`NULL`, or of several policies a row for each, as
+#'   [evaluate_policy()] has it).
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))
@@ -266,7 +314,8 @@ summary.gym_rollout <- function(object, ...) {
       mean = mean(episodes$return),
       se = standard_error(episodes$return),
       terminated = sum(episodes$terminated),
-      truncated = sum(episodes$truncated)
+      truncated = sum(episodes$truncated),
+      candidates = if (!is.null(episodes$candidate)) evaluate_episodes(episodes, object$policy)
     ),
     class = "summary.gym_rollout"
   )
@@ -278,11 +327,15 @@ print.summary.gym_rollout <- function(x, ...) {
     paste0("Rollout in ", x$env_id, ": ", count_of(x$episodes, "episode"), ", ",
            count_of(x$steps, "step")),
     paste0("Policy: ", policy_text(x$policy)),
-    paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
+    if (is.null(x$candidates)) paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
     paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated),
     "",
     sep = "\n"
   )
+  if (!is.null(x$candidates)) {
+    print_candidates(x$candidates)
+    return(invisible(x))
+  }
   print(signif(rbind(return = x$returns, length = x$lengths), 4L))
   invisible(x)
 }

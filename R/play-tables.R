@@ -29,7 +29,7 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
   column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
   values <- function(name, space) bind_batches(space, lapply(steps, function(step) step[[name]]))
   observed <- vector_env$observation_space
-  named <- function(name) observation_columns(vector_env, values(name, observed))
+  named <- function(name) observation_columns(observed, values(name, observed))
   acted <- vector_env$action_space
   columns <- c(
     named("observation"), value_columns(acted, values("action", acted), "action"),
@@ -62,55 +62,3 @@ step_rows <- function(batches) {
     before[[i]] + unlist(lapply(batches[[i]]$steps, function(step) step$at))
   }))
 }
-
-observation_columns <- function(vector_env, values) {
-  space <- vector_env$observation_space
-  columns <- value_columns(space, values, "obs")
-  if (is_stackable(space)) {
-    names(columns) <- paste0("obs_", seq_along(columns), recycle0 = TRUE)
-  }
-  names(columns) <- observation_names(vector_env$spec$id, names(columns))
-  columns
-}
-
-# Values of one space as the columns of a table -------------------------------------
-
-#' Put values of a space into columns
-#'
-#' Numbers have a column each, in row-major order; so have the parts of Tuple and
-#' Dict. Values that may hold any number of parts have one column that is a list.
-#' @param values The values, as [batch_of()] puts them together.
-#' @param name What they are, such as `"action"`.
-#' @return A named list of columns.
-#' @noRd
-value_columns <- function(space, values, name) UseMethod("value_columns")
-
-#' @exportS3Method
-value_columns.default <- function(space, values, name) stats::setNames(list(I(values)), name)
-
-#' @exportS3Method
-value_columns.gym_space_array <- function(space, values, name) {
-  numbers <- number_rows(values)
-  n <- ncol(numbers)
-  each <- lapply(seq_len(n), function(i) numbers[, i])
-  stats::setNames(each, if (n == 1L) name else paste0(name, "_", seq_len(n), recycle0 = TRUE))
-}
-
-#' @exportS3Method
-value_columns.gym_space_discrete <- function(space, values, name) {
-  stats::setNames(list(values), name)
-}
-
-#' @exportS3Method
-value_columns.gym_space_text <- value_columns.gym_space_discrete
-
-#' @exportS3Method
-value_columns.gym_space_tuple <- function(space, values, name) {
-  columns <- lapply(seq_along(space$spaces), function(i) {
-    value_columns(space$spaces[[i]], values[[i]], paste0(name, "_", names(space$spaces)[i] %||% i))
-  })
-  do.call(c, columns)
-}
-
-#' @exportS3Method
-value_columns.gym_space_dict <- value_columns.gym_space_tuple

@@ -6,7 +6,7 @@
 #'
 #' @param object What [rollout()] returned.
 #' @param type `"returns"`, the default, or `"trajectory"`.
-#' @param episode,variables As for [plot()][plot.gym_rollout()].
+#' @param episode,variables,candidate As for [plot()][plot.gym_rollout()].
 #' @param ... Not used.
 #' @return An object of class `ggplot`.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
@@ -18,13 +18,13 @@
 #' autoplot(played) + theme_minimal()
 #' autoplot(played, type = "trajectory", episode = 2)
 autoplot.gym_rollout <- function(object, type = c("returns", "trajectory"), episode = 1,
-                                 variables = NULL, ...) {
+                                 variables = NULL, ..., candidate = 1) {
   type <- check_choice(type[1L], c("returns", "trajectory"), arg = "type")
   check_dots_empty(...)
   if (type == "returns") {
     autoplot_returns(object)
   } else {
-    autoplot_trajectory(object, episode, trajectory_plot_data(object, episode, variables))
+    autoplot_trajectory(object, trajectory_plot_data(object, episode, variables, candidate))
   }
 }
 
@@ -64,7 +64,7 @@ bar_layers <- function(bars) {
   )
 }
 
-autoplot_trajectory <- function(x, episode, data) {
+autoplot_trajectory <- function(x, data) {
   panel <- function(rows) factor(rows$panel, levels = data$panels$panel)
   values <- autoplot_values(data)
   near <- near_rows(data)
@@ -82,7 +82,7 @@ autoplot_trajectory <- function(x, episode, data) {
                         labeller = ggplot2::as_labeller(facet_labels(data))) +
     ggplot2::scale_y_continuous(breaks = trajectory_breaks(values)) +
     ggplot2::labs(x = "steps taken", y = NULL, title = played_title(x),
-                  subtitle = trajectory_subtitle(x, episode, data))
+                  subtitle = data$subtitle)
 }
 
 # The values with the kind of their panel and, where an action has several numbers, with the number

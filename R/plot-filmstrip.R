@@ -9,9 +9,9 @@ pick_stills <- function(frames, n) {
   list(frames = frames[at], steps = as.integer(at - 1))
 }
 
-plot_filmstrip <- function(x, episode, n, main, call = rlang::caller_env()) {
+plot_filmstrip <- function(x, episode, n, main, candidate, call = rlang::caller_env()) {
   check_count(n, call = call)
-  stills <- pick_stills(episode_frames(x, episode, call), n)
+  stills <- pick_stills(episode_frames(x, episode, candidate, call), n)
   check_suggested("png", "draw a filmstrip", call)
   draw_filmstrip(stills, main)
 }

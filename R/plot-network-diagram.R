@@ -88,9 +88,9 @@ input_labels <- function(policy) {
   space <- policy$observation_space
   size <- policy$sizes[[1L]]
   if (inherits(space, "gym_space_discrete")) {
-    return(paste(observation_names(policy$env_id, "observed"), space$start + seq_len(size) - 1L))
+    return(paste(space$names %||% "observed", space$start + seq_len(size) - 1L))
   }
-  observation_names(policy$env_id, if (size == 1L) "obs" else paste0("obs_", seq_len(size)))
+  if (size == 1L && is.null(space$names)) "obs" else number_names(space, size)
 }
 
 output_labels <- function(policy) {

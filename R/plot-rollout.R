@@ -31,6 +31,8 @@
 #'   table of steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, takes the
 #'   first 8.
 #' @param n How many frames a filmstrip has at most, a whole number; the default is 8.
+#' @param candidate Whose episode to show where several policies were played, a whole number; the
+#'   default is the first.
 #' @param ... For `"returns"` further arguments of [plot()][graphics::plot.default()], such as
 #'   `xlim`; the other types take none.
 #' @return `x`, invisibly.
@@ -51,15 +53,15 @@
 #' if (requireNamespace("png", quietly = TRUE)) plot(played, type = "filmstrip")
 plot.gym_rollout <- function(x, type = c("returns", "trajectory", "filmstrip"), main = NULL,
                              xlab = NULL, ylab = NULL, episode = 1, variables = NULL, n = 8,
-                             ...) {
+                             ..., candidate = 1) {
   type <- check_choice(type[1L], c("returns", "trajectory", "filmstrip"), arg = "type")
   if (type != "returns") {
     check_dots_empty(...)
   }
   switch(type,
     returns = plot_returns(x, main, xlab, ylab, ...),
-    trajectory = plot_trajectory(x, episode, variables, main),
-    filmstrip = plot_filmstrip(x, episode, n, main)
+    trajectory = plot_trajectory(x, episode, variables, main, candidate),
+    filmstrip = plot_filmstrip(x, episode, n, main, candidate)
   )
   invisible(x)
 }

@@ -12,12 +12,14 @@ most_actions <- 6L
 #'   beforehand), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data
 #'   frame `value`, `label`, of the actions, `NULL` where they are not one of few), `actions`
 #'   (labels of the actions' columns, named by them), `length` and `ending`, `"terminated"` or
-#'   `"truncated"`.
+#'   `"truncated"`, `subtitle`.
 #' @noRd
-trajectory_plot_data <- function(x, episode = 1, variables = NULL, call = rlang::caller_env()) {
-  check_count(episode, max = nrow(x$episodes), call = call)
+trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1,
+                                 call = rlang::caller_env()) {
+  row <- episode_row(x, episode, candidate, call)
   check_steps(x, call)
-  steps <- x$steps[x$steps$episode == episode, ]
+  own <- x$steps$episode == episode & (x$steps$candidate %||% candidate) == candidate
+  steps <- x$steps[own, ]
   shown <- trajectory_columns(steps, variables, call)
   values <- lapply(c(shown$observed, shown$actions), function(name) steps[[name]])
   names(values) <- c(shown$observed, shown$actions)
@@ -41,15 +43,26 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, call = rlang:
     choices = choices,
     actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
     length = n,
-    ending = if (steps$terminated[[n]]) "terminated" else "truncated"
+    ending = if (steps$terminated[[n]]) "terminated" else "truncated",
+    subtitle = trajectory_subtitle(x$episodes[row, ])
   )
 }
 
+# The row of an episode in the table of episodes. Those of each candidate are counted apart.
+episode_row <- function(x, episode, candidate, call) {
+  candidates <- x$episodes$candidate %||% rep(1L, nrow(x$episodes))
+  check_count(candidate, max = max(candidates, 1L), call = call)
+  own <- which(candidates == candidate)
+  check_count(episode, max = length(own), call = call)
+  own[[episode]]
+}
+
 check_steps <- function(x, call) {
-  if (is.null(x$steps)) {
+  if (!is.data.frame(x$steps)) {
+    kept <- if (is.null(x$steps)) "without its steps being kept" else "with its steps in arrays"
     gym_abort(
-      c("This rollout was played without its steps being kept.",
-        i = "`rollout(..., steps = TRUE)` keeps them."),
+      c(paste0("This rollout was played ", kept, "."),
+        i = "`rollout(..., steps = TRUE)` keeps them in a table."),
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
@@ -63,9 +76,10 @@ trajectory_columns <- function(steps, variables, call) {
   numbers <- vapply(steps, function(column) is.numeric(column) || is.logical(column), NA)
   is_action <- grepl("^action(_|$)", names)
   actions <- names[is_action & numbers]
-  possible <- setdiff(names[!is_action & numbers], c("episode", "step"))
+  possible <- setdiff(names[!is_action & numbers], c("candidate", "episode", "step"))
   if (is.null(variables)) {
     possible <- setdiff(possible, c("reward", "terminated", "truncated"))
+    possible <- possible[!startsWith(possible, "next_")]
     observed <- first_few(possible, most_panels, "numbers of the observation", "variables")
   } else {
     unknown <- setdiff(variables, possible)
@@ -160,8 +174,10 @@ near_limits <- function(at, value) {
   at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
 }
 
-trajectory_subtitle <- function(x, episode, data) {
-  row <- x$episodes[episode, ]
-  paste0("episode ", row$episode, ": return ", number_text(row$return), ", ", data$ending,
-         " after ", count_of(data$length, "step"))
+# `row` is the episode's in the table of episodes.
+trajectory_subtitle <- function(row) {
+  ending <- if (row$terminated) "terminated" else "truncated"
+  of <- if (!is.null(row$candidate)) paste0("candidate ", row$candidate, ", ")
+  paste0(of, "episode ", row$episode, ": return ", number_text(row$return), ", ", ending,
+         " after ", count_of(row$length, "step"))
 }

@@ -1,7 +1,7 @@
 # An episode's observations and actions over its steps, with base graphics.
 
-plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_env()) {
-  data <- trajectory_plot_data(x, episode, variables, call)
+plot_trajectory <- function(x, episode, variables, main, candidate, call = rlang::caller_env()) {
+  data <- trajectory_plot_data(x, episode, variables, candidate, call)
   n <- nrow(data$panels)
   grid <- arrange_panels(n)
   # layout() sets some of these, too, so they are read before it.
@@ -27,7 +27,7 @@ plot_trajectory <- function(x, episode, variables, main, call = rlang::caller_en
   }
   title <- main %||% played_title(x)
   graphics::mtext(title, line = 1.6, outer = TRUE, font = 2, cex = 1.1 * cex)
-  graphics::mtext(trajectory_subtitle(x, episode, data), line = 0.3, outer = TRUE, cex = cex)
+  graphics::mtext(data$subtitle, line = 0.3, outer = TRUE, cex = cex)
   graphics::mtext("steps taken", side = 1L, line = 1.6, outer = TRUE, cex = cex)
 }
 

@@ -24,9 +24,10 @@ check_takes_observations <- function(policy, arg, call) {
 #' @noRd
 ask_beforehand <- function(policy, candidate, observation, vector_env) {
   for (i in which(!duplicated(candidate))) {
-    policy_asked <- policy_subset(policy, candidate[[i]])
-    if (is.function(policy_asked) && sum(candidate == candidate[[i]]) > 1L) {
-      ask_about_one(policy_asked, batch_rows(vector_env$observation_space, observation, i), vector_env)
+    asked <- policy_subset(policy, candidate[[i]])
+    if (is.function(asked) && sum(candidate == candidate[[i]]) > 1L) {
+      one <- batch_rows(vector_env$observation_space, observation, i)
+      ask_about_one(asked, one, vector_env)
     }
   }
 }

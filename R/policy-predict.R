@@ -1,24 +1,28 @@
 #' @rdname act
-#' @param object A policy made by [policy_network()].
+#' @param object A policy made by [policy_network()] or [as_policy()].
 #' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
 #'   a data frame, such as the steps of a [rollout()], with a column for each number of an
 #'   observation under its name there.
 #' @param type `"action"`, the default, for the policy's actions, or `"output"` for the outputs of
-#'   the network that they follow from.
+#'   the network, or the predictions of the model, that they follow from.
 #' @export
 predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  predict_policy(object, newdata, type, object$env_id)
+  predict_policy(object, newdata, type)
 }
 
-predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_env()) {
+predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (inherits(policy, "gym_policy_model")) {
+    return(predict_model(policy, newdata, type, call))
+  }
   if (!inherits(policy, "gym_policy_network")) {
     gym_abort(
-      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
+      paste0("`predict()` needs the policy to be a network or a model, not ", policy_text(policy),
+             "."),
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
   }
-  observation <- observations_from(newdata, policy, env_id, call)
+  observation <- observations_from(newdata, policy, call)
   if (type == "action") {
     return(act(policy, observation))
   }
@@ -29,14 +33,12 @@ predict_policy <- function(policy, newdata, type, env_id, call = rlang::caller_e
 
 # The observations in a data frame: the columns with their names, or all columns where it has none
 # of these names.
-observations_from <- function(newdata, policy, env_id, call) {
+observations_from <- function(newdata, policy, call) {
   if (!is.data.frame(newdata)) {
     return(newdata)
   }
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  size <- if (discrete) 1L else policy$sizes[[1L]]
-  columns <- if (size == 1L) "obs" else paste0("obs_", seq_len(size))
-  names <- observation_names(env_id, columns)
+  names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
   if (any(names %in% names(newdata))) {
     absent <- setdiff(names, names(newdata))
     if (length(absent)) {

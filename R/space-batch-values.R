@@ -7,10 +7,11 @@ has_parts <- function(space) {
   inherits(space, "gym_space_tuple") || inherits(space, "gym_space_dict")
 }
 
-# Calls a function for each part of a Tuple or Dict.
-map_parts <- function(space, part, ...) {
-  parts <- Map(part, unname(space$spaces), ...)
-  names(parts) <- names(space$spaces)
+# Calls a function for each part of a Tuple or Dict, with that part of `values`. A list for a Tuple
+# keeps the names that it has.
+map_parts <- function(space, part, values, ...) {
+  parts <- Map(part, unname(space$spaces), unname(values), ...)
+  names(parts) <- names(space$spaces) %||% names(values)
   parts
 }
 
@@ -24,6 +25,7 @@ batch_of <- function(space, values) {
     as.character(values)
   } else if (has_parts(space)) {
     each <- lapply(seq_along(space$spaces), function(i) lapply(values, function(v) v[[i]]))
+    names(each) <- if (length(values)) names(values[[1L]])
     map_parts(space, batch_of, each)
   } else {
     values
@@ -37,7 +39,9 @@ batch_value <- function(space, batch, i) {
     map_parts(space, batch_value, in_order(space, batch), i)
   } else if (is_stackable(space)) {
     value <- rows_of(batch, i)
+    labels <- if (length(space$shape) == 1L) colnames(value)
     dim(value) <- if (length(space$shape) > 1L) dim(value)[-1L]
+    names(value) <- labels
     value
   } else {
     batch[[i]]
@@ -83,6 +87,7 @@ bind_batches <- function(space, each) {
     parts <- lapply(seq_along(space$spaces), function(i) {
       lapply(each, function(batch) in_order(space, batch)[[i]])
     })
+    names(parts) <- names(each[[1L]])
     map_parts(space, bind_batches, parts)
   } else if (!is_stackable(space)) {
     do.call(c, each)
@@ -95,10 +100,22 @@ bind_batches <- function(space, each) {
     unlist(each)
   } else {
     shape <- dim(each[[1L]])[-1L]
-    flat <- do.call(rbind, lapply(each, matrix, ncol = prod(shape)))
+    rows <- function(batch) matrix(batch, dim(batch)[[1L]], prod(shape))
+    flat <- do.call(rbind, lapply(each, rows))
     dim(flat) <- c(nrow(flat), shape)
+    if (length(shape) == 1L) colnames(flat) <- colnames(each[[1L]])
     flat
   }
+}
+
+#' Put other values in the place of some of a batch
+#' @param n How many values the batch has.
+#' @param i The numbers of those to replace, `values` the batch of what takes their place.
+#' @noRd
+replace_rows <- function(space, batch, n, i, values) {
+  place <- seq_len(n)
+  place[i] <- n + seq_along(i)
+  batch_rows(space, bind_batches(space, list(batch, values)), place)
 }
 
 #' Draw a batch of values

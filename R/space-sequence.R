@@ -64,7 +64,11 @@ stack_values <- function(space, values) {
   } else {
     decode_numbers(space$dtype, list())
   }
-  shape_values(numbers, c(length(values), space$shape))
+  stacked <- shape_values(numbers, c(length(values), space$shape))
+  if (length(space$shape) == 1L && length(values)) {
+    colnames(stacked) <- names(values[[1L]])
+  }
+  stacked
 }
 
 # Sequence --------------------------------------------------------------------------

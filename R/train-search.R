@@ -146,7 +146,7 @@ effort_line <- function(x) {
 predict.gym_search <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
   check_found(object)
-  predict_policy(object$policy, newdata, type, object$env_id)
+  predict_policy(object$policy, newdata, type)
 }
 
 check_found <- function(object, call = rlang::caller_env()) {

@@ -1,7 +1,7 @@
 # Random numbers: a seed gives streams of their own, and the session's generator stays as it was.
 # A stream is a `.Random.seed` of R's generator "L'Ecuyer-CMRG", whose streams are far apart, as
-# ?parallel::nextRNGStream describes them. All kinds are fixed, so that what is drawn does not depend
-# on the session's RNGkind().
+# ?parallel::nextRNGStream describes them. All kinds are fixed, so that what is drawn does not
+# depend on the session's RNGkind().
 
 # Draws a seed from the session's generator.
 draw_seed <- function() sample.int(.Machine$integer.max, 1L)
@@ -65,8 +65,8 @@ forget_random_state <- function(kinds) {
 
 #' Make the streams that everything is drawn from when episodes are played
 #'
-#' @return An environment: `agent`, a generator for what an agent draws; `seeds`, a generator for the
-#'   seeds of episodes; `next_stream`, the stream of the batch that begins next.
+#' @return An environment: `agent`, a generator for what an agent draws; `seeds`, a generator for
+#'   the seeds of episodes; `next_stream`, the stream of the batch that begins next.
 #' @noRd
 new_streams <- function(seed) {
   first <- seed_stream(seed)

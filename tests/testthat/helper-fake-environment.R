@@ -12,12 +12,13 @@ box_space <- function(low, high, shape = length(low), dtype = "float32") {
 }
 
 # `reward` and `ends` are functions of seed, step and action. Observations depend on
-# seed and step alone.
+# seed and step alone. Their space has the names of the environment with this `id`.
 fake_environment <- function(reward = function(seed, step, action) 1,
                              ends = function(seed, step, action) step == 3L,
                              observation_space = box_space(rep(-1, 4), rep(1, 4)),
                              action_space = discrete_space(2L),
                              reward_threshold = NULL, id = "Fake-v0") {
+  observation_space$names <- observation_names(id, observation_space)
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$observation_space <- observation_space
@@ -67,6 +68,7 @@ fake_vector_env <- function(num_envs, mode = "sync",
                             observation_space = box_space(rep(-1, 4), rep(1, 4)),
                             action_space = discrete_space(2L),
                             reward_threshold = NULL, id = "Fake-v0") {
+  observation_space$names <- observation_names(id, observation_space)
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$num_envs <- as.integer(num_envs)

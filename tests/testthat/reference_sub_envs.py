@@ -3,7 +3,8 @@
 Usage: reference_sub_envs.py ENV_ID NUM_ENVS MODE AUTORESET STEPS FILE < ACTIONS. MODE is
 "vector_entry_point" or "sync", AUTORESET a value of Gymnasium's AutoresetMode, and ACTIONS
 holds a line of numbers for each step, one for each sub-environment. The file holds the observation
-of the reset with seed 7, then for each step observation, reward, terminated and truncated,
+of the reset with seed 7, then for each step observation, reward, terminated, truncated and the
+observation that the step led to, which within the same step may have been the last of an episode,
 sub-environment by sub-environment as little-endian doubles.
 """
 
@@ -24,7 +25,11 @@ def main(env_id, num_envs, mode, autoreset, steps, path):
         out.write(np.asarray(observation, "<f8").tobytes())
         for _ in range(int(steps)):
             action = np.array(sys.stdin.readline().split(), env.action_space.dtype)
-            for part in env.step(action.reshape(env.action_space.shape))[:4]:
+            *parts, info = env.step(action.reshape(env.action_space.shape))
+            next_observation = np.array(parts[0])
+            for ended in np.flatnonzero(info.get("_final_obs", [])):
+                next_observation[ended] = info["final_obs"][ended]
+            for part in [*parts, next_observation]:
                 out.write(np.asarray(part, "<f8").tobytes())
     env.close()
 

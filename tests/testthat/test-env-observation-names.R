@@ -1,37 +1,99 @@
 test_that("observations have the names of Gymnasium's documentation, in every version", {
-  names_of <- function(env_id, n) observation_names(env_id, paste0("obs_", seq_len(n)))
+  names_of <- function(env_id, n) observation_names(env_id, box_space(rep(-1, n), rep(1, n)))
   cart_pole <- c("cart_position", "cart_velocity", "pole_angle", "pole_angular_velocity")
   expect_identical(names_of("CartPole-v0", 4), cart_pole)
   expect_identical(names_of("CartPole-v1", 4), cart_pole)
   expect_identical(names_of("MountainCarContinuous-v0", 2), c("position", "velocity"))
-  expect_identical(names_of("Blackjack-v1", 3), c("player_sum", "dealer_card", "usable_ace"))
   expect_identical(names_of("LunarLanderContinuous-v3", 8), names_of("LunarLander-v3", 8))
+  expect_identical(observation_names("Taxi-v4", discrete_space(500L)), "state")
 })
 
-test_that("unknown environments and changed observations keep the names of their columns", {
-  columns <- paste0("obs_", 1:5)
-  expect_identical(observation_names("Unknown-v0", columns[1:2]), columns[1:2])
-  expect_identical(observation_names("CartPole-v1", columns), columns)
-  expect_identical(observation_names(NULL, "obs_1"), "obs_1")
+test_that("unknown environments and changed observations have no names", {
+  four <- box_space(rep(-1, 4), rep(1, 4))
+  expect_null(observation_names("Unknown-v0", four))
+  expect_null(observation_names(NULL, four))
+  expect_null(observation_names("CartPole-v1", box_space(rep(-1, 5), rep(1, 5))))
+  expect_null(observation_names("CartPole-v1", box_space(rep(-1, 4), rep(1, 4), shape = c(1L, 4L))))
+  expect_null(observation_names("CartPole-v1", discrete_space(4L)))
 })
 
-test_that("parts of nested values have columns of their own", {
-  space <- new_space(describe_dict(
-    a = describe_box(c(-1, -1), c(1, 1)), "b.c" = list(name = "Discrete", n = 3L),
-    t = list(name = "Tuple", spaces = list(
-      list(name = "Text", min_length = 0L, max_length = 9L, characters = "ab"),
-      list(name = "MultiBinary", shape = list(1L), dtype = "int8")
-    )),
-    s = list(name = "Sequence", space = list(name = "Discrete", n = 3L), stack = FALSE)
-  ))
-  value <- function(i) {
-    list(a = c(i, i + 0.5), b.c = i, t = list(letters[i], 1L), s = as.list(seq_len(i)))
+test_that("observations of gym_make() have their names, alone and side by side", {
+  parts <- observation_parts$CartPole
+  env <- local_env()
+  expect_named(env$reset(), parts)
+  expect_named(env$reset(return_info = TRUE)$observation, parts)
+  expect_named(env$step(1)$observation, parts)
+  two <- local_env(num_envs = 2, vectorization_mode = "sync", autoreset_mode = "Disabled")
+  expect_identical(dimnames(two$reset()), list(NULL, parts))
+  expect_identical(dimnames(two$reset(return_info = TRUE)$observation), list(NULL, parts))
+  out <- two$step(c(0, 1))
+  expect_identical(dimnames(out$observation), list(NULL, parts))
+  expect_identical(dimnames(two$step(1, which = 2)$observation), list(NULL, parts))
+  expect_identical(out$observation[, "pole_angle"], out$observation[, 3])
+})
+
+test_that("the parts of a Tuple have their names, a single number has none", {
+  parts <- c("player_sum", "dealer_card", "usable_ace")
+  for (n in list(NULL, 2)) {
+    env <- local_env("Blackjack-v1", num_envs = n, autoreset_mode = if (!is.null(n)) "SameStep")
+    expect_named(env$reset(seed = 1), parts)
+    out <- env$step(rep(1, n %||% 1))
+    expect_named(out$observation, parts)
   }
-  columns <- value_columns(space, batch_of(space, lapply(1:2, value)), "obs")
-  expect_named(columns, c("obs_a_1", "obs_a_2", "obs_b.c", "obs_t_1", "obs_t_2", "obs_s"))
-  expect_identical(columns$obs_a_2, c(1.5, 2.5))
-  expect_identical(columns$obs_t_1, c("a", "b"))
-  table <- data.frame(columns)
-  expect_identical(dim(table), c(2L, 6L))
-  expect_identical(table$obs_s[[2]], list(1L, 2L))
+  # Both have drawn too many cards by then.
+  for (i in 1:9) {
+    out <- env$step(c(1, 1))
+    for (final in out$info$final_obs) if (!is.null(final)) expect_named(final, parts)
+    expect_named(out$next_observation, parts)
+  }
+  lake <- local_env("FrozenLake-v1")
+  expect_identical(lake$reset(), 0L)
+  expect_identical(lake$observation_space$names, "position")
+})
+
+test_that("the observations of the classic calls have no names", {
+  for (n in list(NULL, 2)) {
+    env <- local_env(num_envs = n)
+    blackjack <- local_env("Blackjack-v1", num_envs = n)
+    client <- env$client
+    expect_null(attributes(env_reset(client, env$instance_id))$names)
+    expect_null(attributes(env_reset(client, env$instance_id))$dimnames)
+    out <- env_step(client, env$instance_id, rep(1, n %||% 1))
+    expect_null(names(out$observation))
+    expect_null(dimnames(out$observation))
+    expect_null(dimnames(out$next_observation))
+    expect_null(names(env_reset(client, blackjack$instance_id)))
+  }
+})
+
+test_that("where a wrapper changes what is observed, names are lost", {
+  names_of <- function(wrapped) names(local_env(wrapped)$reset())
+  parts <- observation_parts$MountainCar
+  car <- function(...) gym_wrap("MountainCar-v0", ...)
+  expect_identical(names_of(car("TimeLimit", max_episode_steps = 5)), parts)
+  expect_identical(names_of(car("DelayObservation", delay = 1)), parts)
+  expect_null(names_of(car("NormalizeObservation")))
+  expect_null(names_of(car("RescaleObservation", min_obs = 0, max_obs = 1)))
+  expect_null(names_of(car("TimeAwareObservation")))
+  # One of these frames has two numbers, but there are two frames.
+  expect_null(dimnames(local_env(car("FrameStackObservation", stack_size = 2))$reset()))
+})
+
+test_that("an observation with names is sent back as one without", {
+  for (n in list(NULL, 2)) {
+    for (id in c("CartPole-v1", "Blackjack-v1")) {
+      env <- local_env(id, num_envs = n)
+      observed <- env$reset()
+      expect_true(space_contains(env$observation_space, observed))
+      expect_true(env_observation_space_contains(env$client, env$instance_id, observed))
+    }
+  }
+  # A number taken out of an observation keeps its name, and is an action all the same.
+  pendulum <- local_env("Pendulum-v1")
+  other <- local_env("Pendulum-v1")
+  observed <- pendulum$reset(seed = 1)
+  other$reset(seed = 1)
+  expect_identical(pendulum$step(observed["sin_theta"]), other$step(unname(observed)[2]))
+  poles <- local_env("CartPole-v1", num_envs = 1)
+  expect_identical(poles$step((poles$reset(seed = 1) > 9)[, "pole_angle"])$reward, 1)
 })

@@ -24,7 +24,8 @@ test_that("sub-environments play the same in R as in Python, in every vectorizat
       stdin = lines, env = c("current", PYTHONWARNINGS = "ignore")
     )
     flat <- function(out) {
-      as.numeric(c(row_major(out$observation), out$reward, out$terminated, out$truncated))
+      as.numeric(c(row_major(out$observation), out$reward, out$terminated, out$truncated,
+                   row_major(out$next_observation)))
     }
     played <- row_major(env$reset(seed = 7))
     ended <- 0L
@@ -84,7 +85,8 @@ test_that("each part of a result has a row for each sub-environment, also when t
     env <- local_env("CartPole-v1", num_envs = n, seed = 1)
     expect_identical(dim(env$reset()), c(n, 4L))
     out <- env$step(rep(1L, n))
-    expect_named(out, c("observation", "reward", "done", "info", "terminated", "truncated"))
+    expect_named(out, c("observation", "reward", "done", "info", "terminated", "truncated",
+                        "next_observation"))
     expect_identical(dim(out$observation), c(n, 4L))
     expect_identical(out$reward, rep(1, n))
     for (flag in c("done", "terminated", "truncated")) expect_identical(out[[flag]], logical(n))
@@ -154,6 +156,10 @@ test_that("with SameStep the step that ends an episode begins one and keeps its 
   expect_true(out$done[[1]])
   expect_identical(final[[1]], last$observation)
   expect_false(identical(out$observation[1, ], final[[1]]))
+  # What the step led to: the last observation where an episode ended, elsewhere what is observed.
+  expect_identical(out$next_observation[out$done, , drop = FALSE],
+                   do.call(rbind, final[out$done]))
+  expect_identical(out$next_observation[!out$done, ], out$observation[!out$done, ])
   expect_false(any(startsWith(names(out$info), "_")))
 })
 

@@ -60,7 +60,7 @@ drawing <- function(observation) {
   as.integer(stats::runif(nrow(observation)) < stats::plogis(observation[, 1]))
 }
 
-test_that("a batch is the same in whatever order batches are played, and when one is played again", {
+test_that("a batch is the same in any order of batches, and when it is played again", {
   ends <- function(seed, step, action) step == 1L + seed %% 7L
   reward <- function(seed, step, action) seed %% 3 + 10 * action
   for (mode in c("sync", "async", "vector_entry_point")) {

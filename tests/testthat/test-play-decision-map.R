@@ -124,7 +124,7 @@ test_that("a path is that of the rollout's steps, episode by episode", {
   expect_identical(map$path$x, played$steps$pole_angle)
   expect_identical(map$path$y, played$steps$pole_angular_velocity)
   expect_identical(map$path$episode, played$steps$episode)
-  expect_error(pole_map(path = rollout(env, policy_network())), "no steps",
+  expect_error(pole_map(path = rollout(env, policy_network())), "no steps in a table",
                class = "gym_error_argument")
 })
 

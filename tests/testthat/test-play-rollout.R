@@ -364,7 +364,9 @@ test_that("CartPole: the same seed plays the same episodes, another does not", {
 })
 
 first_observations <- function(played) {
-  unname(as.matrix(played$steps[played$steps$step == 1, 3:6]))
+  first <- as.matrix(played$steps[played$steps$step == 1, 3:6])
+  rownames(first) <- NULL
+  first
 }
 
 test_that("CartPole: a seed begins an episode again, in a vector environment with its number", {

@@ -34,3 +34,13 @@ test_that("of single numbers a vector is many observations", {
     expect_identical(observation_rows(c(3, 4), space), list(values = cbind(c(3, 4)), one = FALSE))
   }
 })
+
+test_that("a function sees the names of a single observation, too", {
+  seen <- NULL
+  follow <- function(observation) {
+    seen <<- observation
+    as.integer(observation[, "angle"] > 0)
+  }
+  expect_identical(act(follow, c(position = 1, angle = 2)), 1L)
+  expect_identical(seen, cbind(position = 1, angle = 2))
+})

@@ -54,3 +54,17 @@ test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
   columns <- value_columns(space, bound, "obs")
   expect_identical(as.character(columns$obs_1), c("900719925474099301", "1", "5"))
 })
+
+test_that("values are put in the place of some of a batch, whatever the space", {
+  withr::local_seed(8)
+  for (number in 1:100) {
+    space <- new_space(random_description())
+    values <- replicate(7, space_sample(space), simplify = FALSE)
+    expected <- values[c(1, 6, 3, 7, 5)]
+    replaced <- replace_rows(
+      space, batch_of(space, values[1:5]), 5L, c(2L, 4L), batch_of(space, values[6:7])
+    )
+    each <- function(batch) lapply(1:5, batch_value, space = space, batch = batch)
+    expect_equal(each(replaced), each(batch_of(space, expected)), info = format(space))
+  }
+})

@@ -28,7 +28,8 @@ test_that("after an error both generators are where they should be", {
     stop("no")
   }), silent = TRUE)
   expect_identical(.Random.seed, state)
-  expect_identical(with_generator(generator, runif(1)), with_generator(new_generator(7), runif(2))[2])
+  second <- with_generator(new_generator(7), runif(2))[2]
+  expect_identical(with_generator(generator, runif(1)), second)
   keep_random_state(runif(3))
   expect_identical(.Random.seed, state)
 })

@@ -82,6 +82,12 @@ test_that("values of random spaces reach Python in the sub-environment that they
                            "Dict", "Sequence", "Graph", "OneOf"))
 })
 
+# As text: an integer is a double where other sub-environments need one.
+expect_shows <- function(space, batch, i, value, number) {
+  expect_identical(write_value(space, batch_value(space, batch, i)), write_value(space, value),
+                   info = number)
+}
+
 test_that("the last observation of a sub-environment is kept for every kind of space", {
   skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
@@ -97,12 +103,15 @@ test_that("the last observation of a sub-environment is kept for every kind of s
     expect_length(out$info$final_obs, 1)
     # After its last value a mirror shows its first again.
     expect_identical(out$info$final_obs[[1L]], batch_value(space, first, 1L), info = number)
+    expect_shows(space, out$next_observation, 1L, batch_value(space, first, 1L), number)
     out <- env$step(batch_of(space, list(
       batch_value(space, out$observation, 1L), batch_value(space, second, 2L)
     )))
     expect_identical(out$terminated, c(FALSE, TRUE))
     expect_null(out$info$final_obs[[1L]])
     expect_identical(out$info$final_obs[[2L]], batch_value(space, first, 2L), info = number)
+    expect_shows(space, out$next_observation, 1L, batch_value(space, out$observation, 1L), number)
+    expect_shows(space, out$next_observation, 2L, batch_value(space, first, 2L), number)
     env$close()
   }
 })

@@ -1,0 +1,157 @@
+# The steps of a rollout as arrays, for those who write learners, which go through them time by time.
+
+#' Put the steps of batches into arrays by time and sub-environment
+#'
+#' A sub-environment's episodes follow one another in time. Where it played fewer steps than another
+#' the arrays end with `NA`.
+#' @inheritParams steps_table
+#' @return An object of class `gym_arrays`, a list of arrays.
+#' @noRd
+steps_arrays <- function(batches, episodes, vector_env, several = FALSE,
+                         next_observation = FALSE) {
+  steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
+  each <- function(name) lapply(steps, function(step) step[[name]])
+  row <- step_rows(batches)
+  cells <- cells_in_time(row, episodes, lengths(each("at")))
+  observed <- vector_env$observation_space
+  arrays <- list(
+    observation = array_in_time(observed, each("observation"), cells),
+    action = array_in_time(vector_env$action_space, each("action"), cells),
+    reward = numbers_in_time(as.numeric(unlist(each("reward"))), cells),
+    terminated = numbers_in_time(unlist(each("terminated")), cells),
+    truncated = numbers_in_time(unlist(each("truncated")), cells),
+    candidate = if (several) numbers_in_time(episodes$candidate[row], cells),
+    episode = numbers_in_time(episodes$episode[row], cells),
+    next_observation = if (next_observation) {
+      array_in_time(observed, each("next_observation"), cells)
+    }
+  )
+  # An episode that `max_steps` cut short is truncated in its last step.
+  arrays$truncated[cells$last] <- episodes$truncated
+  structure(arrays[lengths(arrays) > 0L], class = "gym_arrays")
+}
+
+#' Find the place of each step in arrays by time and sub-environment
+#' @param row The row of its episode in the table of episodes, for each step.
+#' @param counts How many steps were taken together, in the order in which they were played.
+#' @return A list: `dim`, how many times and sub-environments there are; `at`, the place of each
+#'   step when the sub-environments follow one another; `to`, which of the steps is the last of
+#'   those taken together; `counts`; and `last`, the places of the episodes' last steps.
+#' @noRd
+cells_in_time <- function(row, episodes, counts) {
+  ended <- stats::ave(episodes$length, episodes$sub_env, FUN = cumsum)
+  step <- integer(length(row))
+  step[order(row, method = "radix")] <- sequence(episodes$length)
+  time <- as.numeric(max(ended))
+  before <- (episodes$sub_env - 1) * time + ended - episodes$length
+  list(
+    dim = c(time, max(episodes$sub_env)), at = before[row] + step, to = cumsum(counts),
+    counts = counts, last = before + episodes$length
+  )
+}
+
+numbers_in_time <- function(values, cells) {
+  numbers <- rep(values[NA_integer_], prod(cells$dim))
+  numbers[cells$at] <- values
+  with_time(numbers, cells)
+}
+
+#' Put batches of values into an array by time and sub-environment
+#'
+#' Each batch goes straight to its place: beside the batches and the array nothing as large is made.
+#' @param values A list of batches, one for each step taken together.
+#' @return An array; a list of arrays for the parts of a Tuple or Dict.
+#' @noRd
+array_in_time <- function(space, values, cells) {
+  if (has_parts(space)) {
+    parts <- lapply(seq_along(space$spaces), function(i) {
+      lapply(values, function(batch) in_order(space, batch)[[i]])
+    })
+    names(parts) <- names(values[[1L]])
+    return(map_parts(space, array_in_time, parts, list(cells)))
+  }
+  wide <- any(vapply(values, inherits, NA, "integer64"))
+  numbers <- matrix(
+    if (wide) unclass(bit64::NA_integer64_) else vector(typeof(values[[1L]]), 1L)[2L],
+    prod(cells$dim), prod(space$shape)
+  )
+  for (i in seq_along(values)) {
+    batch <- if (wide) unclass(bit64::as.integer64(values[[i]])) else values[[i]]
+    numbers[cells$at[cells$to[[i]] - cells$counts[[i]] + seq_len(cells$counts[[i]])], ] <- batch
+  }
+  numbers <- with_time(numbers, cells, space)
+  if (wide) structure(numbers, class = "integer64") else numbers
+}
+
+with_time <- function(numbers, cells, space = NULL) {
+  dim(numbers) <- c(cells$dim, space$shape)
+  rank <- length(space$shape)
+  parts <- if (rank == 1L) list(space$names) else vector("list", rank)
+  dimnames(numbers) <- c(list(time = NULL, sub_env = NULL), parts)
+  numbers
+}
+
+# Checks before anything is played whether the steps fit into arrays.
+check_fits_arrays <- function(vector_env) {
+  for (what in c("observation", "action")) {
+    space <- vector_env[[paste0(what, "_space")]]
+    if (!fits_arrays(space)) {
+      gym_abort(
+        c(paste0("`steps = \"arrays\"` keeps values of one shape, and the ", what, "s of ",
+                 environment_label(vector_env), " are of ", format(space), "."),
+          i = "`steps = TRUE` keeps them in a table."),
+        class = "gym_error_argument", argument = "steps", value = "arrays",
+        call = vector_env$call
+      )
+    }
+  }
+}
+
+fits_arrays <- function(space) {
+  if (has_parts(space)) {
+    all(vapply(space$spaces, fits_arrays, NA))
+  } else {
+    is_stackable(space) || inherits(space, "gym_space_text")
+  }
+}
+
+# Printing --------------------------------------------------------------------------
+
+#' @export
+format.gym_arrays <- function(x, ...) {
+  shape <- dim(x$reward)
+  c(
+    paste0("<gym_arrays: ", count_of(shape[[1L]], "time"), ", ",
+           count_of(shape[[2L]], "sub-environment"), ">"),
+    paste0("  ", array_lines(unclass(x)))
+  )
+}
+
+#' @export
+print.gym_arrays <- function(x, ...) {
+  writeLines(format(x))
+  invisible(x)
+}
+
+array_lines <- function(arrays) {
+  flat <- flat_arrays(arrays)
+  paste0(
+    format(paste0(names(flat), ":")), " ", vapply(flat, function(x) typeof_text(x), ""), " ",
+    vapply(flat, function(x) shape_text(dim(x)), "")
+  )
+}
+
+# The arrays of Tuple and Dict under the names of the parts, such as `observation$position`.
+flat_arrays <- function(arrays) {
+  keys <- names(arrays) %||% paste0("[[", seq_along(arrays), "]]")
+  flat <- Map(function(array, key) {
+    if (!is.list(array)) {
+      return(stats::setNames(list(array), key))
+    }
+    inner <- flat_arrays(array)
+    stats::setNames(inner, paste0(key, ifelse(startsWith(names(inner), "["), "", "$"), names(inner)))
+  }, unname(arrays), keys)
+  do.call(c, flat)
+}
+
+typeof_text <- function(x) if (inherits(x, "integer64")) "integer64" else typeof(x)

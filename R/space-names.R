@@ -1,0 +1,47 @@
+# The names of what is observed. A space may have an element `names`: of a Box of one dimension the
+# names of its numbers, of a Tuple those of its parts, of a Discrete what its number is called in
+# tables. Values get their names once they are read; what reads and writes them needs none.
+
+#' Make the function that gives values of a space their names
+#'
+#' Made once for an environment, so that each step only sets an attribute.
+#' @param space The space of one value.
+#' @param batch Whether the function is for batches of values.
+#' @return A function of a value, which returns it with names; `NULL` where values have none.
+#' @noRd
+naming <- function(space, batch = FALSE) {
+  labels <- space$names
+  if (has_parts(space)) {
+    naming_of_parts(lapply(unname(space$spaces), naming, batch), if (is_tuple(space)) labels)
+  } else if (is.null(labels) || !inherits(space, "gym_space_box")) {
+    # A single number has none: it would be printed with its name at each step.
+    NULL
+  } else if (batch) {
+    labels <- list(NULL, labels)
+    function(value) {
+      dimnames(value) <- labels
+      value
+    }
+  } else {
+    function(value) {
+      names(value) <- labels
+      value
+    }
+  }
+}
+
+is_tuple <- function(space) inherits(space, "gym_space_tuple")
+
+naming_of_parts <- function(parts, labels) {
+  named <- which(!vapply(parts, is.null, NA))
+  if (!length(named) && is.null(labels)) {
+    return(NULL)
+  }
+  function(value) {
+    for (i in named) {
+      value[[i]] <- parts[[i]](value[[i]])
+    }
+    if (!is.null(labels)) names(value) <- labels
+    value
+  }
+}
