@@ -55,7 +55,8 @@ play_and_look <- function(check, seed, actions = NULL) {
     return(NULL)
   }
   look_at_observation(check, "reset", observation, "The first observation")
-  drawn <- new_generator(seed)
+  # The environment draws from the first stream of the seed.
+  drawn <- new_generator(stream = parallel::nextRNGStream(seed_stream(seed)))
   episode <- list(observation = observation, actions = list(), results = list(), ended = FALSE)
   for (taken in seq_len(if (is.null(actions)) check$limit else length(actions))) {
     action <- actions[[taken]] %||% with_generator(drawn, space_sample(env$action_space))
@@ -89,12 +90,21 @@ look_at_observation <- function(check, topic, observation, what) {
     gym_error_space = function(cnd) cnd
   )
   if (!is.null(problem)) {
-    place <- if (nzchar(problem$path)) paste0(" at `$", sub("^[$]", "", problem$path), "`")
+    place <- if (nzchar(problem$path)) {
+      paste0(" at `$", sub("^[$]", "", problem$path), "`", name_of_number(check$space, problem$path))
+    }
     note_finding(check, topic, paste0(
       what, ", ", describe_value(observation), ", does not fit the space ", format(check$space),
       place, ": ", lower_first(first_line(problem))
     ), key = paste("observation", first_line(problem)))
   }
+}
+
+# The name of the number with this index, where the numbers of a Box have names.
+name_of_number <- function(space, path) {
+  index <- suppressWarnings(as.integer(sub("^\\[([0-9]+)\\]$", "\\1", path)))
+  name <- space[["names"]][index + 1L]
+  if (length(name) && !is.na(name)) paste0(" (", name, ")")
 }
 
 lower_first <- function(text) paste0(tolower(substr(text, 1L, 1L)), substring(text, 2L))

@@ -47,15 +47,3 @@ observation_names <- function(env_id, space, wrappers = character()) {
   }
   if (identical(n, length(parts))) parts
 }
-
-#' Put a batch of observations into the columns of a table
-#' @return A named list of columns.
-#' @noRd
-observation_columns <- function(space, observations, env_id) {
-  columns <- value_columns(space, observations, "obs")
-  if (is_stackable(space)) {
-    names(columns) <- paste0("obs_", seq_along(columns), recycle0 = TRUE)
-  }
-  names(columns) <- observation_names(env_id, names(columns))
-  columns
-}

@@ -154,7 +154,7 @@ stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
   length_of <- lengths(each)
   if (all(length_of == 1L)) {
-    unlist(each, use.names = FALSE)
+    unlist(each, recursive = FALSE, use.names = FALSE)
   } else if (optional && all(length_of == 0L)) {
     logical(length(outs))
   }
@@ -176,7 +176,7 @@ observation_stacker <- function(space) {
     if (!has_shape(values)) {
       return(NULL)
     }
-    numbers <- unlist(values, use.names = FALSE)
+    numbers <- unlist(values, recursive = FALSE, use.names = FALSE)
     if (length(shape) == 0L || !is.atomic(numbers)) {
       return(numbers)
     }
@@ -229,7 +229,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
         row[which] <- seq_along(which)
         action <- batch_rows(task$action_space, action, row)
       }
-      result <- take_rows(raw_step(sub_env, action, call = call), sub_env, which, call)
+      out <- raw_step(sub_env, action, call = call)
+      result <- take_rows(out, sub_env, which, call)
       result$next_observation <- result$observation
       result
     },

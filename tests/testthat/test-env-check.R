@@ -89,7 +89,7 @@ test_that("an observation that does not fit its space is found", {
     observation_space = space_box(c(place = 0, speed = 0), c(4, 1)),
     reset = function(seed = NULL) c(0, 0), step = function(action) result(NULL, c(0, 2), 1, TRUE)
   )
-  expect_finding(boxed, "step", "<Box float64 [2]> at `$[1]`: there is a number outside of the")
+  expect_finding(boxed, "step", "<Box float64 [2]> at `$[1]` (speed): there is a number outside")
 })
 
 test_that("what a step must not return is found", {

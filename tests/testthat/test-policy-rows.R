@@ -133,7 +133,9 @@ test_that("a list may have policies of every kind", {
   candidates <- list(
     function(observation) observation[, 3] > 0, network, as_policy(tree), policy_random()
   )
-  env <- list(observation_space = four, action_space = discrete_space(2L),
+  named <- four
+  named$names <- observation_parts$CartPole
+  env <- list(observation_space = named, action_space = discrete_space(2L),
               spec = list(id = "CartPole-v1"))
   policies <- policy_bind(policy_list(candidates), env)
   angles <- c(1, -1, 1, -1, 1, -1, 1, -1)
