@@ -26,6 +26,9 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   } else if (definition$vectorized) {
     vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames)
   } else {
+    if (length(remembered_over_episodes(sub_env$task))) {
+      num_envs <- 1L
+    }
     batch_size <- as.integer(num_envs %||% r_sub_envs)
     copies <- lapply(seq_len(num_envs %||% min(batch_size, max_envs)), function(i) {
       definition_sub_env(definition)
@@ -51,7 +54,7 @@ new_r_vector_env <- function(task, ..., frames, sub_env) {
       observation_space = task$observation_space, action_space = task$action_space,
       spec = task$spec, ...,
       frame = if (frames) function() sub_env_png(sub_env),
-      remembers = task$remembers %||% character(), client = NULL,
+      remembers = remembered_over_episodes(task), client = NULL,
       close = function(wait = TRUE) invisible()
     ),
     class = "gym_vector_env"

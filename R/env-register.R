@@ -108,6 +108,22 @@ is_registered <- function(x) {
 #' @param arguments Those of `entry_point`, and `max_episode_steps`, -1 for no limit.
 #' @noRd
 make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
+  if (!inherits(id, "gym_wrapped")) {
+    return(make_entry(id, arguments, call))
+  }
+  env <- make_entry(id$env_id, arguments, call)
+  for (wrapper in id$wrappers) {
+    env <- wrap_if_r_env(env, wrapper, call)
+  }
+  env
+}
+
+wrap_if_r_env <- function(env, wrapper, call) {
+  check_wrappable(env, call)
+  wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
+}
+
+make_entry <- function(id, arguments, call) {
   registered <- the_session$environments[[id]]
   changes <- registered$changes
   if ("max_episode_steps" %in% names(arguments)) {
@@ -174,7 +190,8 @@ check_parameters <- function(given, definition, id, call = rlang::caller_env()) 
 }
 
 # For gym_make(). `...` are the arguments that only a server's environment has.
-make_registered_env <- function(id, arguments, seed, num_envs, ..., call) {
+make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., call) {
+  id <- with_wrappers(id, wrappers, call)
   servers <- list(...)
   given <- names(servers)[lengths(servers) > 0L]
   if (length(given)) {
@@ -189,6 +206,7 @@ make_registered_env <- function(id, arguments, seed, num_envs, ..., call) {
   check_count(seed, min = 0, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
   env <- make_registered(id, arguments, call)
+  id <- format(id)
   if (!is.null(num_envs)) {
     env <- with_num_envs(env, num_envs, id, call)
   }
@@ -220,7 +238,9 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
     return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
   }
   check_count(num_envs, allow_null = TRUE, call = call)
-  num_envs <- if (frames) 1L else num_envs
+  if (frames || length(remembered_over_episodes(sub_env_of(env)$task))) {
+    num_envs <- 1L
+  }
   batch_size <- as.integer(num_envs %||% r_sub_envs)
   more <- lapply(seq_len((num_envs %||% min(batch_size, max_envs)) - 1), function(i) {
     make_registered(id, arguments, call)
