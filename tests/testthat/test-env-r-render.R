@@ -21,8 +21,12 @@ plots <- function(self) {
 test_that("a function that plots gives a frame, and leaves the session's devices as they were", {
   skip_if_not_installed("png")
   grDevices::pdf(NULL)
-  withr::defer(grDevices::dev.off())
   before <- grDevices::dev.cur()
+  withr::defer(grDevices::dev.off(before))
+  grDevices::pdf(NULL)
+  other <- grDevices::dev.cur()
+  withr::defer(grDevices::dev.off(other))
+  grDevices::dev.set(before)
   env <- local_drawn(plots)
   env$reset()
   frame <- env$render()
