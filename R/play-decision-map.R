@@ -157,10 +157,11 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
       action_space = known$action_space, env_id = known$spec$id
     ))
   }
-  if (!inherits(policy, "gym_policy_network")) {
+  played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
+  if (!inherits(policy, "gym_policy_network") && !played) {
     gym_abort(
-      c(paste0("What is observed and done is known of networks that were played, not of ",
-               policy_text(policy), "."),
+      c(paste0("What is observed and done is known of networks and models that were played, ",
+               "not of ", policy_text(policy), "."),
         i = "Name the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y = )`."),
       class = "gym_error_argument", argument = "env", value = env, call = call
     )

@@ -260,6 +260,9 @@ predict.gym_rollout <- function(object, newdata, type = c("action", "output"), .
 #' @export
 print.gym_rollout <- function(x, ...) {
   cat(rollout_lines(x), sep = "\n")
+  if (!is.null(x$episodes$candidate)) {
+    print_candidates(evaluate_episodes(x$episodes, x$policy))
+  }
   invisible(x)
 }
 
@@ -269,7 +272,7 @@ rollout_lines <- function(x) {
     paste0("Rollout in ", x$env_id, ": ", count_of(length(returns), "episode"), ", ",
            count_of(sum(x$episodes$length), "step")),
     paste0("Policy: ", policy_text(x$policy)),
-    paste0("Return: ", returns_text(returns))
+    if (is.null(x$episodes$candidate)) paste0("Return: ", returns_text(returns))
   )
 }
 
@@ -293,7 +296,8 @@ returns_text <- function(returns) {
 #'   `returns` and `lengths` (the quartiles and the mean, named numeric vectors of
 #'   length 6), `mean` and `se` (the mean return and its standard error, doubles; the
 #'   latter `NA` for a single episode), `terminated` and `truncated` (how many
-#'   episodes ended so, integers).
+#'   episodes ended so, integers), `candidates` (`NULL`, or of several policies a row for each, as
+#'   [evaluate_policy()] has it).
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))
@@ -310,7 +314,8 @@ summary.gym_rollout <- function(object, ...) {
       mean = mean(episodes$return),
       se = standard_error(episodes$return),
       terminated = sum(episodes$terminated),
-      truncated = sum(episodes$truncated)
+      truncated = sum(episodes$truncated),
+      candidates = if (!is.null(episodes$candidate)) evaluate_episodes(episodes, object$policy)
     ),
     class = "summary.gym_rollout"
   )
@@ -322,11 +327,15 @@ print.summary.gym_rollout <- function(x, ...) {
     paste0("Rollout in ", x$env_id, ": ", count_of(x$episodes, "episode"), ", ",
            count_of(x$steps, "step")),
     paste0("Policy: ", policy_text(x$policy)),
-    paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
+    if (is.null(x$candidates)) paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
     paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated),
     "",
     sep = "\n"
   )
+  if (!is.null(x$candidates)) {
+    print_candidates(x$candidates)
+    return(invisible(x))
+  }
   print(signif(rbind(return = x$returns, length = x$lengths), 4L))
   invisible(x)
 }

@@ -1,136 +1,60 @@
-# Several policies that play in the same batch, the candidates: networks of the same sizes with
-# different weights, or a list of policies of any kind.
-
-#' Give the policy of some candidates
+#' Make candidates of a matrix of weights
 #'
-#' @param candidates Their numbers, in increasing order.
-#' @return A policy that has these candidates alone; of a single one the policy itself.
-#' @noRd
-policy_subset <- function(policy, candidates) UseMethod("policy_subset")
-
-#' @exportS3Method
-policy_subset.default <- function(policy, candidates) policy
-
-#' @exportS3Method
-policy_subset.gym_policy_candidates <- function(policy, candidates) {
-  policy$weights <- policy$weights[candidates, , drop = FALSE]
-  if (nrow(policy$weights) == 1L) {
-    with_weights(policy$policy, policy$weights[1L, ])
-  } else {
-    policy
-  }
-}
-
-#' @exportS3Method
-policy_subset.gym_policy_list <- function(policy, candidates) {
-  policies <- unclass(policy)[candidates]
-  if (length(policies) == 1L) policies[[1L]] else policy_list(policies)
-}
-
-#' Give the policy that acts for rows of observations
+#' Candidates are networks of the same sizes and activations that differ in their weights.
+#' [rollout()] and [evaluate_policy()] play all of them at once, which is much faster than playing
+#' one after the other.
 #'
-#' @param candidate Which candidate acts for each row.
-#' @return A policy for [act_batch()].
-#' @noRd
-policy_rows <- function(policy, candidate) UseMethod("policy_rows")
-
-#' @exportS3Method
-policy_rows.default <- function(policy, candidate) policy
-
-# How many candidates there are, `NULL` for a policy that is none of several.
-count_candidates <- function(policy) {
-  if (inherits(policy, "gym_policy_candidates")) {
-    nrow(policy$weights)
-  } else if (inherits(policy, "gym_policy_list")) {
-    length(policy)
-  }
-}
-
-# Networks -----------------------------------------------------------------------------
-
-new_candidates <- function(policy, weights) {
-  structure(
-    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
-  )
-}
-
-#' @exportS3Method
-policy_bind.gym_policy_candidates <- function(policy, env, call = rlang::caller_env()) {
-  policy$policy <- policy_bind(policy$policy, env, call)
-  policy
-}
-
-#' @exportS3Method
-policy_rows.gym_policy_candidates <- function(policy, candidate) {
-  network <- policy$policy
-  ends <- cumsum(lengths(network$weights))
-  layers <- Map(
-    function(from, to) policy$weights[candidate, from:to, drop = FALSE],
-    c(0L, ends[-length(ends)]) + 1L, ends
-  )
-  structure(list(network = network, layers = layers), class = c("gym_policy_rows", "gym_policy"))
-}
-
-#' @exportS3Method
-act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
-  network <- policy$network
-  signal <- network_inputs(network$observation_space, number_rows(observation))
-  for (layer in seq_along(policy$layers)) {
-    signal <- activate(sum_weighted(signal, policy$layers[[layer]]), network$activation[[layer]])
-  }
-  network_action(network$action_space, signal, network, one = FALSE)
-}
-
-#' Sum inputs with weights of their own for each row
+#' @param policy A network, made by [policy_network()]: its sizes and activations are those of all
+#'   candidates. Its own weights are not used.
+#' @param weights A numeric matrix with the weights of a candidate in each row, in the order of
+#'   [coef()][coef.gym_policy_network]. Names of rows are the candidates' names.
+#' @return An object of class `gym_policy_candidates`, a list with the elements `policy` and
+#'   `weights`. [coef()][coef.gym_policy_network] gives the matrix.
+#' @section Errors: `gym_error_argument` when `policy` is no network, or `weights` not a matrix of
+#'   as many columns as the network has weights, without missing values.
+#' @export
+#' @examples
+#' policy <- policy_network(c(4, 1))
+#' candidates <- policy_candidates(policy, rbind(left = c(0, 0, -1, 0), right = c(0, 0, 1, 0)))
+#' candidates
+#' coef(candidates)["right", ]
 #'
-#' @param weights In each row the weight matrix of a layer, column after column: all
-#'   outputs of the first input, then those of the next.
-#' @return A matrix with one column for each output.
-#' @noRd
-sum_weighted <- function(signal, weights) {
-  n <- nrow(signal)
-  inputs <- ncol(signal)
-  outputs <- ncol(weights) %/% inputs
-  terms <- signal[, rep(seq_len(inputs), each = outputs)] * weights
-  sums <- .rowSums(terms, n * outputs, inputs)
-  dim(sums) <- c(n, outputs)
-  sums
+#' @examplesIf gym:::can_start_server()
+#' rollout("CartPole-v1", candidates, episodes = 5, seed = 1)
+policy_candidates <- function(policy, weights) {
+  if (!inherits(policy, "gym_policy_network")) {
+    abort_no_weights(policy, "policy", rlang::current_env())
+  }
+  check_candidate_weights(weights, sum(lengths(policy$weights)))
+  storage.mode(weights) <- "double"
+  new_candidates(policy, weights)
 }
 
-# Lists --------------------------------------------------------------------------------
-
-policy_list <- function(policies) {
-  structure(policies, class = c("gym_policy_list", "gym_policy"))
-}
-
-#' @exportS3Method
-policy_bind.gym_policy_list <- function(policy, env, call = rlang::caller_env()) {
-  policy_list(lapply(unclass(policy), policy_bind, env = env, call = call))
+check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {
+  if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights)) {
+    single <- is.numeric(weights) && is.null(dim(weights))
+    gym_abort(
+      c(paste0("`weights` must be a numeric matrix with a candidate in each row, not ",
+               describe_argument(weights), "."),
+        i = if (single) "For a single candidate this is `rbind(weights)`."),
+      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    )
+  }
+  if (ncol(weights) != count) {
+    turned <- nrow(weights) == count
+    gym_abort(
+      c(paste0("`weights` must have the ", count_of(count, "weight"), " of a candidate in each ",
+               "row, one a column, not ", count_of(ncol(weights), "column"), "."),
+        i = if (turned) "`t(weights)` has a candidate in each row."),
+      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    )
+  }
+  if (anyNA(weights)) {
+    abort_argument(weights, "without missing values", "weights", call)
+  }
 }
 
 #' @export
-format.gym_policy_list <- function(x, ...) {
-  paste0(length(x), " policies: ", paste(vapply(unclass(x), policy_text, ""), collapse = "; "))
-}
-
-#' @exportS3Method
-policy_rows.gym_policy_list <- function(policy, candidate) {
-  structure(
-    list(policies = unclass(policy), rows = split(seq_along(candidate), candidate)),
-    class = c("gym_policy_list_rows", "gym_policy")
-  )
-}
-
-#' @exportS3Method
-act_batch.gym_policy_list_rows <- function(policy, observation, n, vector_env) {
-  observed <- vector_env$observation_space
-  actions <- Map(
-    function(candidate, rows) {
-      own <- batch_rows(observed, observation, rows)
-      act_batch(policy$policies[[candidate]], own, length(rows), vector_env)
-    },
-    as.integer(names(policy$rows)), policy$rows
-  )
-  together <- bind_batches(vector_env$action_space, actions)
-  batch_rows(vector_env$action_space, together, order(unlist(policy$rows)))
+format.gym_policy_candidates <- function(x, ...) {
+  paste0(count_of(nrow(x$weights), "candidate"), " of ", format(x$policy))
 }

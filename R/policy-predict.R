@@ -1,10 +1,10 @@
 #' @rdname act
-#' @param object A policy made by [policy_network()].
+#' @param object A policy made by [policy_network()] or [as_policy()].
 #' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
 #'   a data frame, such as the steps of a [rollout()], with a column for each number of an
 #'   observation under its name there.
 #' @param type `"action"`, the default, for the policy's actions, or `"output"` for the outputs of
-#'   the network that they follow from.
+#'   the network, or the predictions of the model, that they follow from.
 #' @export
 predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
@@ -12,9 +12,13 @@ predict.gym_policy <- function(object, newdata, type = c("action", "output"), ..
 }
 
 predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (inherits(policy, "gym_policy_model")) {
+    return(predict_model(policy, newdata, type, call))
+  }
   if (!inherits(policy, "gym_policy_network")) {
     gym_abort(
-      paste0("`predict()` needs the policy to be a network, not ", policy_text(policy), "."),
+      paste0("`predict()` needs the policy to be a network or a model, not ", policy_text(policy),
+             "."),
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
   }

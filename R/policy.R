@@ -131,7 +131,9 @@ abort_no_policy <- function(x, arg, call) {
     c(
       paste0("`", arg, "` must be a policy or a function of observations, not ",
              describe_argument(x), "."),
-      i = if (!is.null(own)) {
+      i = if (!is.null(predict_method(x))) {
+        "`as_policy()` makes a policy of a model that predicts actions."
+      } else if (!is.null(own)) {
         paste0("`.S3method(\"act\", \"", own, "\", f)` makes `f` the method by which objects of ",
                "its class act.")
       }

@@ -1,64 +1,41 @@
-fake_with <- function(observation_space, action_space) {
-  vector_env_of(
-    fake_vector_env(12, observation_space = observation_space, action_space = action_space)
-  )
-}
-
-# Every candidate in three sub-environments.
-candidates_in <- function(sub_envs, policy) {
-  policies <- lapply(1:4, function(i) policy_bind(policy_resample(policy), sub_envs))
-  list(policies = policies, together = candidates_of(policies, rep(1:4, each = 3)))
-}
-
-alone <- function(policies, observations, playing) {
-  lapply(playing, function(i) act(policies[[(i + 2L) %/% 3L]], observations[i, ]))
-}
-
-test_that("candidates act together as each of them alone, in all sub-environments or in some", {
-  set.seed(1)
-  for (sizes in list(c(4, 1), c(4, 2, 1), c(4, 8, 8, 3), c(4, 1, 3))) {
-    actions <- discrete_space(max(2L, sizes[[length(sizes)]]))
-    sub_envs <- fake_with(box_space(rep(-1, 4), rep(1, 4)), actions)
-    candidates <- candidates_in(sub_envs, policy_network(sizes))
-    observations <- matrix(rnorm(48), ncol = 4)
-    for (playing in list(1:12, c(2L, 3L, 7L, 12L), 5L)) {
-      expect_identical(
-        act_batch(candidates$together, observations[playing, , drop = FALSE], playing, sub_envs),
-        unlist(alone(candidates$policies, observations, playing))
-      )
-    }
-  }
-})
-
-test_that("so they do where actions are boxes, or observations discrete or arrays", {
-  set.seed(2)
-  sub_envs <- fake_with(box_space(rep(-1, 4), rep(1, 4)), box_space(c(-2, 0), c(2, 10)))
-  candidates <- candidates_in(sub_envs, policy_network(c(4, 3, 2), c("tanh", "tanh")))
-  observations <- matrix(rnorm(48), ncol = 4)
-  expect_equal(
-    act_batch(candidates$together, observations, 1:12, sub_envs),
-    do.call(rbind, alone(candidates$policies, observations, 1:12)), tolerance = 1e-14
-  )
-  sub_envs <- fake_with(discrete_space(5L), discrete_space(2L))
-  candidates <- candidates_in(sub_envs, policy_network(c(5, 2, 1)))
-  observed <- sample(0:4, 12, replace = TRUE)
+test_that("candidates give back their weights, with their names", {
+  weights <- rbind(left = c(0, 0, -1, 0), right = c(0, 0, 1, 0))
+  candidates <- policy_candidates(policy_network(c(4, 1)), weights)
+  expect_identical(coef(candidates), weights)
+  coef(candidates) <- -weights
+  expect_identical(coef(candidates), -weights)
   expect_identical(
-    act_batch(candidates$together, observed, 1:12, sub_envs),
-    unlist(alone(candidates$policies, cbind(observed), 1:12))
+    format(candidates), "2 candidates of network 4-1, logistic, 4 weights"
   )
-  sub_envs <- fake_with(box_space(rep(-1, 6), rep(1, 6), shape = c(2L, 3L)), discrete_space(2L))
-  candidates <- candidates_in(sub_envs, policy_network(c(6, 2, 1)))
-  arrays <- array(rnorm(72), c(12, 2, 3))
-  one_by_one <- lapply(1:12, function(i) act(candidates$policies[[(i + 2) %/% 3]], arrays[i, , ]))
-  expect_identical(act_batch(candidates$together, arrays, 1:12, sub_envs), unlist(one_by_one))
+  whole <- policy_candidates(policy_network(c(4, 1)), matrix(1:4, 1))
+  expect_identical(coef(whole), matrix(as.numeric(1:4), 1))
 })
 
-test_that("an infinite input spoils no other sub-environment's or neuron's sum", {
-  sums <- sum_weighted(rbind(c(Inf, 1), c(2, 3)), rbind(c(1, -1, 1, 1), c(1, 2, 3, 4)))
-  expect_identical(sums, rbind(c(Inf, -Inf), c(11, 16)))
+test_that("a matrix of the wrong width is refused with the width that is right", {
+  policy <- policy_network(c(4, 2, 1))
+  try_weights <- function(weights) policy_candidates(policy, weights)
+  cnd <- expect_error(
+    try_weights(matrix(0, 3, 9)),
+    "`weights` must have the 10 weights of a candidate in each row, one a column, not 9 columns.",
+    fixed = TRUE, class = "gym_error_argument"
+  )
+  expect_null(cnd$body)
+  cnd <- expect_error(try_weights(matrix(0, 10, 3)), "not 3 columns", class = "gym_error_argument")
+  expect_match(conditionMessage(cnd), "`t(weights)` has a candidate in each row.", fixed = TRUE)
 })
 
-test_that("a single candidate is played as the network that it is", {
-  policy <- policy_network()
-  expect_identical(candidates_of(list(policy), rep(1L, 5)), policy)
+test_that("what is no matrix of numbers is refused", {
+  policy <- policy_network(c(4, 1))
+  try_weights <- function(weights) policy_candidates(policy, weights)
+  cnd <- expect_error(try_weights(1:4), "a numeric matrix with a candidate in each row",
+                      class = "gym_error_argument")
+  expect_match(conditionMessage(cnd), "`rbind(weights)`", fixed = TRUE)
+  expect_error(try_weights(matrix("a", 1, 4)), "a numeric matrix", class = "gym_error_argument")
+  expect_error(try_weights(data.frame(a = 1)), "object of class data.frame",
+               class = "gym_error_argument")
+  expect_error(try_weights(matrix(0, 0, 4)), "an array of 0 x 4", class = "gym_error_argument")
+  expect_error(try_weights(matrix(c(1, 2, 3, NA), 1)), "without missing values",
+               class = "gym_error_argument")
+  expect_error(policy_candidates(policy_random(), matrix(0, 1, 4)), "a policy with weights",
+               class = "gym_error_argument")
 })

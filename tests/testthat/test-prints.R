@@ -57,6 +57,10 @@ test_that("a policy of each kind", {
   expect_printed(policy_network(c(4, 2, 1)))
   weights <- list(matrix(seq(-0.4, 0.3, by = 0.1), 2), matrix(c(1, -1), 1))
   expect_printed(policy_network(c(4, 2, 1), weights = weights))
+  expect_printed(policy_candidates(policy_network(c(4, 2, 1)), matrix(0, 3, 10)))
+  steps <- data.frame(pole_angle = c(-1, 0.2, -0.1, 2), action = c(0, 0, 1, 1))
+  expect_printed(as_policy(glm(action ~ pole_angle, binomial, steps)))
+  expect_printed(as_policy(lm(steps$action ~ 1)))
 })
 
 test_that("a frame, frames and an animation", {
@@ -73,6 +77,20 @@ test_that("a rollout and its summary", {
   played <- rollout(fake_vector_env(4), policy_random(), episodes = 10, seed = 1)
   expect_printed(played)
   expect_printed(summary(played))
+})
+
+test_that("rollouts and evaluations of several policies", {
+  network <- policy_network(c(4, 1), weights = list(matrix(c(1, -1, 1, -1), 1)))
+  policies <- list(network = network, random = policy_random())
+  env <- fake_vector_env(4, reward = function(seed, step, action) seed %% 7 + action)
+  played <- rollout(env, policies, episodes = 10, seed = 1)
+  expect_printed(played)
+  expect_printed(summary(played))
+  expect_printed(evaluate_policy(env, network, episodes = 10, seed = 1))
+  expect_printed(evaluate_policy(env, network, episodes = 1, seed = 1))
+  weights <- matrix(sin(1:48), 12)
+  candidates <- policy_candidates(policy_network(c(4, 1)), weights)
+  expect_printed(evaluate_policy(env, candidates, episodes = 10, seed = 1, level = 0.999))
 })
 
 test_that("a search that found and one that did not, and their summaries", {

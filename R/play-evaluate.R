@@ -1,0 +1,123 @@
+#' Evaluate policies
+#'
+#' Plays each policy in the same number of episodes and gives its mean return, with how sure that
+#' is. Nothing is kept of single episodes: for these see [rollout()], which plays them.
+#'
+#' All candidates play episodes with the same seeds where each episode has a seed of its own (see
+#' [as_vector_env()]), so that luck favours none of them.
+#'
+#' @inheritParams rollout
+#' @param policy The policy: as for [rollout()] one, a list of several, or [policy_candidates()].
+#' @param episodes How many episodes to play with each policy, a whole number of at least 1; the
+#'   default is 100.
+#' @param level The confidence level of the interval, a number between 0 and 1; the default is
+#'   0.95.
+#' @return A data frame of class `gym_evaluation` with one row for each policy, in which
+#'   `candidate` is its number (integer), `mean_return` the mean of its episodes' returns, `se` the
+#'   standard error of this mean, `lower` and `upper` the bounds of the confidence interval
+#'   (doubles, `NA` for a single episode), `episodes` and `steps` how many were played (integers).
+#'   Names of policies in a list, or of rows of weights, are the names of rows.
+#' @section Errors: As [rollout()].
+#' @references The interval is that of [stats::t.test()].
+#' @seealso [rollout()], [plot()][plot.gym_rollout()] of which compares policies in a picture.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' evaluate_policy("CartPole-v1", follow_pole, episodes = 50, seed = 1)
+#'
+#' policies <- list(random = policy_random(), follow = follow_pole)
+#' compared <- evaluate_policy("CartPole-v1", policies, episodes = 50, seed = 1)
+#' compared
+#' compared["follow", "mean_return"]
+#'
+#' # The best of a hundred networks.
+#' weights <- matrix(runif(100 * 10, -1, 1), nrow = 100)
+#' candidates <- policy_candidates(policy_network(c(4, 2, 1)), weights)
+#' evaluation <- evaluate_policy("CartPole-v1", candidates, episodes = 5, seed = 1)
+#' evaluation
+#' best <- policy_network(c(4, 2, 1))
+#' coef(best) <- weights[which.max(evaluation$mean_return), ]
+evaluate_policy <- function(env, policy, episodes = 100, seed = NULL, ..., max_steps = NULL,
+                            num_envs = NULL, level = 0.95, progress = rlang::is_interactive(),
+                            client = gym_client()) {
+  if (!is_number(level) || level <= 0 || level >= 1) {
+    abort_argument(level, "a number between 0 and 1", "level", rlang::current_env())
+  }
+  played <- rollout(
+    env, policy, episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,
+    progress = progress, client = client
+  )
+  structure(
+    evaluate_episodes(played$episodes, played$policy, level), level = level,
+    env_id = played$env_id, policy = played$policy, seed = played$seed,
+    class = c("gym_evaluation", "data.frame")
+  )
+}
+
+#' Evaluate each candidate by its episodes
+#' @param episodes A table of episodes, with a column `candidate` where there are several.
+#' @return A data frame, see [evaluate_policy()].
+#' @noRd
+evaluate_episodes <- function(episodes, policy, level = 0.95) {
+  candidate <- episodes$candidate %||% rep(1L, nrow(episodes))
+  each <- split(episodes, candidate)
+  column <- function(f, type) unname(vapply(each, f, type))
+  mean_return <- column(function(own) mean(own$return), 0)
+  se <- column(function(own) standard_error(own$return), 0)
+  count <- column(nrow, 0L)
+  # Of a single episode there is no interval, and no quantile for one.
+  beyond <- se * stats::qt((1 + level) / 2, pmax(count - 1L, 1L))
+  numbers <- as.integer(names(each))
+  data.frame(
+    candidate = numbers, mean_return = mean_return, se = se, lower = mean_return - beyond,
+    upper = mean_return + beyond, episodes = count,
+    steps = column(function(own) sum(own$length), 0L),
+    row.names = candidate_names(policy)[numbers]
+  )
+}
+
+#' @export
+print.gym_evaluation <- function(x, ...) {
+  if (!all(evaluation_columns %in% names(x)) || is.null(attr(x, "env_id"))) {
+    # Somebody has chosen columns.
+    return(invisible(NextMethod()))
+  }
+  cat(
+    paste0("Evaluation in ", attr(x, "env_id"), ": ", count_of(sum(x$episodes), "episode"), ", ",
+           count_of(sum(x$steps), "step")),
+    paste0("Policy: ", policy_text(attr(x, "policy"))),
+    sep = "\n"
+  )
+  if (nrow(x) == 1L && is.null(count_candidates(attr(x, "policy")))) {
+    cat("Mean return: ", number_text(x$mean_return), se_text(x$se), interval_text(x), "\n", sep = "")
+  } else {
+    print_candidates(x, attr(x, "level"))
+  }
+  invisible(x)
+}
+
+interval_text <- function(x) {
+  if (!is.na(x$se)) {
+    paste0(", ", level_text(attr(x, "level")), " interval from ", number_text(x$lower), " to ",
+           number_text(x$upper))
+  }
+}
+
+level_text <- function(level) paste0(format(100 * level), "%")
+
+# Prints a row for each candidate; of many those with the highest mean returns.
+print_candidates <- function(x, level = 0.95, most = 10L) {
+  few <- nrow(x) <= most
+  shown <- if (few) seq_len(nrow(x)) else order(-x$mean_return)[seq_len(most)]
+  cat(
+    if (few) "Mean returns" else paste("The", most, "highest of", nrow(x), "mean returns"),
+    ", with ", level_text(level), " intervals:\n", sep = ""
+  )
+  table <- as.list(x)[evaluation_columns]
+  table$candidate <- row.names(x)
+  numbers <- c("mean_return", "se", "lower", "upper")
+  table[numbers] <- lapply(table[numbers], signif, digits = 4L)
+  print(data.frame(lapply(table, `[`, shown)), row.names = FALSE)
+}
+
+evaluation_columns <- c("candidate", "mean_return", "se", "lower", "upper", "episodes", "steps")

@@ -1,0 +1,79 @@
+#' Get and set the weights of a policy
+#'
+#' `coef()` gives the weights of a network as one numeric vector, `coef(policy) <- w` sets them.
+#' So anything that works on vectors works on policies: averages of policies, noise around one,
+#' [stats::optim()].
+#'
+#' The order is that in which [policy_network()] draws them: layer after layer, each matrix column
+#' after column, that is first the weights of the first input.
+#'
+#' @param object A network, made by [policy_network()] or found by a search; or candidates, made
+#'   by [policy_candidates()].
+#' @param ... Not used.
+#' @param value The new weights, a numeric vector with one number for each; for candidates a matrix
+#'   as [policy_candidates()] takes it.
+#' @return `coef()` a numeric vector; for candidates a matrix with the weights of a candidate in
+#'   each row. `coef<-` the policy with the new weights.
+#' @section Errors: `gym_error_argument` for a policy without weights, a wrong number of weights and
+#'   missing values.
+#' @export
+#' @examples
+#' policy <- policy_network(c(4, 2, 1))
+#' coef(policy)
+#' coef(policy)[1]
+#' policy$weights[[1]][1, 1]
+#'
+#' # Noise around a policy.
+#' near <- policy
+#' coef(near) <- coef(policy) + rnorm(10, sd = 0.1)
+coef.gym_policy_network <- function(object, ...) {
+  check_dots_empty(...)
+  weight_vector(object)
+}
+
+#' @rdname coef.gym_policy_network
+#' @export
+coef.gym_policy_candidates <- function(object, ...) {
+  check_dots_empty(...)
+  object$weights
+}
+
+#' @export
+coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlang::current_env())
+
+#' @rdname coef.gym_policy_network
+#' @export
+`coef<-` <- function(object, ..., value) UseMethod("coef<-")
+
+#' @export
+`coef<-.default` <- function(object, ..., value) {
+  abort_no_weights(object, "object", rlang::current_env())
+}
+
+#' @export
+`coef<-.gym_policy_network` <- function(object, ..., value) {
+  check_dots_empty(...)
+  count <- sum(lengths(object$weights))
+  if (!is.numeric(value) || length(value) != count) {
+    abort_argument(value, paste("a vector of", count_of(count, "number")), "value",
+                   rlang::current_env())
+  }
+  if (anyNA(value)) {
+    abort_argument(value, "without missing values", "value", rlang::current_env())
+  }
+  with_weights(object, as.numeric(value))
+}
+
+#' @export
+`coef<-.gym_policy_candidates` <- function(object, ..., value) {
+  check_dots_empty(...)
+  policy_candidates(object$policy, value)
+}
+
+abort_no_weights <- function(policy, arg, call) {
+  gym_abort(
+    c(paste0("`", arg, "` must be a policy with weights, not ", policy_text(policy), "."),
+      i = "`policy_network()` makes one."),
+    class = "gym_error_argument", argument = arg, value = policy, call = call
+  )
+}
