@@ -12,7 +12,8 @@ made_up_steps <- function(n = 200) {
 bound <- function(model, action_space = discrete_space(2L), ..., id = "CartPole-v1",
                   observation_space = box_space(rep(-9, 4), rep(9, 4))) {
   policy_bind(as_policy(model, ...), list(
-    spec = list(id = id), observation_space = observation_space, action_space = action_space
+    spec = list(id = id), observation_space = named_space(observation_space, id),
+    action_space = action_space
   ))
 }
 
