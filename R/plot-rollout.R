@@ -47,7 +47,7 @@
 #' plot(rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1))
 #'
 #' # The pole falls to the right: push the cart to the right.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, steps = TRUE, frames = TRUE)
 #' plot(played, type = "trajectory")
 #' if (requireNamespace("png", quietly = TRUE)) plot(played, type = "filmstrip")
