@@ -98,7 +98,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   settings["seed"] <- list(seed)
   file <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
   if (isTRUE(file$saved$finished)) {
-    client <- if (is_playable(env)) env$client else client
+    client <- if (is_playable(env)) env$client else if (!is_registered(env)) client
     return(finished_search(file$saved, settings, client, file$path))
   }
   settings$seed <- file$saved$seed %||% seed %||% draw_seed()

@@ -65,6 +65,9 @@ as_vector_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALS
 as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
                                     client = gym_client()) {
   check_environment(x)
+  if (is_registered(x)) {
+    return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
+  }
   env <- make_vector_env(x, num_envs, list(...), max_envs, frames, client)
   vector_env <- vector_env_of(env, frames, batch_size = num_envs %||% sync_sub_envs)
   vector_env$close <- function(wait = TRUE) {

@@ -81,6 +81,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
                        autoreset_mode = NULL, name = NULL) {
   check_client(x)
+  check_not_registered(env_id)
   check_named_list(kwargs)
   create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,

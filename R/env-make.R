@@ -109,6 +109,13 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
                           autoreset_mode = NULL, name = NULL, call = rlang::caller_env()) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1", call)
+  if (is_registered(env_id)) {
+    return(make_registered_env(
+      env_id, kwargs, seed, num_envs, render_mode = render_mode, wrappers = wrappers,
+      vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
+      call = call
+    ))
+  }
   check_client(client, call = call)
   env <- NULL
   instance_id <- NULL

@@ -1,7 +1,8 @@
 #' List the environments of Gymnasium
 #'
 #' Those that the server can make, those that it could with an extra, see
-#' [gym_server_install()], and some that it cannot make at all.
+#' [gym_server_install()], and some that it cannot make at all; and the environments written in R
+#' that this session has registered, see [gym_register()].
 #'
 #' @param client A client, by default that of [gym_client()].
 #' @param search A text to look for in the ids, whatever its case; where none has
@@ -25,7 +26,7 @@ env_registry <- function(client = gym_client(), search = NULL) {
   check_string(search, allow_null = TRUE)
   route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
   environments <- get_answer(client, route)$environments
-  data.frame(
+  servers <- data.frame(
     id = listed_texts(environments, "id", ""),
     max_episode_steps = listed_counts(environments, "max_episode_steps"),
     reward_threshold = listed_numbers(environments, "reward_threshold"),
@@ -34,4 +35,6 @@ env_registry <- function(client = gym_client(), search = NULL) {
     available = listed_flags(environments, "available"),
     reason = listed_texts(environments, "reason")
   )
+  own <- registered_rows(search)
+  rbind(servers[!servers$id %in% own$id, ], own, make.row.names = FALSE)
 }

@@ -89,7 +89,8 @@ print.gym_evaluation <- function(x, ...) {
     sep = "\n"
   )
   if (nrow(x) == 1L && is.null(count_candidates(attr(x, "policy")))) {
-    cat("Mean return: ", number_text(x$mean_return), se_text(x$se), interval_text(x), "\n", sep = "")
+    mean <- paste0(number_text(x$mean_return), se_text(x$se), interval_text(x))
+    cat("Mean return: ", mean, "\n", sep = "")
   } else {
     print_candidates(x, attr(x, "level"))
   }

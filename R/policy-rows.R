@@ -125,8 +125,9 @@ format.gym_policy_list <- function(x, ...) {
   if (!is.null(candidate_names(x))) {
     texts <- paste0(names(few), " (", texts, ")")
   }
-  more <- if (length(x) > 4L) paste0("; and ", length(x) - 4L, " more")
-  paste0(length(x), if (length(x) == 1L) " policy: " else " policies: ", paste(texts, collapse = "; "), more)
+  more <- if (length(x) > 4L) paste("and", length(x) - 4L, "more")
+  noun <- if (length(x) == 1L) " policy: " else " policies: "
+  paste0(length(x), noun, paste(c(texts, more), collapse = "; "))
 }
 
 #' @exportS3Method

@@ -107,6 +107,7 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   }
   if (is.function(x) && !has_act_method(x)) {
     check_takes_observations(x, arg, call)
+    check_connections(x, arg, call)
   }
   invisible(x)
 }

@@ -155,9 +155,10 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 #' one, so that the error names the sub-environment and shows its value.
 #' @param space The space of one sub-environment, `batch` that of all `n`.
 #' @param sub_envs Their numbers; `NULL` for 1 to `n`.
+#' @param bounds Whether to check against the bounds, too.
 #' @noRd
-check_batch <- function(space, batch, values, n, call, sub_envs = NULL) {
-  if (fits_space(batch, values)) {
+check_batch <- function(space, batch, values, n, call, sub_envs = NULL, bounds = FALSE) {
+  if (fits_space(batch, values, bounds)) {
     return(invisible())
   }
   given <- batch_length(space, values)
@@ -168,15 +169,15 @@ check_batch <- function(space, batch, values, n, call, sub_envs = NULL) {
   if (!is.na(given)) {
     for (i in seq_len(n)) {
       sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
-      check_batch_value(space, batch_value(space, values, i), sub_env, call)
+      check_batch_value(space, batch_value(space, values, i), sub_env, call, bounds)
     }
   }
-  check_value(batch, values, "", call)
+  check_value(batch, values, "", call, bounds)
 }
 
-check_batch_value <- function(space, value, sub_env, call) {
+check_batch_value <- function(space, value, sub_env, call, bounds = FALSE) {
   tryCatch(
-    check_value(space, value, "", call),
+    check_value(space, value, "", call, bounds),
     gym_error_space = function(cnd) {
       cnd$message <- paste0("Sub-environment ", sub_env, ": ", cnd$message)
       cnd$sub_env <- sub_env

@@ -24,7 +24,11 @@ seed_stream <- function(seed) {
 #' @param stream A stream to begin with, instead of the first one of the seed.
 #' @return An environment with `state`, which [with_generator()] moves on.
 #' @noRd
-new_generator <- function(seed, stream = seed_stream(seed)) rlang::env(state = stream)
+new_generator <- function(seed, stream = seed_stream(seed)) {
+  generator <- new.env(parent = emptyenv())
+  generator$state <- stream
+  generator
+}
 
 #' Run code that draws from a generator beside the session's
 #'

@@ -5,6 +5,7 @@
 #   client          the client of the session's own server; named_client that of GYM_SERVER_URL
 #   instances       the instances that this session has created on servers, see http-instances.R
 #   keys            the idempotency keys of this process, see http-connection.R
+#   environments    the environments written in R that are registered, by their ids
 #   hidden          tokens, which no error may show
 #
 # and, where they apply, what was declined, whether this session holds the install lock, and the
@@ -14,5 +15,6 @@
 # another process, which is how a client notices that it has been moved.
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
+the_session$environments <- list()
 the_session$client <- NULL
 the_session$instances <- new.env(parent = emptyenv())

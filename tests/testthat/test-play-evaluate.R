@@ -66,9 +66,8 @@ test_that("parts of the table print, too", {
 
 test_that("the environment's own arguments and limits of steps go along", {
   client <- test_client()
-  to_goal <- function(observation) c(2L, 2L, 1L, 0L, 1L, 0L, 1L, 0L, 2L, 1L, 1L, 0L, 0L, 2L, 2L)[
-    observation + 1L
-  ]
+  way <- c(2L, 2L, 1L, 0L, 1L, 0L, 1L, 0L, 2L, 1L, 1L, 0L, 0L, 2L, 2L)
+  to_goal <- function(observation) way[observation + 1L]
   sure <- evaluate_policy("FrozenLake-v1", to_goal, 3, seed = 1, is_slippery = FALSE,
                           client = client)
   expect_identical(c(sure$mean_return, sure$steps), c(1, 18))
@@ -83,8 +82,8 @@ test_that("the environment's own arguments and limits of steps go along", {
 test_that("what is wrong is refused before anything is made", {
   evaluate <- function(...) evaluate_policy("CartPole-v1", ..., client = no_client())
   for (level in list(0, 1, 95, NA, "0.95", c(0.9, 0.95))) {
-    expect_error(evaluate(policy_random(), level = level), "`level` must be a number between 0 and 1",
-                 class = "gym_error_argument")
+    expect_error(evaluate(policy_random(), level = level),
+                 "`level` must be a number between 0 and 1", class = "gym_error_argument")
   }
   expect_error(evaluate(policy_random(), episodes = 0), "`episodes` must be a whole number",
                class = "gym_error_argument")

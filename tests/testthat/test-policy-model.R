@@ -9,8 +9,14 @@ made_up_steps <- function(n = 200) {
   steps
 }
 
+four_numbers <- function(names = NULL) {
+  space <- box_space(rep(-9, 4), rep(9, 4))
+  space$names <- names
+  space
+}
+
 bound <- function(model, action_space = discrete_space(2L), ..., id = "CartPole-v1",
-                  observation_space = box_space(rep(-9, 4), rep(9, 4))) {
+                  observation_space = four_numbers(observation_parts$CartPole)) {
   policy_bind(as_policy(model, ...), list(
     spec = list(id = id), observation_space = named_space(observation_space, id),
     action_space = action_space
@@ -100,9 +106,11 @@ test_that("a model without a formula gets a matrix with the names of the steps' 
   })
   act(bound(told), leaning)
   expect_identical(seen, `colnames<-`(leaning, observation_parts$CartPole))
-  act(bound(told, id = "Mine-v0"), leaning)
+  act(bound(told, observation_space = four_numbers()), leaning)
   expect_identical(colnames(seen), paste0("obs_", 1:4))
-  act(bound(told, observation_space = discrete_space(16L), id = "FrozenLake-v1"), 3:5)
+  field <- discrete_space(16L)
+  field$names <- "position"
+  act(bound(told, observation_space = field), 3:5)
   expect_identical(seen, cbind(position = 3:5))
 })
 
@@ -215,6 +223,18 @@ test_that("a model must know the environment, whose actions it can predict", {
   ))
   expect_error(bound(predicting(1), several), "A model cannot choose from <MultiDiscrete",
                class = "gym_error_argument")
+})
+
+test_that("a model of a hand of cards plays Blackjack", {
+  client <- test_client()
+  careful <- function(observation) as.integer(observation$player_sum < 15)
+  played <- rollout("Blackjack-v1", careful, 50, seed = 1, steps = TRUE, client = client)
+  fit <- lm(action ~ I(player_sum < 15), as.data.frame(played))
+  learned <- rollout("Blackjack-v1", as_policy(fit), 50, seed = 1, steps = TRUE, client = client)
+  expect_identical(learned$steps, played$steps)
+  env <- local_env("Blackjack-v1", seed = 1)
+  observation <- env$reset()
+  expect_identical(as.integer(act(learned$policy, observation)), careful(observation))
 })
 
 test_that("a model plays, predicts, prints and is mapped", {

@@ -1,0 +1,77 @@
+# Environments written in R, played step by step as those of gym_make() are.
+
+# The methods by which an environment is played, whatever its own functions are.
+checked_methods <- function(sub_env) {
+  list(
+    reset = function(seed = NULL, options = NULL, return_info = FALSE) {
+      reset_r_env(sub_env, seed, options, return_info)
+    },
+    step = function(action) step_r_env(sub_env, action),
+    render = function() render_r_env(sub_env),
+    clone = function(deep = FALSE) abort_clone(sub_env)
+  )
+}
+
+reset_r_env <- function(sub_env, seed, options, return_info, call = rlang::caller_env()) {
+  check_sub_env_open(sub_env, call)
+  check_count(seed, min = 0, allow_null = TRUE, call = call)
+  check_flag(return_info, call = call)
+  if (!is.null(options)) {
+    check_named_list(options, call = call)
+  }
+  observation <- reset_sub_env(sub_env, seed, options, call = call)
+  if (return_info) list(observation = observation, info = list()) else observation
+}
+
+step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
+  check_sub_env_open(sub_env, call)
+  check_was_reset(sub_env, call)
+  task <- sub_env$task
+  if (is.null(sub_env$num_envs)) {
+    check_value(task$action_rules, action, "", call, bounds = TRUE)
+    action <- tidy_value(task$action_space, action)
+  } else {
+    check_actions(task, action, seq_len(sub_env$num_envs), call)
+    action <- tidy_actions(task$action_space, action)
+  }
+  out <- complete_step(raw_step(sub_env, action, call = call), sub_env, call = call)
+  done <- out$terminated | out$truncated
+  if (isTRUE(all(sub_env$ended))) {
+    warn_step_after_end(sub_env, call)
+  } else {
+    sub_env$ended <- sub_env$ended | done
+  }
+  append(out, list(done = done, info = out$info), after = 2L)[
+    c("observation", "reward", "done", "info", "terminated", "truncated")
+  ]
+}
+
+warn_step_after_end <- function(sub_env, call) {
+  # NA: the episode is over, and the warning has been given.
+  sub_env$ended <- NA
+  rlang::warn(
+    c(
+      paste0(sub_env$task$spec$id, " took a step after the end of its episode."),
+      i = "What comes of it is undefined: reset the environment first."
+    ),
+    class = "gym_warning_step_after_done",
+    call = call
+  )
+}
+
+check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
+  if (sub_env$closed) {
+    gym_abort(
+      c("This environment was closed.", i = "Make a new one."),
+      class = "gym_error_argument", argument = "env", call = call
+    )
+  }
+}
+
+abort_clone <- function(sub_env, call = rlang::caller_env()) {
+  gym_abort(
+    c(paste0(sub_env$task$spec$id, " cannot be cloned: a clone would share its random generator."),
+      i = "Make another one instead."),
+    class = "gym_error_argument", argument = "env", call = call
+  )
+}

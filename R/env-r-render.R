@@ -1,0 +1,126 @@
+# Pictures of environments written in R. A function of the user's either plots, which is caught by a
+# png() device, or returns a picture.
+
+# The size of what is plotted, in pixels: that of CartPole's frames.
+plotted_size <- c(width = 600L, height = 400L)
+
+# A picture of few pixels, such as one for each cell of a grid, is enlarged to about this width.
+least_width <- 240L
+
+render_r_env <- function(sub_env, call = rlang::caller_env()) {
+  check_sub_env_open(sub_env, call)
+  check_was_reset(sub_env, call)
+  check_renders(sub_env, call)
+  drawn <- draw_sub_env(sub_env, call)
+  if (is.raw(drawn)) frame_from_png(drawn) else drawn
+}
+
+check_renders <- function(sub_env, call = rlang::caller_env()) {
+  if (is.null(sub_env$render)) {
+    gym_abort(
+      c(paste0("There is nothing to see of ", sub_env$task$spec$id, ": it cannot be drawn."),
+        i = "An environment in R is drawn by its function `render`, see `?gym_env`."),
+      class = "gym_error_argument", argument = "render", call = call
+    )
+  }
+}
+
+# The current frame as the bytes of a PNG file.
+sub_env_png <- function(sub_env, call = rlang::caller_env()) {
+  drawn <- draw_sub_env(sub_env, call)
+  if (is.raw(drawn)) drawn else png_from_frame(drawn)
+}
+
+#' Call the user's function that draws
+#' @return The bytes of a PNG file where it plots, a `gym_frame` where it returns a picture.
+#' @noRd
+draw_sub_env <- function(sub_env, call) {
+  picture <- NULL
+  bytes <- plot_as_png(plotted_size, {
+    picture <- withCallingHandlers(
+      keep_random_state(sub_env$render()),
+      error = function(cnd) abort_render(cnd, sub_env, call)
+    )
+  })
+  if (is_picture(picture)) {
+    frame_from_picture(picture, sub_env, call)
+  } else if (is.null(bytes)) {
+    gym_abort(
+      c(paste0("`render()` of ", sub_env$task$spec$id, " drew nothing and returned ",
+               describe_argument(picture), "."),
+        i = "It must plot, or return a raster image, a matrix or an array of height x width x 3."),
+      class = "gym_error_argument", argument = "render", value = picture, call = call
+    )
+  } else {
+    bytes
+  }
+}
+
+abort_render <- function(cnd, sub_env, call) {
+  gym_abort(
+    paste0("`render()` of ", sub_env$task$spec$id, " raised an error."),
+    class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
+              "gym_error_environment"),
+    env_id = sub_env$task$spec$id, call = call, parent = cnd
+  )
+}
+
+#' Run code that plots, on a device that writes a PNG file
+#'
+#' The device that was current remains so.
+#' @param size Width and height in pixels.
+#' @return The bytes of the file, `NULL` where nothing was plotted.
+#' @noRd
+plot_as_png <- function(size, code) {
+  file <- tempfile(fileext = ".png")
+  on.exit(unlink(file))
+  before <- grDevices::dev.cur()
+  grDevices::png(file, size[[1L]], size[[2L]], res = 96)
+  device <- grDevices::dev.cur()
+  tryCatch(code, finally = {
+    grDevices::dev.off(device)
+    if (before > 1L) grDevices::dev.set(before)
+  })
+  if (file.exists(file)) readBin(file, "raw", file.size(file))
+}
+
+# Pictures that are returned -----------------------------------------------------------
+
+is_picture <- function(x) {
+  grDevices::is.raster(x) || inherits(x, "gym_frame") ||
+    (is.numeric(x) || is.character(x) || is.logical(x)) && length(dim(x)) %in% 2:3
+}
+
+frame_from_picture <- function(picture, sub_env, call) {
+  if (inherits(picture, "gym_frame")) {
+    return(picture)
+  }
+  colours <- tryCatch(
+    as_colours(picture),
+    error = function(cnd) abort_render(cnd, sub_env, call)
+  )
+  colours <- enlarge(colours)
+  channels <- grDevices::col2rgb(colours)
+  new_frame(aperm(array(channels, c(3L, dim(colours))), c(2L, 3L, 1L)))
+}
+
+# A matrix of the colours of a picture. Numbers are shares of 1, or whole numbers of up to 255.
+as_colours <- function(picture) {
+  raster <- if (is.numeric(picture)) {
+    as.raster(picture, max = if (max(picture, 0, na.rm = TRUE) > 1) 255 else 1)
+  } else {
+    as.raster(picture)
+  }
+  # The elements of a raster image are in rows.
+  matrix(as.character(as.matrix(raster)), nrow(raster))
+}
+
+enlarge <- function(pixels) {
+  by <- ceiling(least_width / ncol(pixels))
+  pixels[rep(seq_len(nrow(pixels)), each = by), rep(seq_len(ncol(pixels)), each = by), drop = FALSE]
+}
+
+png_from_frame <- function(frame) {
+  check_suggested("png", "keep frames")
+  png::writePNG(unclass(frame) / 255)
+}

@@ -1,0 +1,109 @@
+# A sub-environment written in R: the functions that play it, and how far it has come. An
+# environment of its own is one of these; a vectorised one has all its sub-environments in one.
+
+#' Make a sub-environment
+#'
+#' @param reset A function of `seed` and `options` that returns the first observation.
+#' @param step A function of an action, as the user's `step()`.
+#' @param render A function without arguments that draws it, `NULL` where there is none.
+#' @param takes_options Whether the user's `reset()` takes options.
+#' @param num_envs `NULL`, or how many sub-environments a vectorised one has.
+#' @return An environment: these, and `generator`, its random generator, `NULL` before the first
+#'   need; `taken`, how many steps the episode has taken, `NA` before the first reset; `ended`,
+#'   whether it has ended, `NA` when it was warned of that; `closed`.
+#' @noRd
+new_sub_env <- function(task, reset, step, render = NULL, takes_options = FALSE, num_envs = NULL) {
+  sub_env <- new.env(parent = emptyenv())
+  sub_env$task <- task
+  sub_env$reset <- reset
+  sub_env$step <- step
+  sub_env$render <- render
+  sub_env$takes_options <- takes_options
+  sub_env$num_envs <- num_envs
+  sub_env$generator <- NULL
+  sub_env$taken <- NA_integer_
+  sub_env$ended <- FALSE
+  sub_env$closed <- FALSE
+  sub_env
+}
+
+#' Start an episode
+#'
+#' @param seed What its generator is to begin with; `NULL` goes on with the generator as it is. An
+#'   environment that was never seeded draws a seed from the session's generator.
+#' @return The first observation, checked: one, or a batch of those of a vectorised one.
+#' @noRd
+reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number = NULL,
+                          call = rlang::caller_env()) {
+  if (!is.null(options) && !sub_env$takes_options) {
+    gym_abort(
+      c(paste0("`reset()` of ", sub_env$task$spec$id, " takes no options."),
+        i = "It takes some when it has an argument `options`."),
+      class = "gym_error_argument", argument = "options", value = options, call = call
+    )
+  }
+  if (!is.null(seed)) {
+    sub_env$generator <- new_generator(seed)
+  } else if (is.null(sub_env$generator)) {
+    sub_env$generator <- new_generator(draw_seed())
+  }
+  sub_env$taken <- NA_integer_
+  observation <- withCallingHandlers(
+    with_generator(sub_env$generator, sub_env$reset(seed, options)),
+    error = function(cnd) abort_raised(cnd, sub_env, sub_env_number, call)
+  )
+  where <- paste0("`reset()` of ", sub_env$task$spec$id)
+  observation <- if (is.null(sub_env$num_envs)) {
+    check_observation(sub_env$task, observation, where, call)
+    tidy_value(sub_env$task$observation_space, observation)
+  } else {
+    check_observations(sub_env$task, observation, seq_len(sub_env$num_envs), where, call)
+    tidy_batch(sub_env$task$observation_space, observation)
+  }
+  sub_env$taken <- 0L
+  sub_env$ended <- logical(sub_env$num_envs %||% 1L)
+  observation
+}
+
+#' Take a step
+#'
+#' @param action One action that was checked, or a batch of them for a vectorised one.
+#' @return What the user's `step()` returned, unchecked.
+#' @noRd
+raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::caller_env()) {
+  check_was_reset(sub_env, call)
+  out <- withCallingHandlers(
+    with_generator(sub_env$generator, sub_env$step(action)),
+    error = function(cnd) abort_raised(cnd, sub_env, sub_env_number, call)
+  )
+  sub_env$taken <- sub_env$taken + 1L
+  out
+}
+
+check_was_reset <- function(sub_env, call) {
+  if (is.na(sub_env$taken)) {
+    gym_abort(
+      c(paste0(sub_env$task$spec$id, " takes no step before it was reset."),
+        i = "`env$reset()` starts an episode."),
+      class = "gym_error_argument", argument = "env", call = call
+    )
+  }
+}
+
+#' Say that a function of the user's raised an error, and where
+#'
+#' The classes of the error stay, so that it can be caught by them.
+#' @noRd
+abort_raised <- function(cnd, sub_env, sub_env_number, call) {
+  taken <- sub_env$taken
+  where <- if (is.na(taken)) "`reset()` of " else "`step()` of "
+  at <- if (!is.na(taken)) paste0(" in step ", taken + 1L, " of the episode")
+  in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
+  gym_abort(
+    paste0(where, sub_env$task$spec$id, " raised an error", at, in_sub_env, "."),
+    class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
+              "gym_error_environment"),
+    env_id = sub_env$task$spec$id, step = if (!is.na(taken)) taken + 1L,
+    sub_env = sub_env_number, call = call, parent = cnd
+  )
+}

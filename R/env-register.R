@@ -1,0 +1,287 @@
+#' Name an environment written in R
+#'
+#' Makes an environment written in R known by an id to everything that takes one: [gym_make()],
+#' [rollout()], every search, [env_registry()]. It is known until the session's end. An id that is
+#' registered again gets the new environment, also where Gymnasium has one of this id.
+#'
+#' Where several sub-environments play side by side each is made by `entry_point`, unless this is
+#' or returns an environment of [gym_env()], of which copies are made. What `entry_point` draws at
+#' random it draws under the same seed every time, so that all of them are the same environment:
+#' what is to differ from episode to episode is drawn in `reset`.
+#'
+#' @param id The id, a string of letters, digits and `_.:/-`, such as `"Corridor-v0"`.
+#' @param entry_point What makes the environment: an environment of [gym_env()], a function that
+#'   returns an environment, or the R6 generator of a class that inherits from [GymEnv].
+#' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] may replace
+#'   by others. For an environment of [gym_env()] they are values that each `self` begins with.
+#' @param max_episode_steps After how many steps an episode is cut off, a whole number; `NULL`, the
+#'   default, leaves the environment its own limit.
+#' @param reward_threshold The mean return from which the environment counts as solved, a number;
+#'   `NULL`, the default, leaves the environment its own.
+#' @return The id, invisibly.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, and from
+#'   `gym_unregister()` for an id that is not registered.
+#' @seealso [gym_env()], [GymEnv]
+#' @export
+#' @examples
+#' guess <- gym_env(
+#'   reset = function(self) {
+#'     self$secret <- sample(self$choices, 1) - 1
+#'     0
+#'   },
+#'   step = function(self, action) {
+#'     list(observation = 0, reward = as.numeric(action == self$secret), terminated = TRUE)
+#'   },
+#'   observation_space = space_discrete(1), action_space = space_discrete(4), choices = 4
+#' )
+#' gym_register("Guess-v0", guess)
+#' rollout("Guess-v0", policy_random(), episodes = 100, seed = 1)
+#' rollout("Guess-v0", policy_random(), episodes = 100, seed = 1, choices = 2)
+#' gym_unregister("Guess-v0")
+gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_threshold = NULL) {
+  if (!rlang::is_string(id) || !grepl("^[[:alnum:]_.:/-]+$", id)) {
+    must <- "a string of letters, digits and `_.:/-`, such as \"Corridor-v0\""
+    abort_argument(id, must, "id", rlang::current_env())
+  }
+  check_entry_point(entry_point)
+  arguments <- list(...)
+  check_dots_named(arguments, "size = 5")
+  check_count(max_episode_steps, allow_null = TRUE)
+  check_number(reward_threshold, allow_null = TRUE)
+  if (inherits(entry_point, "gym_function_env")) {
+    check_parameters(arguments, definition_of(entry_point), id)
+  }
+  changes <- list(
+    id = id, max_episode_steps = max_episode_steps, reward_threshold = reward_threshold
+  )
+  the_session$environments[[id]] <- list(
+    entry_point = entry_point, arguments = arguments,
+    changes = changes[!vapply(changes, is.null, NA)]
+  )
+  invisible(id)
+}
+
+#' @rdname gym_register
+#' @export
+gym_unregister <- function(id) {
+  check_string(id)
+  known <- names(the_session$environments)
+  if (!id %in% known) {
+    near <- if (length(known)) nearest_name(id, known)
+    gym_abort(
+      c(paste0("No environment written in R is registered as \"", id, "\"."),
+        i = if (length(near)) paste0("Did you mean \"", near, "\"?")),
+      class = "gym_error_argument", argument = "id", value = id
+    )
+  }
+  the_session$environments[[id]] <- NULL
+  invisible(id)
+}
+
+check_entry_point <- function(entry_point, call = rlang::caller_env()) {
+  if (inherits(entry_point, "gym_r_env") && is.null(definition_of(entry_point))) {
+    gym_abort(
+      c("`entry_point` must not be an object of a class, because it is one environment only.",
+        i = paste0("Give the class itself, `", class(entry_point)[[1L]], "`.")),
+      class = "gym_error_argument", argument = "entry_point", value = entry_point, call = call
+    )
+  }
+  if (!inherits(entry_point, c("gym_function_env", "R6ClassGenerator")) &&
+        !is.function(entry_point)) {
+    must <- paste("an environment of `gym_env()`, a function that returns an environment, or an",
+                  "R6 generator")
+    abort_argument(entry_point, must, "entry_point", call)
+  }
+}
+
+# Environments that a server cannot know: those whose id is registered in this session.
+is_registered <- function(x) {
+  id <- if (inherits(x, "gym_wrapped")) x$env_id else x
+  rlang::is_string(id) && id %in% names(the_session$environments)
+}
+
+# Making one ---------------------------------------------------------------------------
+
+#' Make a registered environment
+#'
+#' @param arguments Those of `entry_point`, and `max_episode_steps`, -1 for no limit.
+#' @noRd
+make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
+  registered <- the_session$environments[[id]]
+  changes <- registered$changes
+  if ("max_episode_steps" %in% names(arguments)) {
+    changes["max_episode_steps"] <- list(own_limit(arguments$max_episode_steps, call))
+    arguments$max_episode_steps <- NULL
+  }
+  given <- registered$arguments
+  given[names(arguments)] <- arguments
+  entry_point <- registered$entry_point
+  if (inherits(entry_point, "gym_function_env")) {
+    return(change_function_env(entry_point, changes, given, id, call))
+  }
+  make <- if (is.function(entry_point)) entry_point else entry_point$new
+  env <- with_generator(new_generator(0L), do.call(make, given))
+  if (!is_playable(env)) {
+    gym_abort(
+      c(paste0("The `entry_point` of ", id, " must return an environment, not ",
+               describe_argument(env), "."),
+        i = "`gym_env()` makes one of functions, a class that inherits from `GymEnv` another."),
+      class = "gym_error_argument", argument = "entry_point", value = env, call = call
+    )
+  }
+  if (inherits(env, "gym_function_env")) {
+    env <- change_function_env(env, changes, list(), id, call)
+  } else if (inherits(env, "gym_r_env")) {
+    sub_env <- sub_env_of(env)
+    sub_env$task <- change_task(sub_env$task, changes)
+    env$spec <- sub_env$task$spec
+  }
+  env
+}
+
+own_limit <- function(max_episode_steps, call) {
+  if (identical(as.numeric(max_episode_steps), -1)) {
+    return(NULL)
+  }
+  as.integer(check_count(max_episode_steps, call = call))
+}
+
+# Another environment of the same functions, with other values.
+change_function_env <- function(env, changes, parameters, id, call) {
+  definition <- definition_of(env)
+  check_parameters(parameters, definition, id, call)
+  definition$task <- change_task(definition$task, changes)
+  definition$parameters[names(parameters)] <- parameters
+  function_env$new(definition)
+}
+
+# A value that the functions do not know would change nothing.
+check_parameters <- function(given, definition, id, call = rlang::caller_env()) {
+  known <- c(names(definition$parameters), if (definition$vectorized) "num_envs")
+  strange <- setdiff(names(given), known)
+  if (length(strange)) {
+    near <- if (length(known)) nearest_name(strange[[1L]], known)
+    gym_abort(
+      c(paste0(id, " has no argument `", strange[[1L]], "`."),
+        i = if (length(near)) paste0("Did you mean `", near, "`?"),
+        i = if (!length(near)) {
+          "Its arguments are the further values that `gym_env()` was given, such as `size = 5`."
+        }),
+      class = "gym_error_argument", argument = strange[[1L]], call = call
+    )
+  }
+}
+
+# For gym_make(). `...` are the arguments that only a server's environment has.
+make_registered_env <- function(id, arguments, seed, num_envs, ..., call) {
+  servers <- list(...)
+  given <- names(servers)[lengths(servers) > 0L]
+  if (length(given)) {
+    gym_abort(
+      c(paste0("`", given[[1L]], "` is for an environment on a server, and ", id,
+               " is written in R."),
+        i = "Leave it out."),
+      class = "gym_error_argument", argument = given[[1L]], value = servers[[given[[1L]]]],
+      call = call
+    )
+  }
+  check_count(seed, min = 0, allow_null = TRUE, call = call)
+  check_count(num_envs, allow_null = TRUE, call = call)
+  env <- make_registered(id, arguments, call)
+  if (!is.null(num_envs)) {
+    env <- with_num_envs(env, num_envs, id, call)
+  }
+  if (!is.null(seed) && inherits(env, "gym_r_env")) {
+    sub_env <- sub_env_of(env)
+    sub_env$generator <- new_generator(seed)
+  }
+  env
+}
+
+with_num_envs <- function(env, num_envs, id, call) {
+  if (!isTRUE(definition_of(env)$vectorized)) {
+    gym_abort(
+      c(paste0("`num_envs = ", num_envs, "` takes functions for all sub-environments at once, and ",
+               "those of ", id, " are for one."),
+        i = "`rollout()` and searches play several of it side by side, by their `num_envs`."),
+      class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
+    )
+  }
+  change_function_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
+}
+
+#' See a registered environment as a vector environment
+#' @noRd
+registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
+                                  call = rlang::caller_env()) {
+  env <- make_registered(id, arguments, call)
+  if (!inherits(env, "gym_r_env") || !is.null(definition_of(env))) {
+    return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
+  }
+  check_count(num_envs, allow_null = TRUE, call = call)
+  batch_size <- as.integer(if (frames) 1L else num_envs %||% r_sub_envs)
+  more <- lapply(seq_len(min(batch_size, max_envs) - 1), function(i) {
+    make_registered(id, arguments, call)
+  })
+  envs <- c(list(env), more)
+  if (frames) {
+    check_renders(sub_env_of(env), call)
+  }
+  vector_env <- scalar_vector_env(lapply(envs, sub_env_of), batch_size, frames)
+  vector_env$close <- function(wait = TRUE) for (env in envs) env$close()
+  vector_env
+}
+
+# In the registry ----------------------------------------------------------------------
+
+#' Put the environments written in R into the form of the server's registry
+#' @param search A text to look for in their ids, `NULL` for all.
+#' @noRd
+registered_rows <- function(search = NULL) {
+  ids <- as.character(names(the_session$environments))
+  if (!is.null(search)) {
+    ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
+  }
+  specs <- lapply(ids, registered_spec)
+  data.frame(
+    id = ids,
+    max_episode_steps = vapply(specs, function(spec) spec$max_episode_steps %||% NA_integer_, 0L),
+    reward_threshold = vapply(specs, function(spec) spec$reward_threshold %||% NA_real_, 0),
+    vectorised = vapply(ids, is_vectorized_entry, NA, USE.NAMES = FALSE),
+    extra = rep(NA_character_, length(ids)),
+    available = rep(TRUE, length(ids)),
+    reason = rep(NA_character_, length(ids))
+  )
+}
+
+# What is known without making the environment.
+registered_spec <- function(id) {
+  registered <- the_session$environments[[id]]
+  spec <- if (inherits(registered$entry_point, "gym_function_env")) registered$entry_point$spec
+  spec <- as.list(spec)
+  spec[names(registered$changes)] <- registered$changes
+  if (!is.null(spec$max_episode_steps)) {
+    spec$max_episode_steps <- as.integer(spec$max_episode_steps)
+  }
+  if (!is.null(spec$reward_threshold)) {
+    spec$reward_threshold <- as.numeric(spec$reward_threshold)
+  }
+  spec
+}
+
+is_vectorized_entry <- function(id) {
+  entry_point <- the_session$environments[[id]]$entry_point
+  inherits(entry_point, "gym_function_env") && definition_of(entry_point)$vectorized
+}
+
+# A server cannot see an environment that is written in R.
+check_not_registered <- function(env_id, call = rlang::caller_env()) {
+  if (is_registered(env_id)) {
+    id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
+    gym_abort(
+      c(paste0(id, " is an environment written in R, which no server can see."),
+        i = paste0("`gym_make(\"", id, "\")` makes it here.")),
+      class = "gym_error_argument", argument = "env_id", value = env_id, call = call
+    )
+  }
+}

@@ -1,0 +1,97 @@
+# Quick checks of batches, for values that are checked in every step. Nearly always all values fit,
+# and then nothing needs to be known of the one that does not.
+
+#' Make a quick check of batches of values of a space
+#'
+#' @return A function of a batch and of how many values it must have, an integer of at least 1. It
+#'   returns `TRUE` where all of them surely belong to the space, bounds included; after `FALSE`
+#'   [check_batch()] has to tell.
+#' @noRd
+quick_check <- function(space) UseMethod("quick_check")
+
+#' @exportS3Method
+quick_check.default <- function(space) function(values, n) FALSE
+
+#' @exportS3Method
+quick_check.gym_space_discrete <- function(space) {
+  bounds <- space_bounds(space)
+  low <- bounds$low
+  high <- bounds$high
+  function(values, n) {
+    length(values) == n && is.null(dim(values)) && is_plain(values) &&
+      min(values) >= low && max(values) <= high && is_all_whole(values)
+  }
+}
+
+#' @exportS3Method
+quick_check.gym_space_array <- function(space) {
+  shape <- space$shape
+  is_within <- quick_bounds(space)
+  takes_logical <- space$dtype == "bool" || space$name %in% c("MultiBinary", "MultiDiscrete")
+  must_be_whole <- space$dtype %in% integer_dtypes
+  function(values, n) {
+    is_plain(values, takes_logical) && has_batch_shape(values, n, shape) &&
+      is_within(values, n) && (!must_be_whole || is_all_whole(values))
+  }
+}
+
+#' @exportS3Method
+quick_check.gym_space_tuple <- function(space) {
+  checks <- lapply(unname(space$spaces), quick_check)
+  keys <- names(space$spaces)
+  function(values, n) {
+    if (!is.list(values) || length(values) != length(checks) || !identical(names(values), keys)) {
+      return(FALSE)
+    }
+    for (i in seq_along(checks)) {
+      if (!checks[[i]](values[[i]], n)) {
+        return(FALSE)
+      }
+    }
+    TRUE
+  }
+}
+
+#' @exportS3Method
+quick_check.gym_space_dict <- quick_check.gym_space_tuple
+
+# Numbers without a class, at least one and none of them missing.
+is_plain <- function(x, takes_logical = TRUE) {
+  (is.numeric(x) || takes_logical && is.logical(x)) && length(x) > 0L && !is.object(x) && !anyNA(x)
+}
+
+is_all_whole <- function(x) !is.double(x) || all(x == trunc(x))
+
+has_batch_shape <- function(values, n, shape) {
+  if (length(shape) == 0L || is.null(dim(values))) {
+    is.null(dim(values)) && length(values) == n && prod(shape) == 1
+  } else {
+    identical(dim(values), c(n, shape))
+  }
+}
+
+# A comparison with one number for all, where there is one, is quicker by far.
+quick_bounds <- function(space) {
+  each <- prod(space$shape)
+  bounds <- lapply(space_bounds(space), function(bound) {
+    as.vector(shape_values(rep(as_double(bound), length.out = each), space$shape))
+  })
+  low <- bounds$low
+  high <- bounds$high
+  if (all(low == low[1L]) && all(high == high[1L])) {
+    low <- low[1L]
+    high <- high[1L]
+    return(function(values, n) min(values) >= low && max(values) <= high)
+  }
+  spread <- 1L
+  lows <- low
+  highs <- high
+  function(values, n) {
+    if (n != spread) {
+      lows <<- rep(low, each = n)
+      highs <<- rep(high, each = n)
+      spread <<- n
+    }
+    all(values >= lows & values <= highs)
+  }
+}
