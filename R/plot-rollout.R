@@ -52,7 +52,7 @@
 #' plot(rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1))
 #'
 #' # The pole falls to the right: push the cart to the right.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' random <- rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1)
 #' follow <- rollout("CartPole-v1", follow_pole, episodes = 50, seed = 1)
 #' plot(random = random, `follow the pole` = follow)

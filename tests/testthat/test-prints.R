@@ -79,6 +79,24 @@ test_that("a rollout and its summary", {
   expect_printed(summary(played))
 })
 
+test_that("the steps of a rollout in arrays", {
+  numbers <- fake_vector_env(4, id = "CartPole-v1")
+  parts <- fake_vector_env(2, observation_space = new_space(describe_dict(
+    place = describe_box(c(0, 0), c(1, 1)), word = list(name = "Discrete", n = 3L)
+  )))
+  parts$reset <- function(seed, options) list(place = cbind(1:2, 2:1) / 2, word = 0:1)
+  parts$step <- function(action, which = 1:2) {
+    n <- length(which)
+    list(observation = list(place = cbind(1:2, 2:1)[which, , drop = FALSE] / 2, word = (0:1)[which]),
+         reward = rep(1, n), terminated = rep(TRUE, n), truncated = logical(n))
+  }
+  keep <- function(env, ...) rollout(env, ..., episodes = 10, seed = 1, steps = "arrays")$steps
+  expect_snapshot({
+    print(keep(numbers, policy_random()))
+    print(keep(parts, list(policy_random(), policy_random()), next_observation = TRUE))
+  })
+})
+
 test_that("rollouts and evaluations of several policies", {
   network <- policy_network(c(4, 1), weights = list(matrix(c(1, -1, 1, -1), 1)))
   policies <- list(network = network, random = policy_random())
@@ -126,4 +144,16 @@ test_that("what gym_sitrep() finds", {
   )
   class(found) <- c("gym_sitrep", class(found))
   expect_printed(found)
+})
+
+test_that("what check_env() finds", {
+  walk <- function(reward, ends) {
+    gym_env(
+      function(self) 0,
+      function(self, action) list(observation = 1, reward = reward, terminated = ends),
+      observation_space = space_discrete(2), action_space = space_box(-Inf, 1), id = "Walk"
+    )
+  }
+  expect_printed(check_env(walk(NA, TRUE)))
+  expect_printed(check_env(walk(1, FALSE), max_steps = 20))
 })
