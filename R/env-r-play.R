@@ -34,7 +34,8 @@ step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
     check_actions(task, action, seq_len(sub_env$num_envs), call)
     action <- tidy_actions(task$action_space, action)
   }
-  out <- complete_step(raw_step(sub_env, action, call = call), sub_env, call = call)
+  out <- raw_step(sub_env, action, call = call)
+  out <- complete_step(out, sub_env, call = call)
   done <- out$terminated | out$truncated
   if (isTRUE(all(sub_env$ended))) {
     warn_step_after_end(sub_env, call)

@@ -26,8 +26,13 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   } else if (definition$vectorized) {
     vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames)
   } else {
+    if (length(remembered_over_episodes(sub_env$task))) {
+      num_envs <- 1L
+    }
     batch_size <- as.integer(num_envs %||% r_sub_envs)
-    copies <- lapply(seq_len(min(batch_size, max_envs)), function(i) definition_sub_env(definition))
+    copies <- lapply(seq_len(num_envs %||% min(batch_size, max_envs)), function(i) {
+      definition_sub_env(definition)
+    })
     scalar_vector_env(copies, batch_size, frames)
   }
 }
@@ -49,7 +54,7 @@ new_r_vector_env <- function(task, ..., frames, sub_env) {
       observation_space = task$observation_space, action_space = task$action_space,
       spec = task$spec, ...,
       frame = if (frames) function() sub_env_png(sub_env),
-      remembers = task$remembers %||% character(), client = NULL,
+      remembers = remembered_over_episodes(task), client = NULL,
       close = function(wait = TRUE) invisible()
     ),
     class = "gym_vector_env"
@@ -153,7 +158,7 @@ stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
   length_of <- lengths(each)
   if (all(length_of == 1L)) {
-    unlist(each, use.names = FALSE)
+    unlist(each, recursive = FALSE, use.names = FALSE)
   } else if (optional && all(length_of == 0L)) {
     logical(length(outs))
   }
@@ -175,7 +180,7 @@ observation_stacker <- function(space) {
     if (!has_shape(values)) {
       return(NULL)
     }
-    numbers <- unlist(values, use.names = FALSE)
+    numbers <- unlist(values, recursive = FALSE, use.names = FALSE)
     if (length(shape) == 0L || !is.atomic(numbers)) {
       return(numbers)
     }
@@ -228,7 +233,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
         row[which] <- seq_along(which)
         action <- batch_rows(task$action_space, action, row)
       }
-      result <- take_rows(raw_step(sub_env, action, call = call), sub_env, which, call)
+      out <- raw_step(sub_env, action, call = call)
+      result <- take_rows(out, sub_env, which, call)
       result$next_observation <- result$observation
       result
     },

@@ -118,7 +118,7 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
 }
 
 # The sub-environments of functions are made of a definition: `task`, the functions, `vectorized`,
-# and `parameters`, the values that each `self` begins with.
+# `parameters`, the values that each `self` begins with, and `wrappers`, see wrap_r_env().
 function_env <- R6Class(
   "gym_function_env",
   inherit = GymEnv,
@@ -152,14 +152,21 @@ definition_sub_env <- function(definition, num_envs = NULL) {
     self$num_envs <- num_envs
   }
   takes_options <- "options" %in% names(formals(reset))
-  new_sub_env(
-    definition$task,
+  functions <- list(
     reset = if (takes_options) {
       function(seed, options) reset(self, options = options)
     } else {
       function(seed, options) reset(self)
     },
-    step = function(action) step(self, action),
+    step = function(action) step(self, action)
+  )
+  for (wrap_around in definition$wrappers) {
+    functions <- wrap_around(functions, num_envs)
+  }
+  new_sub_env(
+    definition$task,
+    reset = functions$reset,
+    step = functions$step,
     render = if (!is.null(render)) function() render(self),
     takes_options = takes_options,
     num_envs = num_envs

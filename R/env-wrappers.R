@@ -8,18 +8,38 @@
 #' of steps stays inside of a `"TimeLimit"`, which can only lower it:
 #' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
+#' # Environments written in R
+#'
+#' An environment made by [gym_env()] or of a class that inherits from [GymEnv] is wrapped at once,
+#' and what comes back is a new environment of the same functions. An id that [gym_register()] made
+#' known is wrapped when it is made. There are seven wrappers for them, with the arguments and the
+#' formulas of Gymnasium's:
+#' * `"TimeLimit"`: `max_episode_steps`, after how many steps an episode is cut off;
+#' * `"ClipAction"`: takes every action of a Box to its bounds;
+#' * `"RescaleAction"`: `min_action` and `max_action`, the bounds of the actions from outside;
+#' * `"RescaleObservation"`: `min_obs` and `max_obs`, the bounds of the observations from outside;
+#' * `"ClipReward"`: `min_reward` and `max_reward`, of which one may be left out;
+#' * `"NormalizeObservation"`: `epsilon`, 1e-8 by default; observations minus their mean so far,
+#'   divided by their standard deviation so far;
+#' * `"NormalizeReward"`: `gamma`, 0.99, and `epsilon`, 1e-8 by default; rewards divided by the
+#'   standard deviation so far of their discounted sum.
+#'
+#' The last two remember earlier episodes, those of one [rollout()] or search. In a vectorised
+#' environment they take all sub-environments together, without those whose episode has ended.
+#'
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
-#'   `gym_wrap()` returned for one.
+#'   `gym_wrap()` returned for one; or an environment written in R.
 #' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. Which there
 #'   are is the server's choice; the error for one that it does not know lists
 #'   them. Their arguments are in
 #'   [Gymnasium's documentation](https://gymnasium.farama.org/api/wrappers/).
 #' @param ... The wrapper's arguments, by name. A vector of length one travels as
 #'   a single value, wrapped in `I()` as a list of one.
-#' @return An object of class `gym_wrapped`, which prints in one line: a list of
-#'   `env_id` and `wrappers`.
-#' @section Errors: `gym_error_argument`; the server's come when the environment
-#'   is made, see [env_create()].
+#' @return Of an id, an object of class `gym_wrapped`, which prints in one line: a list of
+#'   `env_id` and `wrappers`. Of an environment written in R, another one.
+#' @section Errors: `gym_error_argument`, also for a wrapper or an argument that there is not for
+#'   environments written in R; the server's come when the environment is made, see
+#'   [env_create()].
 #' @export
 #' @examples
 #' wrapped <- "CartPole-v1" |>
@@ -32,14 +52,30 @@
 #' env$reset()
 #' env$close()
 gym_wrap <- function(env_id, wrapper, ...) {
-  if (!inherits(env_id, "gym_wrapped")) {
-    check_string(env_id)
-    env_id <- structure(list(env_id = env_id, wrappers = list()), class = "gym_wrapped")
-  }
   check_string(wrapper)
   kwargs <- list(...)
   check_dots_named(kwargs, "max_episode_steps = 50")
-  env_id$wrappers <- c(env_id$wrappers, list(c(list(wrapper), kwargs)))
+  if (is.environment(env_id) || is.list(env_id) && !inherits(env_id, "gym_wrapped")) {
+    check_wrappable(env_id, rlang::current_env())
+    return(wrap_r_env(env_id, wrapper, kwargs, rlang::current_env()))
+  }
+  if (is_registered(env_id)) {
+    check_r_wrapper(wrapper, rlang::current_env())
+  }
+  with_wrappers(env_id, list(c(list(wrapper), kwargs)))
+}
+
+# An id with further wrappers.
+with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
+  if (!inherits(env_id, "gym_wrapped")) {
+    check_string(env_id, call = call)
+    if (!length(wrappers)) {
+      return(env_id)
+    }
+    env_id <- structure(list(env_id = env_id, wrappers = list()), class = "gym_wrapped")
+  }
+  check_wrappers(wrappers, call)
+  env_id$wrappers <- c(env_id$wrappers, wrappers)
   env_id
 }
 

@@ -277,8 +277,8 @@ rollout_lines <- function(x) {
 }
 
 returns_text <- function(returns) {
-  if (length(returns) == 1L) {
-    return(number_text(returns))
+  if (length(returns) < 2L) {
+    return(if (length(returns)) number_text(returns) else "none")
   }
   paste0(
     "mean ", number_text(mean(returns)), se_text(standard_error(returns)),

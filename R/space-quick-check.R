@@ -19,7 +19,7 @@ quick_check.gym_space_discrete <- function(space) {
   high <- bounds$high
   function(values, n) {
     length(values) == n && is.null(dim(values)) && is_plain(values) &&
-      min(values) >= low && max(values) <= high && is_all_whole(values)
+      is_between(values, low, high) && is_all_whole(values)
   }
 }
 
@@ -60,6 +60,8 @@ is_plain <- function(x, takes_logical = TRUE) {
   (is.numeric(x) || takes_logical && is.logical(x)) && length(x) > 0L && !is.object(x) && !anyNA(x)
 }
 
+is_between <- function(x, low, high) min(x) >= low && max(x) <= high
+
 is_all_whole <- function(x) !is.double(x) || all(x == trunc(x))
 
 has_batch_shape <- function(values, n, shape) {
@@ -81,7 +83,7 @@ quick_bounds <- function(space) {
   if (all(low == low[1L]) && all(high == high[1L])) {
     low <- low[1L]
     high <- high[1L]
-    return(function(values, n) min(values) >= low && max(values) <= high)
+    return(function(values, n) is_between(values, low, high))
   }
   spread <- 1L
   lows <- low

@@ -12,6 +12,8 @@ draw_environment_seeds <- function(n) sample.int(.Machine$integer.max, n, replac
 
 # The first stream of a seed.
 seed_stream <- function(seed) {
+  # A seed that is drawn in the call must move the session's generator.
+  force(seed)
   keep_random_state({
     set.seed(seed, "L'Ecuyer-CMRG", "Inversion", "Rejection")
     globalenv()$.Random.seed

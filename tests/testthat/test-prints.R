@@ -146,3 +146,15 @@ test_that("what gym_sitrep() finds", {
   class(found) <- c("gym_sitrep", class(found))
   expect_printed(found)
 })
+
+test_that("what check_env() finds", {
+  walk <- function(reward, ends) {
+    gym_env(
+      function(self) 0,
+      function(self, action) list(observation = 1, reward = reward, terminated = ends),
+      observation_space = space_discrete(2), action_space = space_box(-Inf, 1), id = "Walk"
+    )
+  }
+  expect_printed(check_env(walk(NA, TRUE)))
+  expect_printed(check_env(walk(1, FALSE), max_steps = 20))
+})

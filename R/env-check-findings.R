@@ -1,0 +1,238 @@
+# What check_env() looks at. Each look notes what it finds in `check`, an environment with `env`,
+# `found` (a list of findings), `lengths` (of the episodes played) and `limit` (the steps that an
+# episode may take).
+
+look_at_environment <- function(check, seed) {
+  if (!look_at_members(check)) {
+    return()
+  }
+  check$space <- check$env$observation_space
+  check$limit <- max(check$limit, check$env$spec$max_episode_steps)
+  look_at_space(check, "observation")
+  look_at_space(check, "action")
+  first <- play_and_look(check, seed)
+  if (is.null(first)) {
+    return()
+  }
+  second <- play_and_look(check, seed + 1)
+  look_at_end(check, list(first, second))
+  remembers <- intersect(check$env$spec$wrappers, remembering_wrappers)
+  if (length(remembers)) {
+    note_finding(check, "seeds", paste0(
+      remembers[[1L]], " remembers earlier episodes: the same seed gives other numbers later."
+    ), severity = "note")
+  } else {
+    look_at_repetition(check, first, seed)
+    look_at_reset_without_seed(check, seed)
+  }
+  look_at_render(check, seed)
+}
+
+# The same kind of finding is noted once, where it is first found.
+note_finding <- function(check, topic, finding, key = finding, severity = "wrong") {
+  key <- paste(topic, key)
+  if (is.null(check$found[[key]])) {
+    check$found[[key]] <- list(topic = topic, severity = severity, finding = shown_text(finding))
+  }
+}
+
+# The elements of something that may be no environment of this package's: `$` of one aborts where
+# an element is missing.
+members_of <- function(env) {
+  names <- c("observation_space", "action_space", "reset", "step", "spec")
+  stats::setNames(lapply(names, function(name) env[[name]]), names)
+}
+
+# Returns whether the environment can be played at all.
+look_at_members <- function(check) {
+  members <- members_of(check$env)
+  for (name in c("reset", "step")) {
+    if (!is.function(members[[name]])) {
+      note_finding(check, name, paste0("The environment has no function `", name, "()`."))
+    }
+  }
+  for (name in c("observation_space", "action_space")) {
+    if (!inherits(members[[name]], "gym_space")) {
+      note_finding(check, "spaces", paste0(
+        "`", name, "` must be a space, such as `space_discrete(2)`, not ",
+        describe_argument(members[[name]]), "."
+      ))
+    }
+  }
+  if (!is.list(members$spec) || !rlang::is_string(members$spec$id)) {
+    note_finding(check, "spaces", paste0(
+      "`spec` must be a list with the environment's name, such as `list(id = \"Walk\")`, not ",
+      describe_argument(members$spec), "."
+    ))
+  }
+  !length(check$found)
+}
+
+# Spaces --------------------------------------------------------------------------------
+
+look_at_space <- function(check, kind) {
+  element <- paste0(kind, "_space")
+  look_at_part(check, check$env[[paste0("single_", element)]] %||% check$env[[element]],
+               paste0("$", element))
+}
+
+look_at_part <- function(check, space, path) {
+  note <- function(...) note_finding(check, "spaces", paste0(...), severity = "note")
+  if (inherits(space, "gym_space_undescribed")) {
+    note("Of `", path, "` the server tells no more than its name, ", space$name, ".")
+  } else if (has_parts(space)) {
+    if (!length(space$spaces)) {
+      note("`", path, "` is a ", space$name, " without parts.")
+    }
+    keys <- names(space$spaces)
+    for (i in seq_along(space$spaces)) {
+      part <- if (is.null(keys)) path_index(path, i - 1L) else path_key(path, keys[[i]])
+      look_at_part(check, space$spaces[[i]], part)
+    }
+  } else if (inherits(space, "gym_space_box")) {
+    look_at_box(space, path, note)
+  }
+}
+
+look_at_box <- function(space, path, note) {
+  fixed <- which(space$low == space$high)
+  if (length(fixed)) {
+    note("Number ", fixed[[1L]], " of `", path, "` can only be ", space$low[fixed[[1L]]], ".")
+  }
+  if (startsWith(path, "$action") && any(is.infinite(c(space$low, space$high)))) {
+    note("The actions of `", path, "` have no bounds: a policy that chooses among them needs some.")
+  }
+}
+
+# The end -------------------------------------------------------------------------------
+
+look_at_end <- function(check, episodes) {
+  limit <- check$env$spec$max_episode_steps
+  lengths <- vapply(episodes, function(episode) length(episode$results), 0L)
+  ended <- vapply(episodes, function(episode) episode$ended, NA)
+  if (!is.null(limit) && any(lengths > limit | lengths == limit & !ended)) {
+    note_finding(check, "end", paste0(
+      "`spec$max_episode_steps` is ", limit, ", but step ", limit, " of an episode was not ",
+      "truncated."
+    ))
+  } else if (all(!ended & lengths == check$limit)) {
+    note_finding(check, "end", paste0(
+      "No episode ended within ", count_of(check$limit, "step"), ": an environment that never ",
+      "ends is played with `max_steps`, as in `rollout(env, policy, max_steps = 200)`."
+    ), severity = "note")
+  }
+}
+
+# A step after the end may be an error or have any result, but the next episode must not depend on
+# it.
+look_beyond_end <- function(check, episode, seed) {
+  if (!episode$ended) {
+    return()
+  }
+  env <- check$env
+  action <- episode$actions[[length(episode$actions)]]
+  tryCatch(suppressWarnings(env$step(action)), error = function(cnd) NULL)
+  place <- paste0("`reset(seed = ", seed, ")` after a step beyond the end of an episode")
+  again <- call_and_look(check, "reset", place, env$reset(seed = seed))
+  if (!has_raised(again) && !identical(again, episode$observation) && !is_noted(check, "seeds")) {
+    note_finding(check, "end", paste0(
+      place, " gives another first observation than before: ",
+      difference_text(again, episode$observation), "."
+    ))
+  }
+}
+
+is_noted <- function(check, topic) {
+  any(vapply(check$found, function(finding) finding$topic == topic, NA))
+}
+
+# Seeds ---------------------------------------------------------------------------------
+
+look_at_repetition <- function(check, first, seed) {
+  again <- play_and_look(check, seed, first$actions)
+  if (!is.null(again)) {
+    look_at_difference(check, first, again, seed)
+    look_beyond_end(check, again, seed)
+  }
+}
+
+look_at_reset_without_seed <- function(check, seed) {
+  # The seed that an environment was made with may be that of its first `reset()` without one.
+  call_and_look(check, "reset", "`reset()` without a seed", check$env$reset())
+  following <- lapply(1:2, function(time) {
+    check$env$reset(seed = seed)
+    call_and_look(check, "reset", "`reset()` without a seed", check$env$reset())
+  })
+  if (!any(vapply(following, has_raised, NA)) && !identical(following[[1L]], following[[2L]])) {
+    note_finding(check, "seeds", paste0(
+      "`reset(seed = ", seed, ")` followed by `reset()` gave different first observations: ",
+      difference_text(following[[1L]], following[[2L]]), "."
+    ), key = "difference")
+  }
+}
+
+# Notes the first difference between two episodes.
+look_at_difference <- function(check, first, again, seed) {
+  note <- function(what, one, other) {
+    # A simulation of contacts, such as Box2D's, may differ in the last digits.
+    close <- isTRUE(all.equal(one, other, tolerance = 1e-5, scale = 1))
+    note_finding(check, "seeds", paste0(
+      "The same seed, ", seed, ", and the same actions gave different ", what, ": ",
+      difference_text(one, other), "."
+    ), key = "difference", severity = if (close) "note" else "wrong")
+  }
+  if (!identical(first$observation, again$observation)) {
+    return(note("first observations", first$observation, again$observation))
+  }
+  for (i in seq_len(min(length(first$results), length(again$results)))) {
+    for (name in c("observation", "reward", flags, "info")) {
+      one <- element_of(first$results[[i]], name)
+      other <- element_of(again$results[[i]], name)
+      if (!identical(one, other)) {
+        return(note(paste0("values of `", name, "` in step ", i), one, other))
+      }
+    }
+  }
+}
+
+element_of <- function(out, name) if (is.list(out)) out[[name]] else out
+
+# Of numbers it shows the first that differs.
+difference_text <- function(one, other) {
+  if (is.numeric(one) && is.numeric(other) && length(one) == length(other)) {
+    at <- which(!mapply(identical, as.vector(one), as.vector(other)))[1L]
+    if (!is.na(at)) {
+      place <- if (length(one) > 1L) paste0(" for number ", at)
+      return(paste0(format(one[[at]], digits = 15L), " and ", format(other[[at]], digits = 15L),
+                    place))
+    }
+  }
+  paste(describe_value(one), "and", describe_value(other))
+}
+
+# Render --------------------------------------------------------------------------------
+
+look_at_render <- function(check, seed) {
+  env <- check$env
+  if (!is.null(env[["num_envs"]]) || !can_be_drawn(env)) {
+    return()
+  }
+  env$reset(seed = seed)
+  # What is plotted goes nowhere.
+  before <- grDevices::dev.cur()
+  grDevices::pdf(NULL)
+  device <- grDevices::dev.cur()
+  on.exit({
+    grDevices::dev.off(device)
+    if (before > 1L) grDevices::dev.set(before)
+  })
+  call_and_look(check, "render", "`render()`", env$render())
+}
+
+can_be_drawn <- function(env) {
+  if (inherits(env, "gym_server_env")) {
+    known_instance(env$client, env$instance_id)$draws
+  } else {
+    is.function(env[["render"]])
+  }
+}

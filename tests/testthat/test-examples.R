@@ -1,0 +1,34 @@
+# Runs a script of inst/examples from top to bottom, and returns what it prints and the environment
+# in which it ran. The scripts that need a server are left to the other tests.
+run_example <- function(name) {
+  file <- system.file("examples", name, package = "gym", mustWork = TRUE)
+  run <- new.env(parent = globalenv())
+  withr::local_pdf(NULL)
+  printed <- withr::with_preserve_seed(utils::capture.output(sys.source(file, run)))
+  list(printed = printed, env = run)
+}
+
+test_that("the bandit shows that it pays to explore", {
+  run <- run_example("bandit.R")
+  reward <- vapply(run$env$played, function(played) mean(played$rewards[901:1000]), 0)
+  expect_identical(order(reward), 1:3)
+  # Figure 2.2 of the book: about 1 without exploring, 1.4 with a probability of 0.1.
+  expect_lt(abs(reward[[1]] - 1), 0.15)
+  expect_lt(abs(reward[[3]] - 1.4), 0.15)
+})
+
+test_that("Sarsa finds the shortest way through the windy gridworld", {
+  run <- run_example("windy-gridworld.R")
+  expect_match(run$printed, "Nothing is wrong", fixed = TRUE, all = FALSE)
+  expect_identical(run$env$learned$episodes$length, 15L)
+  expect_true(run$env$learned$episodes$terminated)
+  run$env$windy$reset()
+  expect_s3_class(run$env$windy$render(), "gym_frame")
+})
+
+test_that("the inventory never ends, and a rule of two numbers beats chance", {
+  run <- run_example("inventory.R")
+  expect_match(run$printed, "No episode ended within 200 steps", fixed = TRUE, all = FALSE)
+  expect_identical(unique(run$env$chance$episodes$length), 365L)
+  expect_gt(max(run$env$rules$profit), mean(run$env$chance$episodes$return) / 365 + 2)
+})
