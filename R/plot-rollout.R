@@ -52,17 +52,13 @@
 #' plot(rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1))
 #'
 #' # The pole falls to the right: push the cart to the right.
-<<<<<<< HEAD
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' random <- rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1)
 #' follow <- rollout("CartPole-v1", follow_pole, episodes = 50, seed = 1)
 #' plot(random = random, `follow the pole` = follow)
 #' policies <- list(random = policy_random(), follow = follow_pole)
 #' plot(rollout("CartPole-v1", policies, episodes = 50, seed = 1))
 #'
-=======
-#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
->>>>>>> tables
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, steps = TRUE, frames = TRUE)
 #' plot(played, type = "trajectory")
 #' if (requireNamespace("png", quietly = TRUE)) plot(played, type = "filmstrip")
