@@ -18,8 +18,7 @@ four_numbers <- function(names = NULL) {
 bound <- function(model, action_space = discrete_space(2L), ..., id = "CartPole-v1",
                   observation_space = four_numbers(observation_parts$CartPole)) {
   policy_bind(as_policy(model, ...), list(
-    spec = list(id = id), observation_space = named_space(observation_space, id),
-    action_space = action_space
+    spec = list(id = id), observation_space = observation_space, action_space = action_space
   ))
 }
 

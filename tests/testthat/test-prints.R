@@ -87,8 +87,9 @@ test_that("the steps of a rollout in arrays", {
   parts$reset <- function(seed, options) list(place = cbind(1:2, 2:1) / 2, word = 0:1)
   parts$step <- function(action, which = 1:2) {
     n <- length(which)
-    list(observation = list(place = cbind(1:2, 2:1)[which, , drop = FALSE] / 2, word = (0:1)[which]),
-         reward = rep(1, n), terminated = rep(TRUE, n), truncated = logical(n))
+    place <- cbind(1:2, 2:1)[which, , drop = FALSE] / 2
+    list(observation = list(place = place, word = (0:1)[which]), reward = rep(1, n),
+         terminated = rep(TRUE, n), truncated = logical(n))
   }
   keep <- function(env, ...) rollout(env, ..., episodes = 10, seed = 1, steps = "arrays")$steps
   expect_snapshot({
