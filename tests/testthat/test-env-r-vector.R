@@ -199,7 +199,9 @@ test_that("what vectorised functions return is refused in its step, with the sub
       step = function(self, action) {
         self$step <- self$step + 1
         n <- self$num_envs
-        out <- list(observation = matrix(0, n, 2), reward = numeric(n), terminated = seq_len(n) == 1)
+        out <- list(
+          observation = matrix(0, n, 2), reward = numeric(n), terminated = seq_len(n) == 1
+        )
         if (self$step == 2) change(out) else out
       },
       observation_space = space_box(-1, 1, shape = 2), action_space = space_discrete(2),

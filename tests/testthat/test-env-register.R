@@ -12,7 +12,7 @@ guess <- function(...) {
   )
 }
 
-Counter <- R6::R6Class(
+counter_class <- R6::R6Class(
   "Counter",
   inherit = GymEnv,
   public = list(
@@ -96,8 +96,8 @@ test_that("gym_make() seeds, replaces arguments and sets another limit", {
 test_that("a class is made once for each sub-environment, and closed", {
   made <- 0
   closed <- 0
-  Counted <- R6::R6Class(
-    "Counted", inherit = Counter,
+  counted_class <- R6::R6Class(
+    "Counted", inherit = counter_class,
     public = list(
       initialize = function(...) {
         made <<- made + 1
@@ -109,7 +109,7 @@ test_that("a class is made once for each sub-environment, and closed", {
       }
     )
   )
-  local_registered("Counter-v0", Counted)
+  local_registered("Counter-v0", counted_class)
   played <- rollout("Counter-v0", policy_random(), 40, seed = 1, stop = 5)
   expect_identical(made, 16)
   expect_identical(closed, 16)
@@ -134,7 +134,7 @@ test_that("what an entry point draws is the same for each, and moves no generato
 
 test_that("an id that is registered again gets the new environment, and one can be forgotten", {
   local_registered("Again-v0", guess())
-  gym_register("Again-v0", Counter)
+  gym_register("Again-v0", counter_class)
   expect_s3_class(gym_make("Again-v0"), "Counter")
   expect_identical(gym_unregister("Again-v0"), "Again-v0")
   expect_false(is_registered("Again-v0"))
@@ -180,7 +180,7 @@ test_that("what cannot be registered or made is refused with the fix", {
   refused(gym_register("my env", guess()), "`id` must be a string of letters")
   refused(gym_register(3, guess()), "`id` must be a string")
   refused(gym_register("Bad-v0", 3), "`entry_point` must be an environment of `gym_env()`")
-  refused(gym_register("Bad-v0", Counter$new()), "Give the class itself, `Counter`")
+  refused(gym_register("Bad-v0", counter_class$new()), "Give the class itself, `Counter`")
   refused(gym_register("Bad-v0", guess(), 3), "Further arguments need names")
   refused(gym_register("Bad-v0", guess(), choice = 3), "Bad-v0 has no argument `choice`")
   refused(gym_register("Bad-v0", guess(), max_episode_steps = 0), "`max_episode_steps`")
@@ -194,6 +194,6 @@ test_that("what cannot be registered or made is refused with the fix", {
   local_registered("Number-v0", function() 3)
   refused(gym_make("Number-v0"), "The `entry_point` of Number-v0 must return an environment, not 3")
   refused(rollout("Number-v0", policy_random()), "must return an environment, not 3")
-  local_registered("Counter-v0", Counter)
-  refused(rollout(Counter$new(), policy_random(), num_envs = 4), "`gym_register()` its class")
+  local_registered("Counter-v0", counter_class)
+  refused(rollout(counter_class$new(), policy_random(), num_envs = 4), "`gym_register()` its class")
 })

@@ -2,7 +2,8 @@
 cases <- function() {
   list(
     list(space_discrete(3, start = 1), good = list(c(1, 3), c(1L, 2L)),
-         bad = list(c(0, 1), c(1, 4), 1, c(1, 1.5), c(1, NA), c("1", "2"), matrix(1, 2, 1), list(1, 2))),
+         bad = list(c(0, 1), c(1, 4), 1, c(1, 1.5), c(1, NA), c("1", "2"), matrix(1, 2, 1),
+                    list(1, 2))),
     list(space_box(c(0, -Inf), c(1, 5)), good = list(matrix(c(0, 1, -Inf, 5), 2), matrix(0L, 2, 2)),
          bad = list(matrix(c(0, 2, 0, 0), 2), matrix(c(0, 0, 0, 6), 2), c(0, 0), matrix(0, 2, 3),
                     matrix(c(0, NaN, 0, 0), 2), matrix(FALSE, 2, 2))),
