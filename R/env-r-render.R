@@ -95,13 +95,14 @@ frame_from_picture <- function(picture, sub_env, call) {
   if (inherits(picture, "gym_frame")) {
     return(picture)
   }
-  colours <- tryCatch(
-    as_colours(picture),
+  tryCatch(
+    {
+      colours <- enlarge(as_colours(picture))
+      channels <- grDevices::col2rgb(colours)
+      new_frame(aperm(array(channels, c(3L, dim(colours))), c(2L, 3L, 1L)))
+    },
     error = function(cnd) abort_render(cnd, sub_env, call)
   )
-  colours <- enlarge(colours)
-  channels <- grDevices::col2rgb(colours)
-  new_frame(aperm(array(channels, c(3L, dim(colours))), c(2L, 3L, 1L)))
 }
 
 # A matrix of the colours of a picture. Numbers are shares of 1, or whole numbers of up to 255.

@@ -26,9 +26,13 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   } else if (definition$vectorized) {
     vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames)
   } else {
-    alone <- frames || length(remembered_over_episodes(sub_env$task))
-    batch_size <- as.integer(if (alone) 1L else num_envs %||% r_sub_envs)
-    copies <- lapply(seq_len(min(batch_size, max_envs)), function(i) definition_sub_env(definition))
+    if (length(remembered_over_episodes(sub_env$task))) {
+      num_envs <- 1L
+    }
+    batch_size <- as.integer(num_envs %||% r_sub_envs)
+    copies <- lapply(seq_len(num_envs %||% min(batch_size, max_envs)), function(i) {
+      definition_sub_env(definition)
+    })
     scalar_vector_env(copies, batch_size, frames)
   }
 }

@@ -52,7 +52,8 @@ gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_
     check_parameters(arguments, definition_of(entry_point), id)
   }
   changes <- list(
-    id = id, max_episode_steps = max_episode_steps, reward_threshold = reward_threshold
+    id = id, max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps),
+    reward_threshold = reward_threshold
   )
   the_session$environments[[id]] <- list(
     entry_point = entry_point, arguments = arguments,
@@ -237,9 +238,11 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
     return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
   }
   check_count(num_envs, allow_null = TRUE, call = call)
-  alone <- frames || length(remembered_over_episodes(sub_env_of(env)$task))
-  batch_size <- as.integer(if (alone) 1L else num_envs %||% r_sub_envs)
-  more <- lapply(seq_len(min(batch_size, max_envs) - 1), function(i) {
+  if (frames || length(remembered_over_episodes(sub_env_of(env)$task))) {
+    num_envs <- 1L
+  }
+  batch_size <- as.integer(num_envs %||% r_sub_envs)
+  more <- lapply(seq_len((num_envs %||% min(batch_size, max_envs)) - 1), function(i) {
     make_registered(id, arguments, call)
   })
   envs <- c(list(env), more)
@@ -265,7 +268,7 @@ registered_rows <- function(search = NULL) {
   data.frame(
     id = ids,
     max_episode_steps = vapply(specs, function(spec) spec$max_episode_steps %||% NA_integer_, 0L),
-    reward_threshold = vapply(specs, function(spec) spec$reward_threshold %||% NA_real_, 0),
+    reward_threshold = vapply(specs, function(spec) as.numeric(spec$reward_threshold %||% NA), 0),
     vectorised = vapply(ids, is_vectorized_entry, NA, USE.NAMES = FALSE),
     extra = rep(NA_character_, length(ids)),
     available = rep(TRUE, length(ids)),
@@ -279,12 +282,6 @@ registered_spec <- function(id) {
   spec <- if (inherits(registered$entry_point, "gym_function_env")) registered$entry_point$spec
   spec <- as.list(spec)
   spec[names(registered$changes)] <- registered$changes
-  if (!is.null(spec$max_episode_steps)) {
-    spec$max_episode_steps <- as.integer(spec$max_episode_steps)
-  }
-  if (!is.null(spec$reward_threshold)) {
-    spec$reward_threshold <- as.numeric(spec$reward_threshold)
-  }
   spec
 }
 

@@ -24,6 +24,7 @@
 #' |---|---|
 #' | `gym_error_argument` | an argument is not what the function takes; nothing was sent |
 #' | `gym_error_space` | an action or observation does not fit its space |
+#' | `gym_error_environment` | a function of an environment written in R raised an error |
 #' | `gym_error_http` | the server refused |
 #' | `gym_error_connection` | no server there, connection lost, time over; an answer that is none |
 #' | `gym_error_server_start` | a server could not be started |

@@ -6,11 +6,11 @@
 #                           and man/figures/bench.png
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
-# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [search] [memory] runs
+# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [memory] runs
 # parts.
 
 library(gym)
-for (file in c("turns", "workers", "classic", "contenders", "search", "results", "table",
+for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "results", "table",
                "figure")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
@@ -42,6 +42,7 @@ bench <- function(parts, quick) {
   )
   rows <- rbind(
     if (length(contenders)) play_turns(contenders, scale$turns, scale$seconds),
+    if ("r_env" %in% parts) compare_r_envs(scale$turns),
     if ("search" %in% parts) compare_searches(setup, scale$searches, scale$rounds),
     if ("search" %in% parts) fresh_searches(scale$fresh),
     if ("memory" %in% parts) measure_memory(scale$steps)
@@ -105,7 +106,7 @@ report <- function(result, csv, text, figure) {
 
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
-all_parts <- c("single", "vector", "search", "memory")
+all_parts <- c("single", "vector", "r_env", "search", "memory")
 parts <- intersect(all_parts, arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts

@@ -257,7 +257,8 @@ test_that("an observation of numbers must have its shape, its type and its bound
     )
     env$reset()
     expect_error(env$step(0), words, class = "gym_error_space")
-    expect_error(rollout(env, policy_random(), 2, seed = 1, max_steps = 9), words, class = "gym_error_space")
+    expect_error(rollout(env, policy_random(), 2, seed = 1, max_steps = 9), words,
+                 class = "gym_error_space")
   }
   refused(1, "of length 2")
   refused(c(1, 2, 3), "of length 2")
@@ -320,7 +321,8 @@ test_that("an error in a function names the environment and the step, and keeps 
   expect_s3_class(cnd, "gym_error_environment")
   expect_identical(cnd$parent$heat, 9)
   expect_match(conditionMessage(cnd), "The engine stalled.")
-  cnd <- expect_error(rollout(env, policy_random(), 3, seed = 1, max_steps = 9), class = "engine_error")
+  cnd <- expect_error(rollout(env, policy_random(), 3, seed = 1, max_steps = 9),
+                      class = "engine_error")
   expect_match(conditionMessage(cnd), "in step 2 of the episode (sub-environment 1).", fixed = TRUE)
   env <- gym_env(
     reset = function(self) stop("no start"), step = broken,

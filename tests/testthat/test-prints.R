@@ -33,6 +33,14 @@ test_that("an environment, open and closed, with sub-environments, and wrapped",
   expect_printed(gym_wrap("CartPole-v1", "TimeLimit", max_episode_steps = 50))
 })
 
+test_that("an environment in R, open and closed, and with sub-environments", {
+  env <- r_cartpole()
+  expect_printed(env)
+  env$close()
+  expect_printed(env)
+  expect_printed(r_cartpole_vectorized(num_envs = 3))
+})
+
 test_that("a space of each kind", {
   expect_printed(box_space(c(-1, 0), c(1, Inf)))
   expect_printed(discrete_space(3L, start = -1L))

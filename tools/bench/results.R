@@ -83,6 +83,7 @@ check_goals <- function(rows) {
   do.call(rbind, c(
     if ("single" %in% parts) single_goals(rows),
     if ("vector" %in% parts) vector_goals(rows),
+    if ("r_env" %in% parts) r_env_goals(rows),
     if ("search" %in% parts) search_goals(rows),
     if ("memory" %in% parts) memory_goals(rows)
   ))
@@ -123,6 +124,12 @@ vector_goals <- function(rows) {
                 times(rows, "Python", 1024, other_part = "single"), at_least = 8))
     }
   )
+}
+
+r_env_goals <- function(rows) {
+  steps <- values_of(rows, "r_env", r_env_names[["vectorized"]], 256)
+  list(goal("a vectorised environment in R: at least 100,000 steps a second",
+            stats::median(steps), at_least = 1e5))
 }
 
 search_goals <- function(rows) {

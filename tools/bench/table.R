@@ -7,7 +7,8 @@ number <- function(x) {
 what_text <- function(summary) {
   plural <- ifelse(summary$num_envs == 1, "", "s")
   ifelse(
-    summary$part == "vector", sprintf("%.0f sub-environment%s", summary$num_envs, plural),
+    summary$part %in% c("vector", "r_env"),
+    sprintf("%.0f sub-environment%s", summary$num_envs, plural),
     c(single = "single", search = "random search", fresh = "search in a fresh R",
       memory = "memory")[summary$part]
   )
