@@ -14,7 +14,8 @@ given_rollouts <- function(dots, written, call = rlang::caller_env()) {
   if (length(unnamed)) {
     gym_abort(
       paste0("Beside rollouts, the arguments of a plot need names, such as ",
-             "`type = \"trajectory\"`, which ", describe_argument(dots[[unnamed[[1L]]]]), " has not."),
+             "`type = \"trajectory\"`, which ", describe_argument(dots[[unnamed[[1L]]]]),
+             " has not."),
       class = "gym_error_argument", argument = "...", value = dots[[unnamed[[1L]]]], call = call
     )
   }
