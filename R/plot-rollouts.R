@@ -13,15 +13,13 @@ given_rollouts <- function(dots, written, call = rlang::caller_env()) {
   unnamed <- which(!are & !nzchar(names))
   if (length(unnamed)) {
     gym_abort(
-      paste0("Beside rollouts, the arguments of a plot need names, such as `type = \"trajectory\"`, ",
-             "which ", describe_argument(dots[[unnamed[[1L]]]]), " has not."),
+      paste0("Beside rollouts, the arguments of a plot need names, such as ",
+             "`type = \"trajectory\"`, which ", describe_argument(dots[[unnamed[[1L]]]]), " has not."),
       class = "gym_error_argument", argument = "...", value = dots[[unnamed[[1L]]]], call = call
     )
   }
-  list(
-    rollouts = stats::setNames(dots[are], rollout_labels(dots[are], names[are], as.list(written)[-1L][are])),
-    others = dots[!are]
-  )
+  labels <- rollout_labels(dots[are], names[are], as.list(written)[-1L][are])
+  list(rollouts = stats::setNames(dots[are], labels), others = dots[!are])
 }
 
 # Those without a name are called as their variable, or after their policy.
@@ -53,9 +51,9 @@ is_comparison <- function(rollouts) {
 
 #' Compute what a plot of several policies shows
 #' @param rollouts A list of rollouts with names.
-#' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `y` (where
-#'   its row stands), `median`, `text`, `place` (where that is along the axis, from 0 to 1), `colour`;
-#'   `returns`, `shapes`, data frames with a column
+#' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `y`
+#'   (where its row stands), `median`, `text`, `place` (where the median is along the axis, from 0
+#'   to 1), `colour`; `returns`, `shapes`, data frames with a column
 #'   `label`: the returns (`value`), and the corners of the areas (`x`, `y`, and `area`, which tells
 #'   them apart); `xlim`, `ylim`, `title`.
 #' @noRd
