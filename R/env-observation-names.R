@@ -1,7 +1,7 @@
 # What the parts of an observation are called, from the tables "Observation
 # Space" in Gymnasium's documentation of each environment
 # (https://gymnasium.farama.org/environments/classic_control/, toy_text/, box2d/ and
-# mujoco/). Of an environment that is not here, or shows another number of parts, no names are known.
+# mujoco/). Other environments, and those that show another number of parts, have no names.
 
 observation_parts <- list(
   Acrobot = c(

@@ -17,8 +17,8 @@
 #' an episode ends (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn where
 #' the episode comes near; a solid line is its end. The observations are those that the actions were
 #' taken on: the one after the last step is not among them. Takes a rollout with `steps = TRUE`.
-#' What wrappers do to an observation is not known here: labels and limits are those of the
-#' environment itself.
+#' Where a wrapper changes what is observed, as `NormalizeObservation` does, the labels are `obs_1`
+#' and so on, and there are no limits.
 #'
 #' `"filmstrip"` shows frames of an episode side by side, in rows where that makes them
 #' larger, evenly apart, the first and the last among them. Above and below, what is blank in all
