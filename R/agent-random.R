@@ -11,8 +11,8 @@
 #' Rounds are played side by side, in batches of 51 in CartPole, and the first one that
 #' reaches the target ends the search all the same. A search that is interrupted returns the batches
 #' that were finished; one with a `checkpoint` goes on where it was when the same call is made
-#' again, also after a kill. `vignette("playing", package = "gym")` tells all of this in full, and where the tutorial's
-#' own script differs.
+#' again, also after a kill. `vignette("playing", package = "gym")` tells all of this in full, and
+#' where the tutorial's own script differs.
 #'
 #' @param env The environment: an id, by default `"CartPole-v0"`, or an environment made by
 #'   [gym_make()], with sub-environments or without.

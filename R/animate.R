@@ -37,7 +37,7 @@
 #' @export
 #' @examplesIf gym:::can_start_server() && requireNamespace("magick", quietly = TRUE)
 #' # The pole falls to the right: push the cart to the right.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, frames = TRUE)
 #' animate(played, width = 300)
 #'

@@ -68,7 +68,8 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   if (is_registered(x)) {
     return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
   }
-  env <- make_vector_env(x, num_envs, list(...), max_envs, frames, client)
+  call <- rlang::caller_env()
+  env <- make_vector_env(x, num_envs, list(...), max_envs, frames, client, call)
   vector_env <- vector_env_of(env, frames, batch_size = num_envs %||% sync_sub_envs)
   vector_env$close <- function(wait = TRUE) {
     # A server that hangs must not be waited for again.
@@ -124,11 +125,12 @@ sync_sub_envs <- 16L
 # Wrappers whose results depend on earlier episodes.
 remembering_wrappers <- c("NormalizeObservation", "NormalizeReward")
 
-make_vector_env <- function(env_id, num_envs, arguments, max_envs, frames, client) {
+make_vector_env <- function(env_id, num_envs, arguments, max_envs, frames, client, call) {
   make <- function(num_envs, vectorization_mode = NULL, autoreset_mode = NULL) {
     rlang::exec(
       make_unseeded, env_id, !!!arguments, num_envs = num_envs,
-      vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, client = client
+      vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, client = client,
+      call = call
     )
   }
   if (frames || length(remembered_by(noted_wrappers(env_id)))) {

@@ -91,7 +91,8 @@ look_at_observation <- function(check, topic, observation, what) {
   )
   if (!is.null(problem)) {
     place <- if (nzchar(problem$path)) {
-      paste0(" at `$", sub("^[$]", "", problem$path), "`", name_of_number(check$space, problem$path))
+      paste0(" at `$", sub("^[$]", "", problem$path), "`",
+             name_of_number(check$space, problem$path))
     }
     note_finding(check, topic, paste0(
       what, ", ", describe_value(observation), ", does not fit the space ", format(check$space),

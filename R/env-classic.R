@@ -196,9 +196,12 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   * `truncated`, whether it was cut off, such as by its limit of steps.
 #'
 #'   In a vector environment `reward` is a numeric vector and `done`, `terminated` and `truncated`
-#'   are logical vectors, with an element for each sub-environment that stepped. With autoreset
-#'   mode `"SameStep"` the info has, when an episode has ended, `final_obs`: a list with the last
-#'   observation of each sub-environment whose episode ended, `NULL` for the others.
+#'   are logical vectors, with an element for each sub-environment that stepped. There is one more
+#'   element, `next_observation`: what the step led to, in the form of `observation`. It differs
+#'   from that only with autoreset mode `"SameStep"`: where an episode has ended it is the last
+#'   observation of that, and `observation` the first of the next one. The info then has
+#'   `final_obs`, too: a list with the last observation of each sub-environment whose episode ended,
+#'   `NULL` for the others.
 #' @section Errors: `gym_error_space` for an action that does not fit the action
 #'   space, the environment has not moved then; a Box action outside of the bounds goes to
 #'   the environment, as in Gymnasium, and most clip it. In a vector environment also for a wrong

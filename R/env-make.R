@@ -14,6 +14,16 @@
 #' environment's own vector implementation may differ from the single environment in details, such
 #' as the size of the Atari games' pictures.
 #'
+#' # Names of what is observed
+#'
+#' Where Gymnasium's documentation names the numbers of an observation, such as CartPole's, the
+#' vectors that `$reset()` and `$step()` return have these names, and with `num_envs` so have the
+#' columns of the matrix: `observation["pole_angle"]`, `observations[, "pole_angle"]`. The parts of
+#' a Tuple, such as Blackjack's, have names as well. They are the element `names` of
+#' `$single_observation_space`, `NULL` where there are none: in other environments, and where a
+#' wrapper changes what is observed, such as `NormalizeObservation`. The classic calls return
+#' observations without names.
+#'
 #' # After an episode's end
 #'
 #' An environment without `num_envs` wants `$reset()` when a step has returned `done`. With
@@ -22,7 +32,9 @@
 #' its observation is the first of the new episode, its reward is 0, and neither `terminated` nor
 #' `truncated` is set. Leave that step out when you sum rewards or count steps, as [rollout()]
 #' does. With `"SameStep"` the step that ends an episode already returns the first observation of
-#' the next one, with `"Disabled"` `$reset(mask = )` does it.
+#' the next one, with `"Disabled"` `$reset(mask = )` does it. Whatever the mode, the element
+#' `next_observation` of what `$step()` returns is what the step led to: the last observation of an
+#' episode that it ended, not the first of the next one.
 #'
 #' @inheritParams env_create
 #' @param ... Further arguments for the environment, by name, such as
@@ -76,10 +88,10 @@
 #' poles
 #' observation <- poles$reset()
 #' for (step in 1:20) {
-#'   out <- poles$step(observation[, 3] > 0)
+#'   out <- poles$step(observation[, "pole_angle"] > 0)
 #'   observation <- out$observation
 #' }
-#' summary(observation[, 3])
+#' summary(observation[, "pole_angle"])
 #' poles$close()
 gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                      wrappers = list(), client = gym_client(), vectorization_mode = NULL,

@@ -1,7 +1,7 @@
 # What the parts of an observation are called, from the tables "Observation
 # Space" in Gymnasium's documentation of each environment
-# (https://gymnasium.farama.org/environments/classic_control/, toy_text/ and
-# box2d/).
+# (https://gymnasium.farama.org/environments/classic_control/, toy_text/, box2d/ and
+# mujoco/). Other environments, and those that show another number of parts, have no names.
 
 observation_parts <- list(
   Acrobot = c(
@@ -14,6 +14,23 @@ observation_parts <- list(
   CliffWalkingSlippery = "position",
   FrozenLake = "position",
   FrozenLake8x8 = "position",
+  HalfCheetah = c(
+    "tip_z", "tip_angle", "back_thigh_angle", "back_shin_angle", "back_foot_angle",
+    "front_thigh_angle", "front_shin_angle", "front_foot_angle", "tip_x_velocity",
+    "tip_z_velocity", "tip_angular_velocity", "back_thigh_angular_velocity",
+    "back_shin_angular_velocity", "back_foot_angular_velocity", "front_thigh_angular_velocity",
+    "front_shin_angular_velocity", "front_foot_angular_velocity"
+  ),
+  Hopper = c(
+    "torso_z", "torso_angle", "thigh_angle", "leg_angle", "foot_angle", "torso_x_velocity",
+    "torso_z_velocity", "torso_angular_velocity", "thigh_angular_velocity",
+    "leg_angular_velocity", "foot_angular_velocity"
+  ),
+  InvertedDoublePendulum = c(
+    "cart_position", "sin_theta1", "sin_theta2", "cos_theta1", "cos_theta2", "cart_velocity",
+    "angular_velocity_theta1", "angular_velocity_theta2", "constraint_force"
+  ),
+  InvertedPendulum = c("cart_position", "pole_angle", "cart_velocity", "pole_angular_velocity"),
   LunarLander = c(
     "x", "y", "x_velocity", "y_velocity", "angle", "angular_velocity",
     "left_leg_contact", "right_leg_contact"
@@ -21,7 +38,23 @@ observation_parts <- list(
   MountainCar = c("position", "velocity"),
   MountainCarContinuous = c("position", "velocity"),
   Pendulum = c("cos_theta", "sin_theta", "angular_velocity"),
-  Taxi = "state"
+  Reacher = c(
+    "cos_theta1", "cos_theta2", "sin_theta1", "sin_theta2", "target_x", "target_y",
+    "angular_velocity_theta1", "angular_velocity_theta2", "fingertip_minus_target_x",
+    "fingertip_minus_target_y"
+  ),
+  Swimmer = c(
+    "tip_angle", "first_rotor_angle", "second_rotor_angle", "tip_x_velocity", "tip_y_velocity",
+    "tip_angular_velocity", "first_rotor_angular_velocity", "second_rotor_angular_velocity"
+  ),
+  Taxi = "state",
+  Walker2d = c(
+    "torso_z", "torso_angle", "thigh_angle", "leg_angle", "foot_angle", "left_thigh_angle",
+    "left_leg_angle", "left_foot_angle", "torso_x_velocity", "torso_z_velocity",
+    "torso_angular_velocity", "thigh_angular_velocity", "leg_angular_velocity",
+    "foot_angular_velocity", "left_thigh_angular_velocity", "left_leg_angular_velocity",
+    "left_foot_angular_velocity"
+  )
 )
 observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 

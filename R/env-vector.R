@@ -71,8 +71,8 @@ results_by_sub_env <- function(answer) {
   )
 }
 
-# The last observations of the sub-environments that ended within the step: their numbers from 1, and
-# a batch of these observations.
+# The last observations of the sub-environments that ended within the step: the numbers of these
+# sub-environments from 1, and a batch of the observations.
 final_observations <- function(instance, answer, n, named) {
   ended <- unlist(answer$final_sub_envs)
   check_final_sub_envs(ended, n)

@@ -1,4 +1,4 @@
-# The steps of a rollout as arrays, for those who write learners, which go through them time by time.
+# The steps of a rollout as arrays, for those who write learners, which go through time.
 
 #' Put the steps of batches into arrays by time and sub-environment
 #'
@@ -135,23 +135,21 @@ print.gym_arrays <- function(x, ...) {
 
 array_lines <- function(arrays) {
   flat <- flat_arrays(arrays)
-  paste0(
-    format(paste0(names(flat), ":")), " ", vapply(flat, function(x) typeof_text(x), ""), " ",
-    vapply(flat, function(x) shape_text(dim(x)), "")
-  )
+  kinds <- vapply(flat, function(x) if (is.object(x)) class(x)[[1L]] else typeof(x), "")
+  shapes <- vapply(flat, function(x) shape_text(dim(x)), "")
+  paste(format(paste0(names(flat), ":")), kinds, shapes)
 }
 
-# The arrays of Tuple and Dict under the names of the parts, such as `observation$position`.
-flat_arrays <- function(arrays) {
-  keys <- names(arrays) %||% paste0("[[", seq_along(arrays), "]]")
-  flat <- Map(function(array, key) {
-    if (!is.list(array)) {
-      return(stats::setNames(list(array), key))
+# The arrays of Tuple and Dict under the names of their parts, such as `observation$position`.
+flat_arrays <- function(arrays, prefix = "") {
+  parts <- names(arrays) %||% seq_along(arrays)
+  each <- lapply(seq_along(arrays), function(i) {
+    name <- paste0(prefix, parts[[i]])
+    if (is.list(arrays[[i]])) {
+      flat_arrays(arrays[[i]], paste0(name, "$"))
+    } else {
+      stats::setNames(arrays[i], name)
     }
-    inner <- flat_arrays(array)
-    stats::setNames(inner, paste0(key, ifelse(startsWith(names(inner), "["), "", "$"), names(inner)))
-  }, unname(arrays), keys)
-  do.call(c, flat)
+  })
+  unlist(each, recursive = FALSE)
 }
-
-typeof_text <- function(x) if (inherits(x, "integer64")) "integer64" else typeof(x)

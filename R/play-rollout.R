@@ -29,16 +29,16 @@
 #'   `candidate` (integer): matrices.
 #'
 #' A sub-environment's episodes follow one another. Where it has played fewer steps than another
-#' the arrays have `NA` after its last one. For Tuple and Dict there is a list with an array for each
-#' part. Sequence, Graph and OneOf have no arrays.
+#' the arrays have `NA` after its last one. Tuple and Dict have a list with an array for each part;
+#' Sequence, Graph and OneOf have no arrays.
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
 #'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
-#' @param policy The policy: made by [policy_random()] or [policy_network()], or a
-#'   function of many observations that returns as many actions: for the usual
-#'   environments a function of a matrix with an observation in each row, one for each episode
-#'   that still plays, see [act()]. Or several of them, the candidates, which are played side by
-#'   side: a list of policies, or [policy_candidates()].
+#' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of
+#'   many observations that returns as many actions: for the usual environments a function of a
+#'   matrix with an observation in each row, one for each episode that still plays, see [act()];
+#'   [as_policy()] makes one of a fitted model. Or several of them, the candidates, which are played
+#'   side by side: a list of policies, or [policy_candidates()].
 #' @param episodes How many episodes to play, with each of the candidates, a whole number of at
 #'   least 1; the default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of
@@ -60,8 +60,8 @@
 #' @param num_envs How many sub-environments to play in, a whole number, where the environment is
 #'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step as well, in columns whose names
-#'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where steps
-#'   are kept. It is the true one also where the step ended the episode.
+#'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where
+#'   steps are kept. It is the true one also where the step ended the episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
@@ -277,8 +277,8 @@ rollout_lines <- function(x) {
 }
 
 returns_text <- function(returns) {
-  if (length(returns) == 1L) {
-    return(number_text(returns))
+  if (length(returns) < 2L) {
+    return(if (length(returns)) number_text(returns) else "none")
   }
   paste0(
     "mean ", number_text(mean(returns)), se_text(standard_error(returns)),

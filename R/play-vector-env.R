@@ -9,6 +9,8 @@
 #' @param ... Further arguments of [as_vector_env()].
 #' @noRd
 with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., call = rlang::caller_env()) {
+  # Errors from making the environment name the user's call, too.
+  rlang::local_error_call(call)
   vector_env <- as_vector_env(env, ..., max_envs = episodes)
   finished <- FALSE
   on.exit(vector_env$close(wait = finished))

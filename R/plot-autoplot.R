@@ -4,10 +4,11 @@
 #' to be changed and saved in its ways. A trajectory has a facet for each part of the observation
 #' and one for the actions.
 #'
-#' @param object What [rollout()] returned.
+#' @param object What [rollout()] returned. It may have another name, that of its row, as for
+#'   [plot()][plot.gym_rollout()].
 #' @param type `"returns"`, the default, or `"trajectory"`.
 #' @param episode,variables,candidate As for [plot()][plot.gym_rollout()].
-#' @param ... Not used.
+#' @param ... Further rollouts to compare, with the names of their rows or without.
 #' @return An object of class `ggplot`.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
 #'   rollout that was played without steps where a trajectory is wanted.
@@ -17,19 +18,27 @@
 #' played <- rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1, steps = TRUE)
 #' autoplot(played) + theme_minimal()
 #' autoplot(played, type = "trajectory", episode = 2)
-autoplot.gym_rollout <- function(object, type = c("returns", "trajectory"), episode = 1,
-                                 variables = NULL, ..., candidate = 1) {
+autoplot.gym_rollout <- function(object, ..., type = c("returns", "trajectory"), episode = 1,
+                                 variables = NULL, candidate = 1) {
   type <- check_choice(type[1L], c("returns", "trajectory"), arg = "type")
-  check_dots_empty(...)
-  if (type == "returns") {
-    autoplot_returns(object)
+  given <- if (missing(object)) {
+    given_rollouts(list(...), substitute(list(...)))
   } else {
+    given_rollouts(list(object, ...), substitute(list(object, ...)))
+  }
+  rlang::exec(check_dots_empty, !!!given$others)
+  rollouts <- given$rollouts
+  object <- rollouts[[1L]]
+  if (type == "returns") {
+    if (is_comparison(rollouts)) autoplot_comparison(rollouts) else autoplot_returns(object)
+  } else {
+    check_single_rollout(rollouts, type)
     autoplot_trajectory(object, trajectory_plot_data(object, episode, variables, candidate))
   }
 }
 
 autoplot_returns <- function(x) {
-  data <- rollout_plot_data(x)
+  data <- returns_plot_data(x$episodes$return)
   ggplot2::ggplot(data.frame(value = data$returns), ggplot2::aes(x = .data$value)) +
     (if (is.null(data$bars)) density_layers(data$density) else bar_layers(data$bars)) +
     ggplot2::geom_vline(xintercept = data$median, colour = okabe_ito$vermillion,

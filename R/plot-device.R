@@ -10,11 +10,9 @@ open_plot <- function(frame, chosen) {
 # Upright numbers read best, but long ones would run into the axis's label.
 number_direction <- function(at) if (max(nchar(at)) > 3L) 0L else 1L
 
-# A title that names the environment and the policy, the latter up to the first detail: "random" or
-# "network 4-2-1".
+# A title that names the environment and the policy.
 played_title <- function(x) {
-  policy <- sub("(,| over).*", "", policy_text(x$policy))
-  paste(c(x$env_id, paste("policy:", policy)), collapse = ", ")
+  paste(c(x$env_id, paste("policy:", policy_label(x$policy))), collapse = ", ")
 }
 
 # Rounds are whole numbers from 1, and so are the marks on their axis.

@@ -1,12 +1,15 @@
-#' Plot a rollout
+#' Plot a rollout, or compare several
 #'
 #' Three pictures of a rollout: of all of its episodes how their returns are distributed, and
-#' of one of them what was observed and done, or how it looked.
+#' of one of them what was observed and done, or how it looked. Several rollouts, or one of several
+#' policies, are compared: a row for each policy shows how its returns are distributed.
 #'
 #' `"returns"` shows the density of the episodes' returns, the median marked, and each episode
 #' as a tick on the axis. Where there are few different returns, such as the 0 and 1 of
 #' FrozenLake, it shows a bar for each, as high as the number of its episodes: where there are
-#' at most 3, or at most 10 that come twice on average.
+#' at most 3, or at most 10 that come twice on average. In a comparison each row is as high as the
+#' others, whatever the numbers of episodes; of more than ten policies it shows those with the ten
+#' highest mean returns.
 #'
 #' `"trajectory"` shows an episode's observations, each in a panel of its own, and below them its
 #' actions, against the number of steps taken. Where Gymnasium's documentation has units and what
@@ -14,14 +17,15 @@
 #' an episode ends (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn where
 #' the episode comes near; a solid line is its end. The observations are those that the actions were
 #' taken on: the one after the last step is not among them. Takes a rollout with `steps = TRUE`.
-#' What wrappers do to an observation is not known here: labels and limits are those of the
-#' environment itself.
+#' Where a wrapper changes what is observed, as `NormalizeObservation` does, the labels are `obs_1`
+#' and so on, and there are no limits.
 #'
 #' `"filmstrip"` shows frames of an episode side by side, in rows where that makes them
 #' larger, evenly apart, the first and the last among them. Above and below, what is blank in all
 #' of them is cut off. Takes a rollout with `frames = TRUE`, and the package png.
 #'
-#' @param x What [rollout()] returned.
+#' @param x What [rollout()] returned. It may have another name, which is then that of its row:
+#'   `plot(random = played_1, network = played_2)`.
 #' @param type `"returns"`, the default, `"trajectory"` or `"filmstrip"`.
 #' @param main The title; `NULL`, the default, names the environment and the policy, in a
 #'   filmstrip nothing.
@@ -33,9 +37,10 @@
 #' @param n How many frames a filmstrip has at most, a whole number; the default is 8.
 #' @param candidate Whose episode to show where several policies were played, a whole number; the
 #'   default is the first.
-#' @param ... For `"returns"` further arguments of [plot()][graphics::plot.default()], such as
-#'   `xlim`; the other types take none.
-#' @return `x`, invisibly.
+#' @param ... For `"returns"` further rollouts to compare, with the names of their rows or without,
+#'   and further arguments of [plot()][graphics::plot.default()], such as `xlim`; the other types
+#'   take none.
+#' @return `x`, or the first rollout, invisibly.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
 #'   rollout that was played without the steps or frames that are to be shown.
 #' @references The density is that of [stats::density()] with its default bandwidth, within
@@ -47,29 +52,47 @@
 #' plot(rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1))
 #'
 #' # The pole falls to the right: push the cart to the right.
-#' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
+#' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
+#' random <- rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1)
+#' follow <- rollout("CartPole-v1", follow_pole, episodes = 50, seed = 1)
+#' plot(random = random, `follow the pole` = follow)
+#' policies <- list(random = policy_random(), follow = follow_pole)
+#' plot(rollout("CartPole-v1", policies, episodes = 50, seed = 1))
+#'
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, steps = TRUE, frames = TRUE)
 #' plot(played, type = "trajectory")
 #' if (requireNamespace("png", quietly = TRUE)) plot(played, type = "filmstrip")
-plot.gym_rollout <- function(x, type = c("returns", "trajectory", "filmstrip"), main = NULL,
+plot.gym_rollout <- function(x, ..., type = c("returns", "trajectory", "filmstrip"), main = NULL,
                              xlab = NULL, ylab = NULL, episode = 1, variables = NULL, n = 8,
-                             ..., candidate = 1) {
+                             candidate = 1) {
   type <- check_choice(type[1L], c("returns", "trajectory", "filmstrip"), arg = "type")
+  # Without `x` the first rollout has the name of its row.
+  given <- if (missing(x)) {
+    given_rollouts(list(...), substitute(list(...)))
+  } else {
+    given_rollouts(list(x, ...), substitute(list(x, ...)))
+  }
+  rollouts <- given$rollouts
+  x <- rollouts[[1L]]
   if (type != "returns") {
-    check_dots_empty(...)
+    check_single_rollout(rollouts, type)
+    rlang::exec(check_dots_empty, !!!given$others)
   }
   switch(type,
-    returns = plot_returns(x, main, xlab, ylab, ...),
+    returns = if (is_comparison(rollouts)) {
+      plot_comparison(rollouts, main, xlab, ylab, given$others)
+    } else {
+      plot_returns(x, main, xlab, ylab, given$others)
+    },
     trajectory = plot_trajectory(x, episode, variables, main, candidate),
     filmstrip = plot_filmstrip(x, episode, n, main, candidate)
   )
   invisible(x)
 }
 
-plot_returns <- function(x, main, xlab, ylab, ...) {
-  data <- rollout_plot_data(x)
+plot_returns <- function(x, main, xlab, ylab, chosen) {
+  data <- returns_plot_data(x$episodes$return)
   bars <- !is.null(data$bars)
-  chosen <- list(...)
   # The axes of bars have marks at their values, and at whole numbers of episodes.
   axes <- if (bars) "n" else "s"
   open_plot(
@@ -94,13 +117,12 @@ returns_measure <- function(data) if (is.null(data$bars)) "density" else "episod
 # With few different returns a density would show values that no episode had, so there are bars.
 most_bars <- 10L
 
-#' Compute what a plot of a rollout shows
+#' Compute what a plot of returns shows
 #' @return A list: `returns`, `median`, `bars` (data frame `value`, `episodes`, `xmin`, `xmax`,
 #'   `NULL` where there are many different returns), `density` (data frame `x`, `y`, `NULL` where
 #'   there are bars), `xlim`, `ylim`.
 #' @noRd
-rollout_plot_data <- function(x) {
-  returns <- x$episodes$return
+returns_plot_data <- function(returns) {
   values <- sort(unique(returns))
   few <- length(values) <= min(most_bars, max(3, length(returns) / 2))
   bars <- if (few) return_bars(returns, values)

@@ -25,8 +25,8 @@ check_connections <- function(policy, arg, call) {
 #' These are in the environment where it was made, and in those around that one, up to the first
 #' that is not saved with it. Functions and lists among them are looked into, too.
 #' @param seen The functions that were looked into before.
-#' @return A list: `name`, that of the variable or its place in a list, and `what`, words for what it
-#'   was; `NULL` for none.
+#' @return A list: `name`, that of the variable or its place in a list, and `what`, words for what
+#'   it was; `NULL` for none.
 #' @noRd
 lost_connection <- function(f, seen = list()) {
   if (any(vapply(seen, identical, NA, f))) {

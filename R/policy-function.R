@@ -110,6 +110,10 @@ abort_action_count <- function(actions, count, n, vector_env) {
 observations_hint <- function(space) {
   if (inherits(space, "gym_space_discrete") || inherits(space, "gym_space_text")) {
     "It is asked about many observations at once: `observation` is a vector of them."
+  } else if (length(space$shape) == 1L && !is.null(space$names)) {
+    name <- space$names[[min(3L, length(space$names))]]
+    paste0("It is asked about many observations at once, each a row of a matrix: the ", name,
+           " of each is `observation[, \"", name, "\"]`.")
   } else if (is.null(space) || length(space$shape) == 1L) {
     paste("It is asked about many observations at once, each a row of a matrix: the third",
           "number of each is `observation[, 3]`.")

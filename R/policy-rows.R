@@ -121,9 +121,9 @@ policy_bind.gym_policy_list <- function(policy, env, call = rlang::caller_env())
 #' @export
 format.gym_policy_list <- function(x, ...) {
   few <- unclass(x)[seq_len(min(length(x), 4L))]
-  texts <- vapply(few, policy_text, "")
+  texts <- vapply(few, policy_label, "")
   if (!is.null(candidate_names(x))) {
-    texts <- paste0(names(few), " (", texts, ")")
+    texts <- paste0(names(few), ifelse(names(few) == texts, "", paste0(" (", texts, ")")))
   }
   more <- if (length(x) > 4L) paste("and", length(x) - 4L, "more")
   noun <- if (length(x) == 1L) " policy: " else " policies: "

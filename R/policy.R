@@ -25,6 +25,12 @@
 #' `predict()` gives the same actions, or the outputs that they follow from, for observations in a
 #' data frame, too. It never touches R's generator.
 #'
+#' # Saving policies
+#'
+#' [saveRDS()] keeps a policy, and [readRDS()] gives it back in any session. A function keeps the
+#' variables that it uses where these are not in the global environment; connections among them, and
+#' environments made by [gym_make()], are lost, and such a function is refused.
+#'
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
 #' @param observation What is observed. For the usual environments a numeric
@@ -157,6 +163,9 @@ has_act_method <- function(x) {
 policy_text <- function(policy) {
   if (inherits(policy, "gym_policy")) format(policy) else describe_argument(policy)
 }
+
+# The same up to the first detail: "random" or "network 4-2-1".
+policy_label <- function(policy) sub("(,| over).*", "", policy_text(policy))
 
 # What rollouts and searches ask of a policy ------------------------------------
 

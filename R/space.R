@@ -77,7 +77,9 @@ write_value <- function(space, value) UseMethod("write_value")
 #' and `start`; for MultiBinary `shape`; for Text `min_length`, `max_length` and
 #' `characters`; for Tuple, Dict and OneOf `spaces`, a list of spaces, with names
 #' for Dict; for Sequence `space` and `stack`; for Graph `node_space` and
-#' `edge_space`. Bounds of 64-bit integers are doubles, exact up to 2^53.
+#' `edge_space`. Bounds of 64-bit integers are doubles, exact up to 2^53. Where the numbers of an
+#' observation (a Box of one dimension), the parts of a Tuple or what a Discrete counts have names,
+#' these are the element `names`, see [gym_make()].
 #'
 #' # Values in R
 #'
@@ -85,7 +87,8 @@ write_value <- function(space, value) UseMethod("write_value")
 #' * Box, MultiDiscrete, MultiBinary: a vector; an array where the shape has two
 #'   dimensions or more.
 #' * Text: a string.
-#' * Tuple: a list without names. Dict: a list with names.
+#' * Tuple: a list; its elements count by their place, whatever names they have. Dict: a list with
+#'   names.
 #' * Sequence: a list of elements; a stacked one of numbers is an array with the
 #'   elements along the first dimension.
 #' * Graph: a list of `nodes`, `edges` (arrays with the first dimension along the

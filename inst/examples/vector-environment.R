@@ -10,7 +10,7 @@ alive <- rep(TRUE, 1000)
 steps <- 0
 while (any(alive)) {
   # Push to the side to which the pole leans: a row of the matrix is a cart.
-  out <- env$step(observation[, 3] > 0)
+  out <- env$step(observation[, "pole_angle"] > 0)
   observation <- out$observation
   steps <- steps + sum(alive)
   # A sub-environment whose episode has ended begins another one by itself; only the first counts.
@@ -21,5 +21,6 @@ env$close()
 cat("1,000 episodes of", steps / 1000, "steps on average\n")
 
 # rollout() does the same, and returns a table of the episodes.
-played <- rollout("CartPole-v1", function(observation) observation[, 3] > 0, episodes = 1000)
+follow_pole <- function(observation) observation[, "pole_angle"] > 0
+played <- rollout("CartPole-v1", follow_pole, episodes = 1000)
 print(summary(played))

@@ -11,6 +11,11 @@ box_space <- function(low, high, shape = length(low), dtype = "float32") {
   ))
 }
 
+named_space <- function(space, id) {
+  space$names <- observation_names(id, space)
+  space
+}
+
 # `reward` and `ends` are functions of seed, step and action. Observations depend on
 # seed and step alone. Their space has the names of the environment with this `id`.
 fake_environment <- function(reward = function(seed, step, action) 1,
@@ -18,7 +23,7 @@ fake_environment <- function(reward = function(seed, step, action) 1,
                              observation_space = box_space(rep(-1, 4), rep(1, 4)),
                              action_space = discrete_space(2L),
                              reward_threshold = NULL, id = "Fake-v0") {
-  observation_space$names <- observation_names(id, observation_space)
+  observation_space <- named_space(observation_space, id)
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$observation_space <- observation_space
@@ -68,7 +73,7 @@ fake_vector_env <- function(num_envs, mode = "sync",
                             observation_space = box_space(rep(-1, 4), rep(1, 4)),
                             action_space = discrete_space(2L),
                             reward_threshold = NULL, id = "Fake-v0") {
-  observation_space$names <- observation_names(id, observation_space)
+  observation_space <- named_space(observation_space, id)
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$num_envs <- as.integer(num_envs)

@@ -17,6 +17,19 @@ test_that("unknown environments and changed observations have no names", {
   expect_null(observation_names("CartPole-v1", discrete_space(4L)))
 })
 
+test_that("there are as many names as the newest version of the environment shows numbers", {
+  client <- test_client()
+  known <- env_registry(client)
+  known <- known[known$available, ]
+  families <- vapply(known$id, environment_family, "")
+  for (family in intersect(names(observation_parts), families)) {
+    id <- known$id[max(which(families == family))]
+    env <- gym_make(id, client = client)
+    expect_identical(env$observation_space$names, observation_parts[[family]], info = id)
+    env$close()
+  }
+})
+
 test_that("observations of gym_make() have their names, alone and side by side", {
   parts <- observation_parts$CartPole
   env <- local_env()

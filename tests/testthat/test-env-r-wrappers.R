@@ -80,7 +80,9 @@ test_that("actions are changed as Gymnasium changes them", {
     log$actions <- list()
     record(own, given, 1)
     expect_equal(record(plain, log$actions, 1), record(wrapped, given, 1), tolerance = 1e-6)
-    expect_false(identical(log$actions, given))
+    # Pendulum clips them, too.
+    highest <- if (wrapper[[1]] == "ClipAction") 2 else 10 / 7
+    expect_equal(range(unlist(log$actions)), c(-2, highest))
   }
 })
 

@@ -12,7 +12,7 @@ test_that("returns are those of the episodes", {
   played <- rollout(scripted_environment(returns), policy_random(), episodes = 8)
   plot <- ggplot2::autoplot(played)
   expect_drawn(plot)
-  density <- rollout_plot_data(played)$density
+  density <- returns_plot_data(played$episodes$return)$density
   expect_equal(ggplot2::layer_data(plot, 1)[c("x", "y")], density, ignore_attr = TRUE)
   expect_identical(ggplot2::layer_data(plot, 2)$x, returns)
   expect_identical(ggplot2::layer_data(plot, 3)$xintercept, 15.5)

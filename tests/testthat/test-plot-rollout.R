@@ -4,7 +4,7 @@ rollout_of <- function(returns) {
 
 test_that("the plot shows the density of the returns and their median", {
   returns <- c(10, 12, 13, 15, 16, 18, 20, 40)
-  data <- rollout_plot_data(rollout_of(returns))
+  data <- returns_plot_data(returns)
   expect_identical(data$returns, returns)
   expect_identical(data$median, 15.5)
   whole <- density(returns, from = 10, to = 40)
@@ -14,20 +14,20 @@ test_that("the plot shows the density of the returns and their median", {
 })
 
 test_that("few different returns have a bar each, as high as the number of their episodes", {
-  data <- rollout_plot_data(rollout_of(rep(c(0, 1, 0), 20)))
+  data <- returns_plot_data(rep(c(0, 1, 0), 20))
   expect_null(data$density)
   expect_equal(data$bars, data.frame(
     value = 0:1, episodes = c(40L, 20L), xmin = c(-0.4, 0.6), xmax = c(0.4, 1.4)
   ))
   expect_identical(bar_marks(data$bars), c(0, 1))
   expect_identical(returns_measure(data), "episodes")
-  blackjack <- rollout_plot_data(rollout_of(rep(c(1.5, -1, 1, 0, -1), 8)))
+  blackjack <- returns_plot_data(rep(c(1.5, -1, 1, 0, -1), 8))
   expect_identical(blackjack$bars$value, c(-1, 0, 1, 1.5))
   expect_identical(blackjack$bars$episodes, c(16L, 8L, 8L, 8L))
 })
 
 test_that("bars are as few as are twice as many episodes on average, or three", {
-  has_bars <- function(returns) !is.null(rollout_plot_data(rollout_of(returns))$bars)
+  has_bars <- function(returns) !is.null(returns_plot_data(returns)$bars)
   expect_true(has_bars(c(9, 20, 31)))
   expect_false(has_bars(c(9, 20, 31, 40)))
   expect_true(has_bars(rep(1:10, 2)))
@@ -35,14 +35,14 @@ test_that("bars are as few as are twice as many episodes on average, or three", 
 })
 
 test_that("bars near each other are seen, and have the usual marks", {
-  bars <- rollout_plot_data(rollout_of(c(rep(500, 20), 499.9, 9)))$bars
+  bars <- returns_plot_data(c(rep(500, 20), 499.9, 9))$bars
   expect_gt(min(bars$xmax - bars$xmin), 4)
   expect_null(bar_marks(bars))
 })
 
 test_that("equal returns, or a single one, have a bar with room beside it", {
   for (returns in list(200, rep(200, 5), 0)) {
-    data <- rollout_plot_data(rollout_of(returns))
+    data <- returns_plot_data(returns)
     expect_identical(data$bars$episodes, length(returns))
     expect_true(data$xlim[1] < data$bars$xmin && data$bars$xmax < data$xlim[2])
   }

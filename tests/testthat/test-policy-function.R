@@ -150,3 +150,14 @@ test_that("asking a function beforehand moves no generator and is done once a ro
   })
   expect_identical(played$steps$action, unlist(drawn))
 })
+
+test_that("the hint for a function of a single observation names a part that there is", {
+  hint <- function(id, n) {
+    for_one <- function(observation) as.integer(observation[[1]] > 0)
+    env <- fake_vector_env(3, id = id, observation_space = box_space(rep(-1, n), rep(1, n)))
+    conditionMessage(expect_error(rollout(env, for_one, 3), class = "gym_error_argument"))
+  }
+  expect_match(hint("CartPole-v1", 4), "`observation[, \"pole_angle\"]`", fixed = TRUE)
+  expect_match(hint("MountainCar-v0", 2), "`observation[, \"velocity\"]`", fixed = TRUE)
+  expect_match(hint("Other-v0", 4), "`observation[, 3]`", fixed = TRUE)
+})

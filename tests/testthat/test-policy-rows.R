@@ -133,10 +133,8 @@ test_that("a list may have policies of every kind", {
   candidates <- list(
     function(observation) observation[, 3] > 0, network, as_policy(tree), policy_random()
   )
-  named <- four
-  named$names <- observation_parts$CartPole
-  env <- list(observation_space = named, action_space = discrete_space(2L),
-              spec = list(id = "CartPole-v1"))
+  env <- list(observation_space = named_space(four, "CartPole-v1"),
+              action_space = discrete_space(2L), spec = list(id = "CartPole-v1"))
   policies <- policy_bind(policy_list(candidates), env)
   angles <- c(1, -1, 1, -1, 1, -1, 1, -1)
   observations <- cbind(0, 0, angles, 0, deparse.level = 0)
