@@ -167,6 +167,14 @@ test_that("the session's generator moves by one draw at the first need, and not 
   expect_identical(.Random.seed, after)
 })
 
+test_that("an episode of a rollout has the draws of its seed, step for step", {
+  env <- local_dice()
+  played <- rollout(env, policy_random(), 20, seed = 1, steps = TRUE)
+  last <- played$steps[played$steps$episode == 19, ]
+  expect_identical(env$reset(seed = played$episodes$seed[[19]])[["a"]], last$a[[1]])
+  for (step in 1:2) expect_identical(env$step(0)$observation[["a"]], last$a[[step + 1]])
+})
+
 test_that("an error in a step leaves the session's generator as it was", {
   withr::local_seed(1)
   env <- local_walk(step = function(self, action) stop(runif(1)))
@@ -234,6 +242,7 @@ test_that("what a step returns is refused in the step that returned it", {
   refused(with(reward = NaN), "must be a number, not NaN")
   refused(with(reward = 1:2), "must be a number, not 1:2")
   refused(with(reward = "1"), "must be a number, not \"1\"")
+  refused(utils::modifyList(good, list(reward = I(list(1)))), "`reward` of what")
   space <- "gym_error_space"
   refused(with(observation = 4), "not in its space <Discrete 7 from -3>", space)
   refused(with(observation = 0.5), "one whole number", space)

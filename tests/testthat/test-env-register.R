@@ -69,7 +69,9 @@ test_that("a saved search of an environment in R is found again without a server
                   checkpoint = file)
   }
   first <- search()
-  expect_identical(suppressMessages(search())$history, first$history)
+  again <- suppressMessages(search())
+  expect_identical(again$history, first$history)
+  expect_null(again$client)
 })
 
 test_that("gym_make() seeds, replaces arguments and sets another limit", {
