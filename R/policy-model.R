@@ -43,7 +43,7 @@
 #' @examples
 #' # A model of any kind that predicts: here one that was fitted to made-up data.
 #' steps <- data.frame(pole_angle = rnorm(100))
-#' steps$action <- as.integer(steps$pole_angle + rnorm(100, sd = 0.1) > 0)
+#' steps$action <- as.integer(steps$pole_angle + rnorm(100, sd = 0.5) > 0)
 #' as_policy(glm(action ~ pole_angle, binomial, steps))
 #'
 #' @examplesIf gym:::can_start_server()
