@@ -35,7 +35,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     truncated = logical(n), ended = logical(n), needed = rep(TRUE, n), steps = list(),
     frames = list(), target = target, each = each, report = report
   )
-  with_generator(new_generator(stream = stream), {
+  play <- function() {
     for (first in which(sub_env == 1L)) {
       numbers <- seq(first, min(n, first + vector_env$num_envs - 1L))
       numbers <- numbers[batch$needed[numbers]]
@@ -43,10 +43,24 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
         play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps, keep_next)
       }
     }
-  })
+  }
+  with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
   c(lapply(mget(columns, batch), `[`, batch$needed), mget(c("steps", "frames"), batch))
+}
+
+# An error of the environment names the user's call, not the step that was taken for it.
+naming_call <- function(code, vector_env) {
+  withCallingHandlers(
+    code,
+    gym_error = function(cnd) {
+      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(vector_env$step))) {
+        cnd["call"] <- list(rlang::error_call(vector_env$call))
+        rlang::cnd_signal(cnd)
+      }
+    }
+  )
 }
 
 # Plays some episodes of a batch, one in each sub-environment. They begin together, so that all that
