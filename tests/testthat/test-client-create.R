@@ -368,9 +368,9 @@ test_that("a proxy of the system's is not asked for a server on this machine", {
 })
 
 test_that("calls leave R's generator alone", {
+  env <- local_env()
   set.seed(1)
   before <- .Random.seed
-  env <- local_env()
   env$reset()
   env$step(1)
   env_action_space_sample(env$client, env$instance_id)

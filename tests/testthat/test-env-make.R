@@ -46,3 +46,20 @@ test_that("an environment of which nothing could be learnt is closed again", {
   expect_error(gym_make("CartPole-v1", client = client), class = "gym_error_connection")
   expect_length(env_list_all(server), 0)
 })
+
+test_that("set.seed() fixes an environment that is given no seed, by the one number it draws", {
+  first <- function(...) {
+    env <- local_env("CartPole-v1", ...)
+    list(env$reset(), env$step(1)$observation, env$reset())
+  }
+  set.seed(1)
+  drawn <- first()
+  state <- .Random.seed
+  expect_identical(first(seed = 5), first(seed = 5))
+  expect_identical(.Random.seed, state)
+  set.seed(1)
+  seed <- draw_seed()
+  expect_identical(.Random.seed, state)
+  expect_identical(first(seed = seed), drawn)
+  expect_false(identical(first(), drawn))
+})
