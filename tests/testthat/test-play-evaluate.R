@@ -62,6 +62,8 @@ test_that("parts of the table print, too", {
   expect_output(print(evaluation["b", ]), "Evaluation in Fake-v0: 5 episodes")
   expect_output(print(evaluation["se"]), "se\na +0")
   expect_output(print(evaluation[1, c("candidate", "steps")]), "candidate steps")
+  evaluation$steps <- NULL
+  expect_output(print(evaluation), "mean_return se lower upper episodes\n")
 })
 
 test_that("the environment's own arguments and limits of steps go along", {
