@@ -99,7 +99,7 @@ draw_episode_seeds <- function(vector_env, history, episodes) {
   if (vector_env$one_seed) {
     at_once <- vector_env$num_envs
     rep(draw(ceiling(n / at_once)), each = at_once, length.out = n)
-  } else if (history$common_seeds) {
+  } else if (history$common_seeds && history$candidates > 1) {
     history$seeds <- history$seeds %||% draw(history$episodes)
     history$seeds[episodes$episode]
   } else {

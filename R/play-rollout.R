@@ -150,8 +150,9 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_count(num_envs, allow_null = TRUE)
   check_flag(progress)
   check_dots_named(list(...), "is_slippery = FALSE")
-  seed <- seed %||% draw_seed()
   candidates <- count_candidates(policy) %||% 1L
+  check_countable(episodes, candidates)
+  seed <- seed %||% draw_seed()
   play <- function(vector_env) {
     play_rollout(
       vector_env, policy, candidates, episodes, max_steps, seed, steps, next_observation, progress
@@ -161,6 +162,15 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
     client = client
   )
+}
+
+# The numbers of all episodes together are integers.
+check_countable <- function(episodes, candidates, call = rlang::caller_env()) {
+  most <- .Machine$integer.max %/% candidates
+  if (episodes > most) {
+    must <- paste("at most", most, "for each of", count_of(candidates, "candidate"))
+    abort_argument(episodes, must, "episodes", call)
+  }
 }
 
 check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {

@@ -19,8 +19,22 @@ given_rollouts <- function(dots, written, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "...", value = dots[[unnamed[[1L]]]], call = call
     )
   }
+  check_have_episodes(dots[are], call)
   labels <- rollout_labels(dots[are], names[are], as.list(written)[-1L][are])
   list(rollouts = stats::setNames(dots[are], labels), others = dots[!are])
+}
+
+check_have_episodes <- function(rollouts, call) {
+  for (rollout in rollouts) {
+    if (!nrow(rollout$episodes)) {
+      gym_abort(
+        c(paste0("A rollout in ", rollout$env_id, " has no episode to plot: it was interrupted ",
+                 "before the first batch of episodes had ended."),
+          i = "The same call of `rollout()` with its `seed` plays it again."),
+        class = "gym_error_argument", argument = "x", value = rollout, call = call
+      )
+    }
+  }
 }
 
 # Those without a name are called as their variable, or after their policy.

@@ -128,8 +128,20 @@ check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   }
   for (i in seq_along(x)) {
     check_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
+    check_one_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
   }
   policy_list(x)
+}
+
+# Candidates are several policies, so they are none of a list.
+check_one_policy <- function(x, arg, call) {
+  if (!is.null(count_candidates(x))) {
+    gym_abort(
+      c(paste0("`", arg, "` must be one policy, not ", policy_text(x), "."),
+        i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
 }
 
 abort_no_policy <- function(x, arg, call) {

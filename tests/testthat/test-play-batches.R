@@ -94,3 +94,16 @@ test_that("a batch that was interrupted in the middle and played again is as if 
   suppressMessages(rollout(env, drawing, 8, seed = 1, steps = TRUE))
   expect_identical(rollout(env, drawing, 8, seed = 1, steps = TRUE), whole)
 })
+
+test_that("seeds are drawn batch after batch, and all at once only to be common to candidates", {
+  vector_env <- as_vector_env(fake_environment())
+  seeds <- function(candidates) {
+    history <- new_history(candidates, 1000L, new_streams(1), common_seeds = TRUE)
+    first <- draw_episode_seeds(vector_env, history, list(episode = 1:2))
+    list(drawn = c(first, draw_episode_seeds(vector_env, history, list(episode = 3L))),
+         kept = length(history$seeds))
+  }
+  expect_identical(seeds(1L)$kept, 0L)
+  expect_identical(seeds(2L)$kept, 1000L)
+  expect_identical(seeds(1L)$drawn, seeds(2L)$drawn)
+})

@@ -204,3 +204,9 @@ test_that("where each sub-environment has a seed, a single environment plays an 
   expect_identical(alone$episodes$return, played$episodes$return)
 })
 
+test_that("more episodes than an integer counts, in all candidates together, are refused", {
+  policies <- list(policy_random(), policy_random())
+  expect_error(rollout(fake_environment(), policies, episodes = .Machine$integer.max),
+               "`episodes` must be at most 1073741823 for each of 2 candidates",
+               class = "gym_error_argument")
+})

@@ -116,3 +116,11 @@ test_that("what cannot be compared is refused", {
   expect_error(ggplot2::autoplot(played, xlim = 1:2), "no argument for `xlim`",
                class = "gym_error_argument")
 })
+
+test_that("a rollout that was interrupted before it had an episode is refused", {
+  interrupted <- function(observation) rlang::interrupt()
+  none <- suppressMessages(rollout(fake_environment(), interrupted, episodes = 2))
+  some <- rollout(fake_environment(), policy_random(), episodes = 2)
+  expect_error(plot(none), "has no episode to plot", class = "gym_error_argument")
+  expect_error(plot(some, none), "has no episode to plot", class = "gym_error_argument")
+})

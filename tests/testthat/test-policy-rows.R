@@ -160,3 +160,10 @@ test_that("a list of policies without any, or with something else in it, is refu
                "`policy[[2]]` must be a function of observations", fixed = TRUE,
                class = "gym_error_argument")
 })
+
+test_that("candidates in a list of policies are refused before anything is played", {
+  candidates <- policy_candidates(policy_network(c(4, 1)), diag(4))
+  expect_error(rollout("CartPole-v1", list(policy_random(), candidates), client = no_client()),
+               "`policy[[2]]` must be one policy, not 4 candidates of network 4-1", fixed = TRUE,
+               class = "gym_error_argument")
+})
