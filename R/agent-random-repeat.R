@@ -6,9 +6,9 @@
 #' the searches needed stand beside the geometric distribution that they follow.
 #'
 #' The row of a seed is what `search_random(seed = )` gives with that seed and the same
-#' arguments: call it to see that search again, or to have its policy. (Only an environment
-#' that remembers something beyond a reset, such as one wrapped in `NormalizeReward`, may
-#' differ.) As each search is seeded, the session's generator is left as it was.
+#' arguments: call it to see that search again, or to have its policy. (Only an
+#' environment that was made before and remembers something beyond a reset, such as one wrapped
+#' in `NormalizeReward`, may differ.) As each search is seeded, the session's generator is left as it was.
 #'
 #' # The chance of a round
 #'
@@ -78,9 +78,14 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
     settings <- settings_in(vector_env, settings)
     check_target(settings, call)
     template <- policy_bind(settings$policy, vector_env, call = call)
-    play_searches(vector_env, template, settings, seeds, progress, call)
+    anew <- length(vector_env$remembers) && !is_playable(env)
+    with_env <- if (anew) in_env else function(use) use(vector_env)
+    play_searches(with_env, template, settings, seeds, progress, call)
   }
-  with_vector_env(env, as.numeric(rounds) * episodes, play, max_steps, client = client)
+  in_env <- function(use, ...) {
+    with_vector_env(env, as.numeric(rounds) * episodes, use, ..., client = client, call = call)
+  }
+  in_env(play, max_steps)
 }
 
 check_seeds <- function(seeds, call = rlang::caller_env()) {
@@ -115,15 +120,17 @@ check_target <- function(settings, call) {
 #' Play a search with each seed
 #'
 #' An interrupt ends them early; so does an error, which carries the searches that were finished.
+#' @param with_env A function that calls a function with a vector environment: the same for all
+#'   seeds, or one that is made anew where it remembers earlier episodes.
 #' @return As [search_repeat()].
 #' @noRd
-play_searches <- function(vector_env, template, settings, seeds, progress, call) {
+play_searches <- function(with_env, template, settings, seeds, progress, call) {
   started <- proc.time()[["elapsed"]]
   show <- if (progress) progress_bar(length(seeds), "Search", "0 solved, ") else function(...) NULL
   rows <- list()
   play <- function() {
     for (seed in seeds) {
-      search <- play_seed(vector_env, template, settings, seed, call)
+      search <- play_seed(with_env, template, settings, seed, call)
       if (search$interrupted) {
         rlang::interrupt()
       }
@@ -144,12 +151,15 @@ play_searches <- function(vector_env, template, settings, seeds, progress, call)
   new_searches(rows, settings, started, interrupted)
 }
 
-# An interrupt of one search ends all of them. The message comes once, for all.
-play_seed <- function(vector_env, template, settings, seed, call) {
+# An interrupt of one search ends all of them. Messages come once, for all.
+play_seed <- function(with_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
-    play_search(vector_env, template, settings, progress = FALSE, call),
-    gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd)
+    with_env(function(vector_env) {
+      play_search(vector_env, template, settings, progress = FALSE, call)
+    }),
+    gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd),
+    gym_message_remembers = function(cnd) rlang::cnd_muffle(cnd)
   )
 }
 

@@ -84,9 +84,13 @@ play_batches <- function(vector_env, history, policy_of, after = function(histor
       vector_env, policy, episodes, stream, each = history$episodes, report = report, ...
     )
     played$candidate <- candidates[played$candidate]
-    history$batches[[length(history$batches) + 1L]] <- played
-    history$played_batches <- history$played_batches + 1
-    if (after(history, played)) {
+    # An interrupt finds the batch entered completely, or not at all.
+    suspendInterrupts({
+      history$batches[[length(history$batches) + 1L]] <- played
+      history$played_batches <- history$played_batches + 1
+      ended <- after(history, played)
+    })
+    if (ended) {
       break
     }
   }

@@ -152,3 +152,17 @@ test_that("CartPole: each seed's row is the search with that seed, and nothing s
     expect_identical(row$steps, sum(search$rounds$steps))
   }
 })
+
+test_that("an environment that remembers earlier episodes is made anew for each seed", {
+  client <- local_server()
+  wrapped <- gym_wrap("CartPole-v0", "NormalizeObservation")
+  play <- function(seeds) {
+    messages <- testthat::capture_messages(
+      searches <- search_repeat(wrapped, rounds = 2, target = 1e4, seeds = seeds, client = client)
+    )
+    expect_length(messages, 1)
+    searches$searches[c("seed", "mean_return", "steps")]
+  }
+  expect_equal(play(1:3)[3, ], play(3), ignore_attr = "row.names")
+  expect_length(env_list_all(client), 0)
+})
