@@ -8,7 +8,8 @@
 #' The row of a seed is what `search_random(seed = )` gives with that seed and the same
 #' arguments: call it to see that search again, or to have its policy. (Only an
 #' environment that was made before and remembers something beyond a reset, such as one wrapped
-#' in `NormalizeReward`, may differ.) As each search is seeded, the session's generator is left as it was.
+#' in `NormalizeReward`, may differ.) As each search is seeded, the session's generator is left as
+#' it was.
 #'
 #' # The chance of a round
 #'
