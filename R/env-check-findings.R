@@ -16,6 +16,7 @@ look_at_environment <- function(check, seed) {
   }
   second <- play_and_look(check, seed + 1)
   look_at_end(check, list(first, second))
+  look_at_draws(check, first$states, second$states)
   remembers <- intersect(check$env$spec$wrappers, remembering_wrappers)
   if (length(remembers)) {
     note_finding(check, "seeds", paste0(
@@ -26,6 +27,21 @@ look_at_environment <- function(check, seed) {
     look_at_reset_without_seed(check, seed)
   }
   look_at_render(check, seed)
+}
+
+# The generators of two episodes with different seeds can only come to the same state when somebody
+# sets it.
+look_at_draws <- function(check, states, others) {
+  set <- Filter(
+    function(topic) !is.null(states[[topic]]) && identical(states[[topic]], others[[topic]]),
+    c("reset", "step")
+  )
+  if (length(set)) {
+    note_finding(check, "seeds", paste0(
+      "`", set[[1L]], "()` sets the state of the random generator, as `set.seed()` does, so that ",
+      "every episode draws the same numbers whatever its seed: leave that out."
+    ))
+  }
 }
 
 # The same kind of finding is noted once, where it is first found.

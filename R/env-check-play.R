@@ -57,13 +57,20 @@ play_and_look <- function(check, seed, actions = NULL) {
   look_at_observation(check, "reset", observation, "The first observation")
   # The environment draws from the first stream of the seed.
   drawn <- new_generator(stream = parallel::nextRNGStream(seed_stream(seed)))
-  episode <- list(observation = observation, actions = list(), results = list(), ended = FALSE)
+  episode <- list(
+    observation = observation, actions = list(), results = list(), ended = FALSE,
+    # Only an environment written in R has a generator that can be looked at.
+    states = if (check$in_r) list(reset = env$random_state())
+  )
   for (taken in seq_len(if (is.null(actions)) check$limit else length(actions))) {
     action <- actions[[taken]] %||% with_generator(drawn, space_sample(env$action_space))
     place <- paste0("step ", taken, " of the episode with seed ", seed)
     out <- call_and_look(check, "step", paste("`step()` in", place), env$step(action))
     if (has_raised(out)) {
       break
+    }
+    if (check$in_r && taken == 1L) {
+      episode$states$step <- env$random_state()
     }
     look_at_step(check, out, place)
     episode$actions[[taken]] <- action
@@ -170,6 +177,7 @@ without_checks <- function(env) {
       }
       out
     },
-    render = if (!is.null(sub_env$render)) function() draw_sub_env(sub_env, NULL)
+    render = if (!is.null(sub_env$render)) function() draw_sub_env(sub_env, NULL),
+    random_state = function() sub_env$generator$state
   )
 }

@@ -55,8 +55,11 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   } else {
     check_environment(env)
   }
-  check <- rlang::env(env = env, found = list(), lengths = integer(), limit = max_steps)
-  if (inherits(env, "gym_r_env")) {
+  check <- rlang::env(
+    env = env, found = list(), lengths = integer(), limit = max_steps,
+    in_r = inherits(env, "gym_r_env")
+  )
+  if (check$in_r) {
     check$env <- without_checks(env)
     # It must be reset before it is played again.
     sub_env <- sub_env_of(env)

@@ -108,6 +108,9 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
   check_flag(vectorized)
   parameters <- list(...)
   check_dots_named(parameters, "size = 5")
+  # A space that was left out is refused as one that is NULL is.
+  if (missing(observation_space)) observation_space <- NULL
+  if (missing(action_space)) action_space <- NULL
   task <- new_task(
     observation_space, action_space, id, max_episode_steps, reward_threshold, render_fps
   )

@@ -137,6 +137,7 @@ make_entry <- function(id, arguments, call) {
     return(change_function_env(entry_point, changes, given, id, call))
   }
   make <- if (is.function(entry_point)) entry_point else entry_point$new
+  check_taken(names(given), entry_point, id, call)
   env <- with_generator(new_generator(0L), do.call(make, given))
   if (!is_playable(env)) {
     gym_abort(
@@ -172,18 +173,34 @@ change_function_env <- function(env, changes, parameters, id, call) {
   function_env$new(definition)
 }
 
+# The arguments that the function takes, or the `initialize()` of the class.
+check_taken <- function(given, entry_point, id, call) {
+  taken <- entry_point
+  while (!is.function(taken)) {
+    taken <- entry_point$public_methods$initialize %||% {
+      entry_point <- entry_point$get_inherit()
+    }
+  }
+  known <- names(formals(args(taken)))
+  strange <- if (!"..." %in% known) setdiff(given, known)
+  refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
+}
+
 # A value that the functions do not know would change nothing.
 check_parameters <- function(given, definition, id, call = rlang::caller_env()) {
   known <- c(names(definition$parameters), if (definition$vectorized) "num_envs")
   strange <- setdiff(names(given), known)
+  from <- "the further values that `gym_env()` was given, such as `size = 5`"
+  refuse_argument(strange, known, id, from, call)
+}
+
+refuse_argument <- function(strange, known, id, from, call) {
   if (length(strange)) {
     near <- if (length(known)) nearest_name(strange[[1L]], known)
     gym_abort(
       c(paste0(id, " has no argument `", strange[[1L]], "`."),
         i = if (length(near)) paste0("Did you mean `", near, "`?"),
-        i = if (!length(near)) {
-          "Its arguments are the further values that `gym_env()` was given, such as `size = 5`."
-        }),
+        i = if (!length(near)) paste0("Its arguments are ", from, ".")),
       class = "gym_error_argument", argument = strange[[1L]], call = call
     )
   }

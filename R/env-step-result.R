@@ -18,7 +18,7 @@ take_step <- function(env, n, ...) {
 
 check_observation <- function(task, observation, where, call) {
   space <- task$observation_space
-  if (is.atomic(observation) && is.null(dim(observation))) {
+  if (length(observation) && is.atomic(observation) && is.null(dim(observation))) {
     # As the batch that it makes alone, which is checked more quickly.
     alone <- observation
     dim(alone) <- if (length(space$shape) == 1L) c(1L, length(alone))

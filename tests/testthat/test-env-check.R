@@ -309,3 +309,25 @@ test_that("the mistakes of vectorised functions are found", {
   expect_identical(nrow(check_env(moves(function(n) rep(1, n)))), 0L)
   expect_finding(moves(function(n) 1), "step", "`reward` must be one finite number for each")
 })
+
+test_that("an environment that sets a seed of its own is found", {
+  drawing <- function(reset = function(self) runif(1), first = function() NULL) {
+    gym_env(
+      reset,
+      function(self, action) {
+        first()
+        list(observation = runif(1), reward = 1, terminated = runif(1) < 0.2)
+      },
+      space_box(0, 1, shape = 1), space_discrete(2), max_episode_steps = 50
+    )
+  }
+  expect_identical(nrow(check_env(drawing())), 0L)
+  seeded_step <- check_env(drawing(first = function() set.seed(1)))
+  expect_match(seeded_step$finding, "^`step\\(\\)` sets the state of the random generator",
+               all = FALSE)
+  seeded_reset <- check_env(drawing(reset = function(self) {
+    set.seed(1)
+    runif(1)
+  }))
+  expect_match(seeded_reset$finding, "^`reset\\(\\)` sets the state", all = FALSE)
+})

@@ -354,3 +354,17 @@ test_that("an error that a function catches itself is no error", {
 test_that("an environment cannot be cloned", {
   expect_error(local_walk()$clone(), "Walk cannot be cloned", class = "gym_error_argument")
 })
+
+test_that("a reset that returns nothing and a space that was left out are refused", {
+  step <- function(self, action) list(observation = 0, reward = 1, terminated = TRUE)
+  box <- space_box(0, 1, shape = 1)
+  empty <- gym_env(function(self) NULL, step, box, space_discrete(2), id = "Empty")
+  expect_error(empty$reset(), "`reset\\(\\)` of Empty .*not in its space",
+               class = "gym_error_space")
+  expect_error(rollout(empty, policy_random()), "`reset\\(\\)` of Empty",
+               class = "gym_error_space")
+  expect_error(gym_env(function(self) 0, step, box), "`action_space` must be a space, not NULL",
+               class = "gym_error_argument")
+  expect_error(gym_env(function(self) 0, step, action_space = box), "`observation_space` must be",
+               class = "gym_error_argument")
+})

@@ -199,3 +199,27 @@ test_that("what cannot be registered or made is refused with the fix", {
   local_registered("Counter-v0", counter_class)
   refused(rollout(counter_class$new(), policy_random(), num_envs = 4), "`gym_register()` its class")
 })
+
+test_that("an argument that the entry point does not take is refused by name", {
+  walk <- R6::R6Class("Walk",
+    inherit = GymEnv,
+    public = list(
+      initialize = function(size = 3) {
+        super$initialize(space_discrete(size), space_discrete(2), id = "Walk")
+      },
+      reset = function() 0L,
+      step = function(action) list(observation = 0L, reward = 1, terminated = TRUE)
+    )
+  )
+  shorter <- R6::R6Class("Shorter", inherit = walk)
+  points <- list(walk, shorter, function(size = 3) walk$new(size))
+  for (entry_point in points) {
+    gym_register("Refusing-v0", entry_point)
+    expect_identical(gym_make("Refusing-v0", size = 5)$observation_space$n, 5L)
+    expect_error(gym_make("Refusing-v0", sise = 5), "no argument `sise`.*`size`",
+                 class = "gym_error_argument")
+    expect_error(rollout("Refusing-v0", policy_random(), depth = 5), "no argument `depth`",
+                 class = "gym_error_argument")
+  }
+  gym_unregister("Refusing-v0")
+})
