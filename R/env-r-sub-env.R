@@ -83,7 +83,7 @@ raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::calle
 check_was_reset <- function(sub_env, call) {
   if (is.na(sub_env$taken)) {
     gym_abort(
-      c(paste0(sub_env$task$spec$id, " takes no step before it was reset."),
+      c(paste0(sub_env$task$spec$id, " has not been reset, so that it has no episode yet."),
         i = "`env$reset()` starts an episode."),
       class = "gym_error_argument", argument = "env", call = call
     )

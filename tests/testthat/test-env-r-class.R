@@ -20,7 +20,7 @@ test_that("a class that inherits from GymEnv is played and checked as an environ
   env <- walk_class$new(max_episode_steps = 8)
   expect_identical(class(env), c("Walk", "gym_r_env", "gym_env", "R6"))
   expect_identical(env$spec$id, "Walk")
-  expect_error(env$step(1), "Walk takes no step before it was reset", class = "gym_error_argument")
+  expect_error(env$step(1), "Walk has not been reset", class = "gym_error_argument")
   first <- env$reset(seed = 3)
   expect_type(first, "integer")
   expect_identical(walk_class$new()$reset(seed = 3), first)

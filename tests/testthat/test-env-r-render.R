@@ -108,7 +108,7 @@ test_that("what cannot be drawn is refused with the fix", {
   expect_error(as_vector_env(local_drawn(plots), num_envs = 2, frames = TRUE),
                "`num_envs` must be 1", class = "gym_error_argument")
   env <- local_drawn(function(self) NULL)
-  expect_error(env$render(), "before it was reset", class = "gym_error_argument")
+  expect_error(env$render(), "has not been reset", class = "gym_error_argument")
   env$reset()
   expect_error(env$render(), "drew nothing and returned NULL", class = "gym_error_argument")
   env <- local_drawn(function(self) stop("no ink"))

@@ -230,7 +230,7 @@ test_that("num_envs, arguments and seeds that an environment cannot have are ref
   env <- r_cartpole()
   expect_error(as_vector_env(env, num_envs = 0), "whole number", class = "gym_error_argument")
   expect_error(as_vector_env(env, size = 3), "was made before", class = "gym_error_argument")
-  expect_error(as_vector_env(env, num_envs = 2)$step(c(0, 1), 1:2), "before it was reset",
+  expect_error(as_vector_env(env, num_envs = 2)$step(c(0, 1), 1:2), "has not been reset",
                class = "gym_error_argument")
   expect_error(env$reset(seed = -1), "whole number of at least 0", class = "gym_error_argument")
 })

@@ -56,7 +56,7 @@ test_that("an environment of functions is played as one of gym_make()", {
 
 test_that("a closed environment, and one that was not reset, say what to do", {
   env <- local_walk()
-  expect_error(env$step(1), "takes no step before it was reset", class = "gym_error_argument")
+  expect_error(env$step(1), "has not been reset", class = "gym_error_argument")
   env$reset()
   expect_true(env$is_open)
   expect_identical(env$close(), env)
