@@ -48,12 +48,14 @@ cut_batches <- function(batch_size, candidates, episodes) {
 #' @param streams As [new_streams()] makes them.
 #' @param common_seeds Whether all candidates begin their episodes with the same seeds, where each
 #'   episode has a seed of its own.
-#' @return An environment: these, and `batches`, what [play_batch()] returned for each batch so far.
+#' @return An environment: these, how many batches and episodes were played, and `batches`, what
+#'   [play_batch()] returned for each.
 #' @noRd
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
     candidates = candidates, episodes = as.integer(episodes), streams = streams,
-    common_seeds = common_seeds, seeds = NULL, played_batches = 0, batches = list()
+    common_seeds = common_seeds, seeds = NULL, played_batches = 0, played_episodes = 0,
+    batches = list()
   )
 }
 
@@ -88,6 +90,7 @@ play_batches <- function(vector_env, history, policy_of, after = function(histor
     suspendInterrupts({
       history$batches[[length(history$batches) + 1L]] <- played
       history$played_batches <- history$played_batches + 1
+      history$played_episodes <- history$played_episodes + length(played$episode)
       ended <- after(history, played)
     })
     if (ended) {

@@ -203,27 +203,23 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
     until_interrupted(
       play_batches(
         vector_env, history, function(candidates) policy_subset(policy, candidates),
-        report = function(ended) show(count_played(history) + ended),
+        report = function(ended) show(history$played_episodes + ended),
         max_steps = max_steps %||% Inf, keep_steps = !isFALSE(steps), keep_next = next_observation
       ),
       "Interrupted after {finished} of {total} episode{?s}; what was finished is returned.",
-      function() count_played(history), total
+      function() history$played_episodes, total
     ),
     error = function(cnd) {
-      if (!count_played(history)) {
+      if (!history$played_episodes) {
         rlang::cnd_signal(cnd)
       }
-      played <- count_of(count_played(history), "episode")
+      played <- count_of(history$played_episodes, "episode")
       abort_with_result(
         cnd, "The rollout", result(), played, "gym_error_rollout", vector_env$call
       )
     }
   )
   result(interrupted)
-}
-
-count_played <- function(history) {
-  sum(vapply(history$batches, function(batch) length(batch$episode), 0L))
 }
 
 new_rollout <- function(history, policy, vector_env, seed, steps, next_observation, interrupted) {
