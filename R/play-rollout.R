@@ -254,7 +254,7 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
 
 #' @rdname rollout
 #' @param object What `rollout()` returned.
-#' @param newdata,type,... As for [predict()][predict.gym_policy()] of a policy.
+#' @param newdata,type As for [predict()][predict.gym_policy()] of a policy.
 #' @export
 predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")

@@ -58,13 +58,20 @@ def test_what_it_forked_ends_with_it(server, eventually):
     before = set(descendants(server.process.pid))
     url, pid = rogue(server, does="forks_and_exits")
     server.post(f"{url}/step/", {"action": 0})
-    eventually(lambda: not any(os.getpgid(one) == pid for one in _all_processes()))
+    eventually(lambda: not any(is_in_group(one, pid) for one in _all_processes()))
     assert set(descendants(server.process.pid)) <= before
 
 
 def _all_processes():
     pids = [int(name) for name in os.listdir("/proc") if name.isdecimal()]
     return [pid for pid in pids if os.path.exists(f"/proc/{pid}") and is_running_safely(pid)]
+
+
+def is_in_group(pid, group):
+    try:
+        return os.getpgid(pid) == group
+    except ProcessLookupError:  # It ended since it was listed.
+        return False
 
 
 def is_running_safely(pid):
