@@ -122,9 +122,6 @@ close_or_warn <- function(env) {
 entry_point_sub_envs <- 256L
 sync_sub_envs <- 16L
 
-# Wrappers whose results depend on earlier episodes.
-remembering_wrappers <- c("NormalizeObservation", "NormalizeReward")
-
 make_vector_env <- function(env_id, num_envs, arguments, max_envs, frames, client, call) {
   make <- function(num_envs, vectorization_mode = NULL, autoreset_mode = NULL) {
     rlang::exec(
@@ -133,7 +130,7 @@ make_vector_env <- function(env_id, num_envs, arguments, max_envs, frames, clien
       call = call
     )
   }
-  if (frames || length(remembered_by(noted_wrappers(env_id)))) {
+  if (frames || length(remembering(wrapper_names(noted_wrappers(env_id))))) {
     return(make(NULL))
   }
   own <- if (has_vector_implementation(make)) {
@@ -174,10 +171,6 @@ if_supported <- function(code) {
   )
 }
 
-remembered_by <- function(wrappers) {
-  intersect(vapply(wrappers, function(wrapper) wrapper[[1L]], ""), remembering_wrappers)
-}
-
 # Seeing one as a vector environment ---------------------------------------------------
 
 #' Describe an environment that was made as a vector environment
@@ -201,7 +194,7 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
     if (vector_env$one_seed || is.null(env$num_envs)) vector_env$num_envs
     else batch_size %||% vector_env$num_envs
   )
-  vector_env$remembers <- as.character(intersect(env$spec$wrappers, remembering_wrappers))
+  vector_env$remembers <- remembering(env$spec$wrappers)
   vector_env$close <- function(wait = TRUE) NULL
   if (frames) {
     check_draws(env, call)
@@ -293,17 +286,21 @@ joint_sub_envs <- function(env) {
     observation_space = observed, action_space = actions, num_envs = n, one_seed = one_seed,
     reset = reset,
     step = function(action, which) {
-      if (length(which) < n) {
-        # Those that have ended repeat the action of the first that is playing.
-        row <- rep(1L, n)
-        row[which] <- seq_along(which)
-        action <- batch_rows(actions, action, row)
-      }
-      out <- take_step(env, n, action)
+      out <- take_step(env, n, actions_of_all(actions, action, which, n))
       out$next_observation <- out$next_observation %||% out$observation
       rows(out, which)
     }
   )
+}
+
+# The actions of all sub-environments: those that have ended repeat that of the first that plays.
+actions_of_all <- function(space, action, which, n) {
+  if (length(which) == n) {
+    return(action)
+  }
+  row <- rep(1L, n)
+  row[which] <- seq_along(which)
+  batch_rows(space, action, row)
 }
 
 check_ended_can_step <- function(env, call) {

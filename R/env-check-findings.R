@@ -17,7 +17,7 @@ look_at_environment <- function(check, seed) {
   second <- play_and_look(check, seed + 1)
   look_at_end(check, list(first, second))
   look_at_draws(check, first$states, second$states)
-  remembers <- intersect(check$env$spec$wrappers, remembering_wrappers)
+  remembers <- remembering(check$env$spec$wrappers)
   if (length(remembers)) {
     note_finding(check, "seeds", paste0(
       remembers[[1L]], " remembers earlier episodes: the same seed gives other numbers later."

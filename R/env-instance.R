@@ -93,7 +93,7 @@ ask_instance <- function(client, instance_id, call) {
     space_of(answer$observation_space), "Its `observation_space`"
   )
   instance$single_observation_space$names <- observation_names(
-    answer$env_id, instance$single_observation_space, wrapper_names(answer$wrappers)
+    answer$env_id, instance$single_observation_space, answered_wrapper_names(answer$wrappers)
   )
   instance$name_observation <- naming(
     instance$single_observation_space, batch = !is.null(answer$num_envs)
@@ -118,7 +118,7 @@ ask_instance <- function(client, instance_id, call) {
 }
 
 # The names of the wrappers in an answer, which classic servers do not send.
-wrapper_names <- function(wrappers) {
+answered_wrapper_names <- function(wrappers) {
   as.character(unlist(lapply(wrappers, function(wrapper) wrapper["name"])))
 }
 

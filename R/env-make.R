@@ -175,7 +175,7 @@ server_env <- R6Class(
         self[[name]] <- private$instance[[name]]
       }
       self$spec <- private$instance$spec
-      self$spec$wrappers <- vapply(wrappers, function(wrapper) wrapper[[1L]], "")
+      self$spec$wrappers <- wrapper_names(wrappers)
     },
     reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()
@@ -206,16 +206,8 @@ server_env <- R6Class(
       invisible(self)
     },
     print = function(...) {
-      sub_envs <- if (!is.null(self$num_envs)) {
-        paste0(", ", count_of(self$num_envs, "sub-environment"), " (",
-               self$vectorization_mode, ", ",
-               self$autoreset_mode, ")")
-      }
-      closed <- if (private$closed) ", closed"
-      cat("<gym_env: ", self$spec$id, sub_envs, closed, ">\n", sep = "")
-      cat("  observations: ", format(private$instance$observations), "\n", sep = "")
-      cat("  actions:      ", format(private$instance$actions), "\n", sep = "")
-      invisible(self)
+      how <- paste0(self$vectorization_mode, ", ", self$autoreset_mode)
+      print_env(self, how, private$instance$observations, private$instance$actions)
     }
   ),
   active = list(
@@ -239,6 +231,17 @@ server_env <- R6Class(
     }
   )
 )
+
+# `how` says how its sub-environments are run.
+print_env <- function(env, how, observations, actions) {
+  sub_envs <- if (!is.null(env$num_envs)) {
+    paste0(", ", count_of(env$num_envs, "sub-environment"), " (", how, ")")
+  }
+  cat("<gym_env: ", env$spec$id, sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
+  cat("  observations: ", format(observations), "\n", sep = "")
+  cat("  actions:      ", format(actions), "\n", sep = "")
+  invisible(env)
+}
 
 # A name that an environment does not have is an error. (R's own `$` gives NULL, and calling that
 # fails with "attempt to apply non-function".) `[[` gives NULL. Every step calls this method, so it

@@ -99,13 +99,7 @@ GymEnv <- R6Class(
       invisible(self)
     },
     print = function(...) {
-      sub_envs <- if (!is.null(self$num_envs)) {
-        paste0(", ", count_of(self$num_envs, "sub-environment"), " (vectorised)")
-      }
-      cat("<gym_env: ", self$spec$id, sub_envs, if (!self$is_open) ", closed", ">\n", sep = "")
-      cat("  observations: ", format(self$observation_space), "\n", sep = "")
-      cat("  actions:      ", format(self$action_space), "\n", sep = "")
-      invisible(self)
+      print_env(self, "vectorised", self$observation_space, self$action_space)
     }
   ),
   active = list(

@@ -26,7 +26,7 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   } else if (definition$vectorized) {
     vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames)
   } else {
-    if (length(remembered_over_episodes(sub_env$task))) {
+    if (length(remembering(sub_env$task$spec$wrappers))) {
       num_envs <- 1L
     }
     batch_size <- as.integer(num_envs %||% r_sub_envs)
@@ -54,7 +54,7 @@ new_r_vector_env <- function(task, ..., frames, sub_env) {
       observation_space = task$observation_space, action_space = task$action_space,
       spec = task$spec, ...,
       frame = if (frames) function() sub_env_png(sub_env),
-      remembers = remembered_over_episodes(task), client = NULL,
+      remembers = remembering(task$spec$wrappers), client = NULL,
       close = function(wait = TRUE) invisible()
     ),
     class = "gym_vector_env"
@@ -227,12 +227,7 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
       which <- which %||% seq_len(num_envs)
       check_actions(task, action, which, call)
       action <- tidy_actions(task$action_space, action)
-      if (length(which) < num_envs) {
-        # Those that have ended repeat the action of the first that is playing.
-        row <- rep(1L, num_envs)
-        row[which] <- seq_along(which)
-        action <- batch_rows(task$action_space, action, row)
-      }
+      action <- actions_of_all(task$action_space, action, which, num_envs)
       out <- raw_step(sub_env, action, call = call)
       result <- take_rows(out, sub_env, which, call)
       result$next_observation <- result$observation

@@ -28,12 +28,6 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
   }
 }
 
-# The names of the wrappers that remember something over episodes. Then one sub-environment plays
-# all of them, or one vectorised environment.
-remembered_over_episodes <- function(task) {
-  as.character(intersect(task$spec$wrappers, remembering_wrappers))
-}
-
 check_wrappable <- function(env, call) {
   if (!inherits(env, "gym_r_env")) {
     must <- paste("the id of an environment, or one made by `gym_env()` or of a class that",

@@ -255,7 +255,7 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
     return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
   }
   check_count(num_envs, allow_null = TRUE, call = call)
-  if (frames || length(remembered_over_episodes(sub_env_of(env)$task))) {
+  if (frames || length(remembering(env$spec$wrappers))) {
     num_envs <- 1L
   }
   batch_size <- as.integer(num_envs %||% r_sub_envs)

@@ -82,6 +82,13 @@ with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
 # The wrappers that gym_wrap() has noted for an id.
 noted_wrappers <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$wrappers
 
+wrapper_names <- function(wrappers) vapply(wrappers, function(wrapper) wrapper[[1L]], "")
+
+# Those of some wrappers whose results depend on earlier episodes.
+remembering <- function(names) {
+  as.character(intersect(names, c("NormalizeObservation", "NormalizeReward")))
+}
+
 #' @export
 format.gym_wrapped <- function(x, ...) {
   paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")

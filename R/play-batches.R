@@ -80,8 +80,7 @@ play_batches <- function(vector_env, history, policy_of, after = function(histor
     # The policy of a batch has its candidates alone.
     candidates <- unique(episodes$candidate)
     policy <- policy_of(candidates)
-    numbers <- episodes$candidate
-    episodes$candidate <- match(numbers, candidates)
+    episodes$candidate <- match(episodes$candidate, candidates)
     played <- play_batch(
       vector_env, policy, episodes, stream, each = history$episodes, report = report, ...
     )
