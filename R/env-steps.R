@@ -36,8 +36,10 @@ reset_line <- function(client, instance, named, infos) {
     )
   }
   read_quickly <- if (!is.null(instance$num_envs)) read_answer else function(answer) {
-    list(observation = read_quick_observation(instance, answer, named),
-         info = info_from(instance, answer))
+    if (is_object(answer$info)) {
+      list(observation = read_quick_observation(instance, answer, named),
+           info = info_from_json(answer$info))
+    }
   }
   finish <- function(tensors) {
     observation <- tensors_observation(instance, instance$observations, tensors, named)
@@ -158,7 +160,7 @@ read_quick_step <- function(instance, answer, named) {
   terminated <- answer$terminated
   truncated <- answer$truncated
   if (is.numeric(reward) && length(reward) == 1L && is_flag(terminated) && is_flag(truncated) &&
-        identical(answer$done, terminated || truncated)) {
+        identical(answer$done, terminated || truncated) && is_object(answer$info)) {
     step_result(
       read_quick_observation(instance, answer, named), as.numeric(reward), terminated, truncated,
       info_from_json(answer$info)

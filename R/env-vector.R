@@ -37,7 +37,12 @@ vector_step_line <- function(client, instance, fields, n, which, named) {
       vector_step_result(observation, tensors, empty_object)
     }
   )
-  line$write <- if (instance$sends_tensors) tensors_writer(single, n) else function(action) NULL
+  if (instance$sends_tensors) {
+    line$write <- tensors_writer(single, n)
+    line$integers_table <- integers_table(n)
+  } else {
+    line$write <- function(action) NULL
+  }
   line$check <- function(action, call) {
     check_batch(single, actions, action, n, call, which)
     if (instance$sends_tensors) {
@@ -144,12 +149,11 @@ mask_json <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(NULL)
   }
-  if (!identical(mask, instance$mask)) {
+  if (!identical(mask, instance$last_mask$mask)) {
     check_mask(mask, instance, call)
-    instance$mask_json <- to_json(I(mask))
-    instance$mask <- mask
+    instance$last_mask <- list(mask = mask, json = to_json(I(mask)))
   }
-  instance$mask_json
+  instance$last_mask$json
 }
 
 check_mask <- function(mask, instance, call) {

@@ -20,8 +20,10 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
 parsed_body <- function(response, layouts = NULL, key = NULL) {
   if (response$status_code == 204L) {
     NULL
-  } else if (response$type %in% c(tensors_type, column_tensors_type)) {
-    tensors_answer(response$content, layouts, key, response$type == column_tensors_type)
+  } else if (identical(response$type, column_tensors_type)) {
+    tensors_answer(response$content, layouts, key, by_column = TRUE)
+  } else if (identical(response$type, tensors_type)) {
+    tensors_answer(response$content, layouts, key)
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
   } else {
@@ -58,14 +60,11 @@ echo_in_header <- function(response) {
 }
 
 # An answer with tensors has the fields of the JSON answer that it replaces, and beside them the
-# tensors and the texts by their names; `bare` is the layout of one that says nothing more than its
-# tensors.
+# tensors and the texts by their names.
 tensors_answer <- function(bytes, layouts, key = NULL, by_column = FALSE) {
   file <- read_tensors(bytes, layouts, if (!is.null(key)) bare_metadata(key), by_column)
   if (is.null(file$metadata)) {
-    return(list(
-      tensors = file$tensors, info = empty_object, request = key, bare = file$layout
-    ))
+    return(list(tensors = file$tensors, info = empty_object, request = key))
   }
   field <- function(name) {
     text <- file$metadata[[name]]

@@ -52,8 +52,8 @@ tensors_line_reader <- function(layouts, read_answer, finish, labels) {
       return(NULL)
     }
     result <- read_answer(answer)
-    if (!is.null(answer$bare)) {
-      form <<- new_form(answer$bare, response, key, by_column, labels)
+    if (!"texts" %in% names(answer)) {
+      form <<- new_form(response, layouts, key, by_column, labels)
     }
     result
   }
@@ -61,17 +61,18 @@ tensors_line_reader <- function(layouts, read_answer, finish, labels) {
 
 #' Keep what the answers to one kind of call have in common
 #'
-#' @param layout From a response that says nothing more than its tensors.
+#' @param response One that says nothing more than its tensors.
 #' @return A list of the response's `type`, the `key` and the first bytes, up to the number of the
 #'   idempotency key; how long the rest of the header is; and the tensors, in their order. `NULL`
 #'   where they do not follow each other.
 #' @noRd
-new_form <- function(layout, response, key, by_column, labels) {
+new_form <- function(response, layouts, key, by_column, labels) {
+  data <- 8L + header_size(response$content)
+  layout <- known_layout(response$content[9L:data], layouts)
   mark <- '"number\\":'
   before <- bare_metadata(list(key = key, number = 0))
   before <- regexpr(mark, before, fixed = TRUE) + nchar(mark) - 1L
   same <- 8L + length(layout$start) + before
-  data <- 8L + header_size(response$content)
   begins <- vapply(layout$entries, function(entry) as.double(entry$begin), 0)
   entries <- layout$entries[order(begins)]
   sizes <- vapply(entries, function(entry) as.double(entry$size), 0)

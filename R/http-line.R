@@ -120,17 +120,19 @@ json_members <- function(fields) {
 join_as_integers <- 1024L
 
 line_tensors <- function(line, content, key, number) {
-  plain <- is.integer(content)
   if (line$has_texts) {
     return(tensors_with_texts(line, content, key, number))
   }
-  table <- if (plain) integers_table(length(content)) else tensors_table(content)
-  digits <- sprintf("%.0f", number)
-  if (!identical(line$table, table) || !identical(line$key, key) ||
-        line$digits != nchar(digits)) {
-    prepare_header(line, table, key, nchar(digits))
+  plain <- is.integer(content)
+  table <- if (plain) line$integers_table else tensors_table(content)
+  digits <- charToRaw(sprintf("%.0f", number))
+  parts <- line$header
+  if (is.null(parts) || length(digits) != parts$digits || !identical(parts$table, table) ||
+        !identical(parts$key, key)) {
+    parts <- header_parts(line$fields, table, key, length(digits))
+    line$header <- parts
   }
-  header <- c(line$before, charToRaw(digits), line$after)
+  header <- c(parts$before, digits, parts$after)
   if (!plain) {
     do.call(c, c(list(header), lapply(unname(content), `[[`, "bytes")))
   } else if (length(content) < join_as_integers) {
@@ -152,25 +154,19 @@ tensors_with_texts <- function(line, content, key, number) {
 }
 
 # The header of a body, but for the number of the idempotency key.
-prepare_header <- function(line, table, key, digits) {
-  line$table <- table
-  line$key <- key
-  line$digits <- digits
+header_parts <- function(fields, table, key, digits) {
   number <- strrep("0", digits)
   request <- paste0('{"key":"', key, '","number":', number, "}")
-  header <- tensors_header(c(line$fields, request = request), table)
-  text <- rawToChar(header[-(1:8)])
+  header <- tensors_header(c(fields, request = request), table)
+  # The quotes of the request are escaped in the header.
   mark <- paste0('number\\":', number)
-  at <- regexpr(mark, text, fixed = TRUE) + 8L + nchar(mark) - digits - 1L
-  line$before <- header[seq_len(at)]
-  line$after <- header[-seq_len(at + digits)]
+  at <- regexpr(mark, rawToChar(header[-(1:8)]), fixed = TRUE) + 8L + nchar(mark) - digits - 1L
+  list(
+    table = table, key = key, digits = digits,
+    before = header[seq_len(at)], after = header[-seq_len(at + digits)]
+  )
 }
 
 integers_table <- function(n) {
-  if (!identical(written$integers, n)) {
-    tensor <- list(dtype = "I32", shape = n, bytes = raw(4 * n))
-    written$integers_table <- write_table(list(action = tensor))
-    written$integers <- n
-  }
-  written$integers_table
+  write_table(list(action = list(dtype = "I32", shape = n, bytes = raw(4 * n))))
 }

@@ -18,13 +18,13 @@ known_layout <- function(header, layouts) {
   text <- rawToChar(header)
   at <- regexpr(metadata_key, text, fixed = TRUE, useBytes = TRUE)
   start <- if (at > 0L) rawToChar(header[seq_len(at - 1L)]) else text
-  known <- match(start, layouts$starts)
+  known <- match(start, names(layouts$seen))
   if (!is.na(known)) {
     return(layouts$seen[[known]])
   }
   layout <- read_layout(header)
-  layouts$starts <- utils::head(c(start, layouts$starts), max_layouts)
-  layouts$seen <- utils::head(c(list(layout), layouts$seen), max_layouts)
+  seen <- c(stats::setNames(list(layout), start), layouts$seen)
+  layouts$seen <- utils::head(seen, max_layouts)
   layout
 }
 

@@ -14,8 +14,8 @@
 #'   tensors: metadata that are equal to it are not parsed. `NULL` for none.
 #' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
 #'   are in R's order.
-#' @return A list of `tensors`, a named list of vectors and arrays, `metadata`, a named list of
-#'   strings, `NULL` for the `expected` ones, and `layout`, that of the header.
+#' @return A list of `tensors`, a named list of vectors and arrays, and
+#'   `metadata`, a named list of strings, `NULL` for the `expected` ones.
 #' @noRd
 read_tensors <- function(bytes, layouts = NULL, expected = NULL, by_column = FALSE) {
   size <- header_size(bytes)
@@ -31,12 +31,9 @@ read_tensors <- function(bytes, layouts = NULL, expected = NULL, by_column = FAL
   place <- if (by_column) place_by_column else place_by_row
   tensors <- read_entries(layout$entries, bytes, data, place)
   if (layout$metadata_last && ends_as(header, length(layout$start), expected)) {
-    return(list(tensors = tensors, layout = layout))
+    return(list(tensors = tensors))
   }
-  list(
-    tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata,
-    layout = layout
-  )
+  list(tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata)
 }
 
 # Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
@@ -229,11 +226,10 @@ written <- new.env(parent = emptyenv())
 
 tensors_table <- function(tensors) {
   forms <- lapply(tensors, function(tensor) tensor[c("dtype", "shape")])
-  if (!identical(forms, written$forms)) {
-    written$table <- write_table(tensors)
-    written$forms <- forms
+  if (!identical(forms, written$last$forms)) {
+    written$last <- list(forms = forms, table = write_table(tensors))
   }
-  written$table
+  written$last$table
 }
 
 write_table <- function(tensors) {
