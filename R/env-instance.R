@@ -144,12 +144,26 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
   }
+  if (is.list(seed)) {
+    return(encode_seed_lists(seed, num_envs, call))
+  }
   if (is.null(num_envs) || length(seed) == 1L) {
     check_count(seed, min = 0, max = 2^53, call = call)
     return(whole_text(seed))
   }
   check_sub_env_seeds(seed, num_envs, call)
   json_array(ifelse(is.na(seed), "null", whole_text(seed)))
+}
+
+# A vector of seeds for each sub-environment, `NULL` for those that are not reset.
+encode_seed_lists <- function(seeds, num_envs, call) {
+  fits <- function(one) is.null(one) || length(one) && are_whole(one, 0, 2^53)
+  if (is.null(num_envs) || length(seeds) != num_envs || !all(vapply(seeds, fits, NA))) {
+    abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seeds", call)
+  }
+  json_array(vapply(seeds, function(one) {
+    if (is.null(one)) "null" else json_array(whole_text(one))
+  }, ""))
 }
 
 encode_options <- function(options, call) {

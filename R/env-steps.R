@@ -1,5 +1,5 @@
-# Steps and resets. What an instance's calls have in common is bound once, in a line for each form of
-# the call, see new_line().
+# Steps and resets. What an instance's calls have in common is bound once, in a line for each form
+# of the call, see new_line().
 
 #' Start an episode
 #' @param named Whether observations are to carry their names: those of the classic calls do not.
@@ -82,7 +82,8 @@ step_line <- function(client, instance, render, which, named, infos) {
   } else {
     some <- length(which) && length(which) < n
     if (some) fields <- c(fields, step_mask = json_array(json_atoms(seq_len(n) %in% which)))
-    vector_step_line(client, instance, fields, if (some) length(which) else n, which, named)
+    stepping <- if (some) length(which) else n
+    vector_step_line(client, instance, fields, stepping, which, named, infos)
   }
   line$which <- which
   line
@@ -125,15 +126,8 @@ single_step_line <- function(client, instance, fields, named) {
     }
   )
   actions <- instance$actions
-  write_json <- json_writer(actions)
-  line$write <- if (instance$sends_tensors || instance$classic) {
-    function(action) NULL
-  } else {
-    function(action) {
-      json <- write_json(action)
-      if (!is.null(json)) paste0('"action":', json, ",")
-    }
-  }
+  general <- instance$sends_tensors || instance$classic
+  line$write <- if (general) function(action) NULL else json_writer(actions)
   # A classic server's error does not say that an action was wrong, so bounds are checked here.
   bounds <- instance$classic && inherits(actions, "gym_space_discrete")
   line$check <- function(action, call) {
@@ -157,15 +151,18 @@ step_result <- function(observation, reward, terminated, truncated, info) {
 # Reads an answer as it nearly always is. `NULL` for any other.
 read_quick_step <- function(instance, answer, named) {
   reward <- answer$reward
-  terminated <- answer$terminated
-  truncated <- answer$truncated
-  if (is.numeric(reward) && length(reward) == 1L && is_flag(terminated) && is_flag(truncated) &&
-        identical(answer$done, terminated || truncated) && is_object(answer$info)) {
+  info <- answer$info
+  if (is.numeric(reward) && length(reward) == 1L && are_step_flags(answer) && is_object(info)) {
     step_result(
-      read_quick_observation(instance, answer, named), as.numeric(reward), terminated, truncated,
-      info_from_json(answer$info)
+      read_quick_observation(instance, answer, named), as.numeric(reward), answer$terminated,
+      answer$truncated, if (length(info)) info_from_json(info) else info
     )
   }
+}
+
+are_step_flags <- function(answer) {
+  is_flag(answer$terminated) && is_flag(answer$truncated) &&
+    identical(answer$done, answer$terminated || answer$truncated)
 }
 
 read_single_step <- function(instance, answer, named) {
@@ -244,4 +241,47 @@ info_from <- function(instance, answer) {
   } else {
     info_by_sub_env(answer$info, instance$num_envs)
   }
+}
+
+# For rollouts -------------------------------------------------------------------------------
+
+#' Start episodes, or take a step, without infos
+#'
+#' What `$reset()` and `$step()` of an environment on a server do, for those who want no infos: the
+#' server then makes none.
+#' @param env An environment of [gym_make()].
+#' @param seeds A seed for each of `which`, or a list with a vector of seeds for each: the first for
+#'   now, the others for the episodes that the sub-environment begins by itself.
+#' @param which The numbers of the sub-environments, in increasing order; `NULL` for all.
+#' @return `reset_bare()` the first observations, a row for each of `which`; `step_bare()` what
+#'   `$step()` returns, with an empty info.
+#' @noRd
+reset_bare <- function(env, seeds, which = NULL, call = rlang::caller_env()) {
+  instance <- open_instance(env, call)
+  n <- instance$num_envs
+  some <- !is.null(n) && length(which) && length(which) < n
+  if (some) {
+    check_which(which, instance, call)
+    all <- rep(if (is.list(seeds)) list(NULL) else NA_real_, n)
+    all[which] <- seeds
+    seeds <- all
+  }
+  mask <- if (some) seq_len(n) %in% which
+  observation <- reset_instance(
+    env$client, instance, seeds, NULL, mask = mask, named = TRUE, infos = FALSE, call = call
+  )
+  if (some) batch_rows(instance$single_observation_space, observation, which) else observation
+}
+
+step_bare <- function(env, action, which = NULL, call = rlang::caller_env()) {
+  instance <- open_instance(env, call)
+  step_instance(
+    env$client, instance, action, FALSE, which, named = TRUE, infos = FALSE, call = call
+  )
+}
+
+open_instance <- function(env, call) {
+  check_open(env, call)
+  instances <- client_state(env$client)$instances
+  instances[[env$instance_id]] %||% known_instance(env$client, env$instance_id, call)
 }

@@ -24,11 +24,11 @@ travels_as_tensors <- function(space, num_envs) {
 #' Prepare the steps of sub-environments
 #' @param n How many step, `which` the numbers of these.
 #' @noRd
-vector_step_line <- function(client, instance, fields, n, which, named) {
+vector_step_line <- function(client, instance, fields, n, which, named, infos) {
   single <- instance$single_action_space
   actions <- batch_space(single, n)
   observed <- batch_space(instance$single_observation_space, n)
-  read_answer <- function(answer) read_vector_step(instance, answer, observed, n, named)
+  read_answer <- function(answer) read_vector_step(instance, answer, observed, n, named, infos)
   line <- instance_line(
     client, instance, instance$step_route, instance$sends_tensors, fields, named, read_answer,
     read_quickly = read_answer,
@@ -61,7 +61,7 @@ vector_step_result <- function(observation, parts, info, next_observation = obse
   )
 }
 
-read_vector_step <- function(instance, answer, observed, n, named) {
+read_vector_step <- function(instance, answer, observed, n, named, infos) {
   result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
@@ -72,7 +72,7 @@ read_vector_step <- function(instance, answer, observed, n, named) {
   }
   space <- instance$single_observation_space
   final <- final_observations(instance, answer, n, named)
-  info$final_obs <- final_by_sub_env(space, final, n)
+  if (infos) info$final_obs <- final_by_sub_env(space, final, n)
   next_observation <- replace_rows(space, observation, n, final$sub_envs, final$values)
   vector_step_result(observation, result, info, next_observation)
 }

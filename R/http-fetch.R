@@ -4,10 +4,7 @@
 # connection's error.
 fetch <- function(client, connection, handle, route, key, repeatable, call, received = NULL) {
   url <- paste0(client$remote_base, route)
-  started <- proc.time()[["elapsed"]]
-  if (!is.null(received)) {
-    started <- started - curl::handle_data(handle)$times[["total"]]
-  }
+  started <- proc.time()[["elapsed"]] - time_taken(handle, received)
   attempt <- 1L
   reached <- FALSE
   state <- client$state
@@ -35,6 +32,11 @@ fetch <- function(client, connection, handle, route, key, repeatable, call, rece
     on.exit(curl::handle_setopt(handle, timeout_ms = timeout_of(client) * 1000))
     attempt <- attempt + 1L
   }
+}
+
+# How many seconds a first attempt has taken.
+time_taken <- function(handle, received) {
+  if (is.null(received)) 0 else curl::handle_data(handle)$times[["total"]]
 }
 
 # Raises what ended an attempt from this side: the answer was too large, or the user interrupted.

@@ -1,4 +1,4 @@
-# Reading the answers of calls that are made in every step. From step to step only the numbers differ.
+# Reading the answers of calls that are made in every step, in which only the numbers differ.
 
 #' Make the function that reads the responses of a line that come as JSON
 #'
@@ -29,26 +29,21 @@ is_echo <- function(request, key, number) {
 #' @param labels The names of the numbers of an observation, `NULL` for none.
 #' @noRd
 tensors_line_reader <- function(layouts, read_answer, finish, labels) {
-  from_json_answer <- json_line_reader(read_answer)
+  read_json <- json_line_reader(read_answer)
   form <- NULL
   function(response, key, number) {
+    tensors <- if (!is.null(form)) tensors_of_form(form, response, key, number)
+    if (!is.null(tensors)) {
+      return(finish(tensors))
+    }
     type <- response$type
-    if (response$status_code != 200L) {
-      return(NULL)
-    }
-    if (!is.null(form) && identical(type, form$type) && identical(key, form$key)) {
-      tensors <- tensors_of_form(form, response$content, number)
-      if (!is.null(tensors)) {
-        return(finish(tensors))
-      }
-    }
-    by_column <- identical(type, column_tensors_type)
-    if (!by_column && !identical(type, tensors_type)) {
-      return(from_json_answer(response, key, number))
+    if (!is_tensors_type(type)) {
+      return(read_json(response, key, number))
     }
     sent <- list(key = key, number = number)
+    by_column <- type == column_tensors_type
     answer <- tensors_answer(response$content, layouts, sent, by_column)
-    if (!is.null(answer$request) && !is_same_key(answer$request, sent)) {
+    if (response$status_code != 200L || !is_echo(answer$request, key, number)) {
       return(NULL)
     }
     result <- read_answer(answer)
@@ -59,12 +54,16 @@ tensors_line_reader <- function(layouts, read_answer, finish, labels) {
   }
 }
 
+is_tensors_type <- function(type) {
+  identical(type, tensors_type) || identical(type, column_tensors_type)
+}
+
 #' Keep what the answers to one kind of call have in common
 #'
 #' @param response One that says nothing more than its tensors.
 #' @return A list of the response's `type`, the `key` and the first bytes, up to the number of the
 #'   idempotency key; how long the rest of the header is; and the tensors, in their order. `NULL`
-#'   where they do not follow each other.
+#'   where they do not follow each other, or one is empty.
 #' @noRd
 new_form <- function(response, layouts, key, by_column, labels) {
   data <- 8L + header_size(response$content)
@@ -76,7 +75,8 @@ new_form <- function(response, layouts, key, by_column, labels) {
   begins <- vapply(layout$entries, function(entry) as.double(entry$begin), 0)
   entries <- layout$entries[order(begins)]
   sizes <- vapply(entries, function(entry) as.double(entry$size), 0)
-  if (!identical(unname(sort(begins)), c(0, cumsum(unname(sizes)))[seq_along(sizes)])) {
+  follow <- identical(unname(sort(begins)), c(0, cumsum(unname(sizes)))[seq_along(sizes)])
+  if (!follow || any(sizes == 0)) {
     return(NULL)
   }
   list(
@@ -89,33 +89,47 @@ new_form <- function(response, layouts, key, by_column, labels) {
 # A tensor, and how its numbers are put into their places: by attributes alone where they can be.
 form_entry <- function(entry, name, by_column, labels) {
   labels <- if (name == "observation") labels
-  shape <- if (by_column) rev(entry$shape) else entry$shape
+  shape <- entry$shape
   if (length(shape) == 2L && !is.null(labels)) {
     labels <- list(NULL, labels)
   }
-  if (length(shape) > 1L && !by_column) {
-    entry$place <- function(values) {
-      values <- place_by_row(values, shape)
-      dimnames(values) <- labels
-      values
-    }
-  } else if (length(shape) > 1L) {
-    entry$attributes <- c(list(dim = shape), if (!is.null(labels)) list(dimnames = labels))
-  } else if (!is.null(labels)) {
-    entry$attributes <- list(names = labels)
+  if (length(shape) <= 1L) {
+    entry$attributes <- if (!is.null(labels)) list(names = labels)
+  } else if (by_column) {
+    entry$attributes <- c(list(dim = rev(shape)), if (!is.null(labels)) list(dimnames = labels))
+  } else {
+    entry$place <- row_placer(shape, labels)
   }
   entry
 }
 
+row_placer <- function(shape, labels) {
+  if (length(shape) > 2L) {
+    return(function(values) place_by_row(values, shape))
+  }
+  function(values) {
+    if (is.raw(values) || is.object(values)) {
+      place_by_row(values, shape)
+    } else {
+      matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE, dimnames = labels)
+    }
+  }
+}
+
 # Returns the tensors of a response, `NULL` where it is not like the one that the form was made of.
-tensors_of_form <- function(form, content, number) {
-  if (length(content) < form$total || !identical(content[form$same], form$start)) {
+tensors_of_form <- function(form, response, key, number) {
+  content <- response$content
+  alike <- response$status_code == 200L && identical(response$type, form$type) &&
+    identical(key, form$key) && length(content) >= form$total &&
+    identical(content[form$same], form$start)
+  if (!alike) {
     return(NULL)
   }
   ending <- c(charToRaw(sprintf('%.0f}"}}', number)), json_blanks)[seq_along(form$rest)]
-  if (!identical(content[form$rest], ending)) {
-    return(NULL)
-  }
+  if (identical(content[form$rest], ending)) read_form_entries(form, content)
+}
+
+read_form_entries <- function(form, content) {
   large <- length(content) > index_up_to
   if (large) {
     file <- rawConnection(content)
@@ -126,12 +140,9 @@ tensors_of_form <- function(form, content, number) {
   entries <- form$entries
   for (i in seq_along(entries)) {
     entry <- entries[[i]]
-    size <- entry$size
-    values <- if (large) {
-      entry$read(if (entry$streams) file else readBin(file, "raw", size), entry$n)
-    } else {
-      entry$read(content[(before + 1L):(before + size)], entry$n)
-    }
+    end <- before + entry$size
+    bytes <- if (large) readBin(file, "raw", entry$size) else content[(before + 1L):end]
+    values <- entry$read(bytes, entry$n)
     if (!is.null(entry$place)) {
       values <- entry$place(values)
     } else {
@@ -139,7 +150,7 @@ tensors_of_form <- function(form, content, number) {
       if (!is.null(entry$attributes)) attributes(values) <- entry$attributes
     }
     entries[[i]] <- values
-    before <- before + size
+    before <- end
   }
   entries
 }

@@ -29,7 +29,7 @@ new_line <- function(client, route, sends, takes, fields, read, read_answer) {
 #'
 #' @param line From [new_line()].
 #' @param content What is sent: the members of a JSON object, each with a comma after it; or, where
-#'   tensors are sent, a list as [to_tensors()] returns it, or integers that are the tensor "action".
+#'   tensors are sent, a list as [to_tensors()] returns it, or integers, the tensor "action".
 #' @return What the line's functions return.
 #' @noRd
 call_line <- function(client, line, content, call) {
@@ -123,24 +123,33 @@ line_tensors <- function(line, content, key, number) {
   if (line$has_texts) {
     return(tensors_with_texts(line, content, key, number))
   }
-  plain <- is.integer(content)
-  table <- if (plain) line$integers_table else tensors_table(content)
   digits <- charToRaw(sprintf("%.0f", number))
-  parts <- line$header
-  if (is.null(parts) || length(digits) != parts$digits || !identical(parts$table, table) ||
-        !identical(parts$key, key)) {
-    parts <- header_parts(line$fields, table, key, length(digits))
-    line$header <- parts
-  }
-  header <- c(parts$before, digits, parts$after)
-  if (!plain) {
+  if (is.integer(content)) {
+    with_integers(line_header(line, line$integers_table, key, digits), content)
+  } else {
+    header <- line_header(line, tensors_table(content), key, digits)
     do.call(c, c(list(header), lapply(unname(content), `[[`, "bytes")))
-  } else if (length(content) < join_as_integers) {
-    c(header, writeBin(content, raw(), endian = "little"))
+  }
+}
+
+with_integers <- function(header, integers) {
+  if (length(integers) < join_as_integers) {
+    c(header, writeBin(integers, raw(), endian = "little"))
   } else {
     words <- readBin(header, "integer", length(header) / 4L, endian = "little")
-    writeBin(c(words, content), raw(), endian = "little")
+    writeBin(c(words, integers), raw(), endian = "little")
   }
+}
+
+line_header <- function(line, table, key, digits) {
+  parts <- line$header
+  known <- length(digits) == length(parts$digits) && identical(parts$table, table) &&
+    identical(parts$key, key)
+  if (!known) {
+    parts <- header_parts(line$fields, table, key, digits)
+    line$header <- parts
+  }
+  c(parts$before, digits, parts$after)
 }
 
 # Texts stand among the metadata, so that the header is another one each time.
@@ -153,17 +162,17 @@ tensors_with_texts <- function(line, content, key, number) {
   write_tensors(content[!texts], fields)
 }
 
-# The header of a body, but for the number of the idempotency key.
+# The header of a body, split at the number of the idempotency key, which has these digits.
 header_parts <- function(fields, table, key, digits) {
-  number <- strrep("0", digits)
+  number <- rawToChar(digits)
   request <- paste0('{"key":"', key, '","number":', number, "}")
   header <- tensors_header(c(fields, request = request), table)
   # The quotes of the request are escaped in the header.
   mark <- paste0('number\\":', number)
-  at <- regexpr(mark, rawToChar(header[-(1:8)]), fixed = TRUE) + 8L + nchar(mark) - digits - 1L
+  end <- regexpr(mark, rawToChar(header[-(1:8)]), fixed = TRUE) + 8L + nchar(mark) - 1L
   list(
     table = table, key = key, digits = digits,
-    before = header[seq_len(at)], after = header[-seq_len(at + digits)]
+    before = header[seq_len(end - length(digits))], after = header[-seq_len(end)]
   )
 }
 

@@ -96,7 +96,7 @@ read_entry <- function(entry) {
   # R takes a part of a vector by integers in less time than by doubles.
   whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
   list(
-    read = type$read, streams = type$streams, n = n, shape = as.integer(shape),
+    read = type$read, n = n, shape = as.integer(shape),
     begin = whole(offsets[[1L]]), size = whole(size)
   )
 }

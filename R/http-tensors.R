@@ -50,7 +50,7 @@ read_entries <- function(entries, bytes, data, place) {
     entry <- entries[[name]]
     part <- if (large) {
       seek(file, data + entry$begin)
-      if (entry$streams) file else readBin(file, "raw", entry$size)
+      readBin(file, "raw", entry$size)
     } else if (entry$size) {
       first <- data + entry$begin + 1L
       bytes[first:(first + entry$size - 1L)]
@@ -96,15 +96,15 @@ ends_as <- function(header, after, text) {
 
 # The types -----------------------------------------------------------------------
 
-# Each takes bytes, or where the type streams a connection, and returns the numbers as they come.
+# Each takes bytes and returns the numbers as they come.
 
 read_double <- function(size) {
-  function(source, n) readBin(source, "double", n, size = size, endian = "little")
+  function(bytes, n) readBin(bytes, "double", n, size = size, endian = "little")
 }
 
 read_integer <- function(size, signed = TRUE) {
-  function(source, n) {
-    readBin(source, "integer", n, size = size, signed = signed, endian = "little")
+  function(bytes, n) {
+    readBin(bytes, "integer", n, size = size, signed = signed, endian = "little")
   }
 }
 
@@ -112,21 +112,21 @@ read_integer <- function(size, signed = TRUE) {
 read_byte <- function(bytes, n) bytes
 
 # The bits of the smallest int32 are R's NA.
-read_int32 <- function(source, n) {
-  values <- readBin(source, "integer", n, size = 4L, endian = "little")
+read_int32 <- function(bytes, n) {
+  values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
   if (anyNA(values)) signed_half(values) else values
 }
 
-read_uint32 <- function(source, n) {
-  values <- readBin(source, "integer", n, size = 4L, endian = "little")
+read_uint32 <- function(bytes, n) {
+  values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
   wide <- anyNA(values) || any(values < 0L)
   if (wide) unsigned_half(values) else values
 }
 
 read_int64 <- function(signed) function(bytes, n) whole_from_halves(bytes, n, signed)
 
-read_half <- function(source, n) {
-  bits <- readBin(source, "integer", n, size = 2L, signed = FALSE, endian = "little")
+read_half <- function(bytes, n) {
+  bits <- readBin(bytes, "integer", n, size = 2L, signed = FALSE, endian = "little")
   double_from_half(bits)
 }
 
@@ -150,12 +150,9 @@ write_byte <- function(x) as.raw(as.integer(x) %% 256L)
 
 write_int64 <- function(x) bytes_of_whole(x)
 
-tensor_type <- function(size, read, write, streams = TRUE) {
-  list(size = size, read = read, write = write, streams = streams)
-}
+tensor_type <- function(size, read, write) list(size = size, read = read, write = write)
 
-# By the name in a header: how many bytes a number has, how it is read and written, and whether it
-# can be read from a connection.
+# By the name in a header: how many bytes a number has, how it is read and written.
 tensor_types <- list(
   F64 = tensor_type(8L, read_double(8L), write_double(8L)),
   F32 = tensor_type(4L, read_double(4L), write_double(4L)),
@@ -163,12 +160,12 @@ tensor_types <- list(
   I8 = tensor_type(1L, read_integer(1L), write_byte),
   I16 = tensor_type(2L, read_integer(2L), write_integer(2L)),
   I32 = tensor_type(4L, read_int32, write_int32),
-  I64 = tensor_type(8L, read_int64(TRUE), write_int64, streams = FALSE),
-  U8 = tensor_type(1L, read_byte, write_byte, streams = FALSE),
+  I64 = tensor_type(8L, read_int64(TRUE), write_int64),
+  U8 = tensor_type(1L, read_byte, write_byte),
   U16 = tensor_type(2L, read_integer(2L, signed = FALSE), write_integer(2L)),
   U32 = tensor_type(4L, read_uint32, write_int32),
-  U64 = tensor_type(8L, read_int64(FALSE), write_int64, streams = FALSE),
-  BOOL = tensor_type(1L, read_bool, write_byte, streams = FALSE)
+  U64 = tensor_type(8L, read_int64(FALSE), write_int64),
+  BOOL = tensor_type(1L, read_bool, write_byte)
 )
 
 # Halves: 1 bit of sign, 5 of exponent, 10 of fraction.

@@ -50,7 +50,7 @@ json_reader.gym_space_dict <- json_reader.gym_space_tuple
 
 # Writers ----------------------------------------------------------------------------------
 
-#' Make the function that checks an action and writes it as JSON
+#' Make the function that checks an action and writes it as a member of a JSON object
 #' @return A function of an action; it returns `NULL` for one that [check_value()] must look at.
 #' @noRd
 json_writer <- function(space) UseMethod("json_writer")
@@ -61,9 +61,13 @@ json_writer.default <- function(space) function(value) NULL
 #' @exportS3Method
 json_writer.gym_space_discrete <- function(space) {
   function(value) {
-    plain <- length(value) == 1L && !is.object(value) && (is.numeric(value) || is.logical(value))
-    if (plain && is.finite(value) && value == trunc(value)) sprintf("%.0f", as.double(value))
+    if (is_plain_whole(value)) sprintf('"action":%.0f,', as.double(value))
   }
+}
+
+is_plain_whole <- function(x) {
+  length(x) == 1L && (is.numeric(x) || is.logical(x)) && !is.object(x) && is.finite(x) &&
+    x == trunc(x)
 }
 
 #' @exportS3Method
@@ -73,12 +77,14 @@ json_writer.gym_space_box <- function(space) {
     return(json_writer.default(space))
   }
   function(value) {
-    if (is.double(value) && length(value) == n && is.null(dim(value)) && !is.object(value) &&
+    if (length(value) == n && is_plain_double(value) && is.null(dim(value)) &&
           all(is.finite(value))) {
-      json_array(json_number(value))
+      paste0('"action":', json_array(json_number(value)), ",")
     }
   }
 }
+
+is_plain_double <- function(x) is.double(x) && !is.object(x)
 
 #' Make the function that checks a batch of actions and puts it into tensors
 #'
@@ -96,15 +102,18 @@ tensors_writer.gym_space_discrete <- function(space, n) {
   if (space$dtype == "uint64") {
     return(tensors_writer.default(space, n))
   }
-  function(values) {
-    if (length(values) != n || !is.null(dim(values)) || is.object(values)) {
-      NULL
-    } else if (is.integer(values) || is.logical(values)) {
-      if (!anyNA(values)) as.integer(values)
-    } else if (is.double(values) && within_integer(values)) {
-      whole <- as.integer(values)
-      if (all(whole == values)) whole
-    }
+  function(values) if (length(values) == n && is.null(dim(values))) plain_integers(values)
+}
+
+# Whole numbers as integers, `NULL` for what has to be looked at.
+plain_integers <- function(values) {
+  if (is.object(values)) {
+    NULL
+  } else if (is.integer(values) || is.logical(values)) {
+    if (!anyNA(values)) as.integer(values)
+  } else if (is.double(values) && within_integer(values)) {
+    whole <- as.integer(values)
+    if (all(whole == values)) whole
   }
 }
 
@@ -120,9 +129,11 @@ tensors_writer.gym_space_box <- function(space, n) {
   }
   type <- tensor_dtypes[[space$dtype]]
   write <- tensor_types[[type]]$write
+  fits <- function(values) {
+    is_plain_double(values) && identical(dim(values), shape) && isTRUE(max(abs(values)) <= limit)
+  }
   function(values) {
-    if (is.double(values) && !is.object(values) && identical(dim(values), shape) &&
-          isTRUE(max(abs(values)) <= limit)) {
+    if (fits(values)) {
       numbers <- if (shape[[2L]] == 1L) values else t(values)
       list(action = list(dtype = type, shape = shape, bytes = write(as.vector(numbers))))
     }
