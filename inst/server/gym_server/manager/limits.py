@@ -93,8 +93,8 @@ class Limits:
                 "too_many_processes",
                 f"All environments together may have {self.max_processes} processes, and "
                 f"{max(0, left)} are left, not {more.processes}",
-                "close some, GET /v1/instances/ lists them, or leave vectorization_mode 'async' "
-                "out; the server's option --max-processes sets the limit",
+                "close some, GET /v1/instances/ lists them, or let fewer processes run sub-"
+                "environments (num_workers); the server's option --max-processes sets the limit",
             )
 
 
