@@ -144,7 +144,7 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
   }
-  if (is.list(seed)) {
+  if (inherits(seed, "gym_seed_lists")) {
     return(encode_seed_lists(seed, num_envs, call))
   }
   if (is.null(num_envs) || length(seed) == 1L) {

@@ -267,6 +267,9 @@ reset_bare <- function(env, seeds, which = NULL, call = rlang::caller_env()) {
     seeds <- all
   }
   mask <- if (some) seq_len(n) %in% which
+  if (is.list(seeds)) {
+    class(seeds) <- "gym_seed_lists"
+  }
   observation <- reset_instance(
     env$client, instance, seeds, NULL, mask = mask, named = TRUE, infos = FALSE, call = call
   )
