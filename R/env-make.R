@@ -185,7 +185,7 @@ server_env <- R6Class(
       )
     },
     step = function(action, which = NULL) {
-      private$check_open()
+      if (private$closed) private$check_open()
       step_instance(
         private$connected, private$instance, action, render = FALSE, which, named = TRUE
       )
