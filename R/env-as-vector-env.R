@@ -170,9 +170,9 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
   structure(vector_env, class = "gym_vector_env")
 }
 
-# How many episodes make a batch in sub-environments with seeds of their own: with four of them each,
-# few sub-environments have nothing to play while the last episodes end. Where there is only one,
-# what is interrupted loses no episode that has ended.
+# How many episodes make a batch in sub-environments with seeds of their own: with four of them
+# each, few sub-environments have nothing to play while the last episodes end. Where there is only
+# one, what is interrupted loses no episode that has ended.
 episodes_of_batch <- function(num_envs) {
   as.integer(if (num_envs == 1L) 1L else 4L * num_envs)
 }

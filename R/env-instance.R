@@ -258,17 +258,26 @@ warn_step_after_done <- function(instance, call) {
   )
 }
 
-# One seed for all, or in a vector environment one for each sub-environment, NA for none.
+# One seed for all, or in a vector environment one for each sub-environment, NA for none; or a list
+# with several for a sub-environment, the later ones for the episodes that it begins by itself.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
   }
-  if (is.null(num_envs) || length(seed) == 1L) {
+  if (!is.list(seed) && (is.null(num_envs) || length(seed) == 1L)) {
     check_count(seed, min = 0, max = 2^53, call = call)
     return(whole_text(seed))
   }
   check_sub_env_seeds(seed, num_envs, call)
-  json_array(ifelse(is.na(seed), "null", whole_text(seed)))
+  if (is.list(seed)) {
+    json_array(vapply(seed, encode_sub_env_seeds, ""))
+  } else {
+    json_array(ifelse(is.na(seed), "null", whole_text(seed)))
+  }
+}
+
+encode_sub_env_seeds <- function(seeds) {
+  if (anyNA(seeds)) "null" else json_array(whole_text(seeds))
 }
 
 encode_options <- function(options, call) {

@@ -131,7 +131,12 @@ check_has_sub_envs <- function(num_envs, x, arg, call) {
 }
 
 check_sub_env_seeds <- function(seed, num_envs, call) {
-  right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, 2^53)
+  are_seeds <- function(x) is.numeric(x) && are_whole(x[!is.na(x) | is.nan(x)], 0, 2^53)
+  right <- if (is.list(seed)) {
+    all(lengths(seed) > 0L) && are_seeds(unlist(seed, recursive = FALSE))
+  } else {
+    are_seeds(seed)
+  }
   if (!right || length(seed) != num_envs) {
     must <- paste0(
       "a whole number of at least 0, or ", num_envs,

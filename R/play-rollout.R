@@ -13,7 +13,8 @@
 #'
 #' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
 #' side by side in sub-environments; with `frames = TRUE` one after the other. The policy is asked
-#' about the episodes that still run, so that a function gets fewer rows as the last of them end. `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
+#' about the episodes that still run, so that a function gets fewer rows as the last of them end.
+#' `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
 #' again.
 #'
 #' # Steps as arrays

@@ -179,7 +179,8 @@ scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) 
     observation <- reset(seed, options, mask)
     batch <<- batch + 1L
     # Sub-environment i plays the episodes i, i + num_envs and so on.
-    seeds <<- if (is.list(seed)) c(t(vapply(seed, function(own) as.numeric(own)[1:4], numeric(4L)))) else env$seed
+    own <- function(seeds) as.numeric(seeds)[1:4]
+    seeds <<- if (is.list(seed)) c(t(vapply(seed, own, numeric(4L)))) else env$seed
     observation
   }
   # Sub-environments beyond the last episode play along in some modes.
