@@ -8,7 +8,7 @@ import gymnasium
 
 from faulty_envs.counting import Counting
 from faulty_envs.drawing import Drawing, OldRenderModes
-from faulty_envs.hanging import Hanging, HangsWhere, Meeting, Spins
+from faulty_envs.hanging import Hanging, HangsWhenClosedElsewhere, HangsWhere, Meeting, Spins
 from faulty_envs.odd_spaces import (
     SPACES,
     CustomSpace,
@@ -43,6 +43,7 @@ for _kind in (
     Echo,
     ExitsInStep,
     Hanging,
+    HangsWhenClosedElsewhere,
     HangsWhere,
     Insists,
     KillsItself,
