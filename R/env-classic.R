@@ -122,7 +122,10 @@ env_list_all <- function(x) {
 #'   number of at least 0; `NULL` goes on with the generator as it is. In a vector environment
 #'   one number is for all: the first sub-environment gets it, the second gets it plus 1, and so
 #'   on; where the environment's own implementation has one generator for all of them, that gets
-#'   it. Or give one number for each sub-environment, `NA` where its generator goes on as it is.
+#'   it. Or give one number for each sub-environment, `NA` where its generator goes on as it is; or
+#'   a list with a vector for each, whose first number is for now and whose others are for the
+#'   episodes that the sub-environment begins by itself (autoreset_mode `"SameStep"` or
+#'   `"NextStep"`), after the last of which it waits for a reset.
 #' @param options A named list of options for the environment's reset, such as
 #'   `list(low = -0.1, high = 0.1)` for CartPole.
 #' @param return_info Whether to return the environment's info, too: `TRUE` or `FALSE`, the

@@ -248,8 +248,8 @@ test_that("seeds, masks and `which` that do not fit are refused, and nothing mov
   }
   env <- make()
   twin <- make()
-  for (bad in list(1:2, c(1, 2, -3), c(1, 2, 0.5), c(1, 2, NaN), c("1", "2", "3"), list(1, 2, 3),
-                   c(1, 2, Inf), NA, integer())) {
+  for (bad in list(1:2, c(1, 2, -3), c(1, 2, 0.5), c(1, 2, NaN), c("1", "2", "3"), list(1, 2),
+                   list(1, 2, integer()), list(1, 2, "3"), c(1, 2, Inf), NA, integer())) {
     expect_error(env$reset(seed = bad), "seed", class = "gym_error_argument")
   }
   for (bad in list(TRUE, c(TRUE, FALSE), c(TRUE, NA, FALSE), logical(3), c(1, 0, 0), "TRUE",
