@@ -119,16 +119,12 @@ class GroupProcess:
         """Let it make a group; ``finish()`` waits for it.
 
         Raises:
-            GymServerError: ``not_supported`` for an environment that cannot be sent there.
+            GymServerError: for an environment that cannot be sent there.
         """
         try:
             pickle.dumps(sub_env, 5)
         except Exception as failure:
-            raise GymServerError(
-                "not_supported",
-                f"This environment cannot be made in another process: {failure}",
-                "num_workers 0 runs the sub-environments in the server's process",
-            ) from failure
+            raise GymServerError("not_supported", str(failure)) from failure
         self.begin("make", sub_env, numbers, mode)
 
     def begin(self, method: str, *args: object) -> None:

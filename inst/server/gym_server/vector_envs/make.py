@@ -263,7 +263,7 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
     try:
         env = make.ask(_make_with, request, sub_env, num_workers)
     except GymServerError as refusal:
-        if request.config.wants_workers or num_workers == 0:
+        if request.config.wants_workers or num_workers == 0 or refusal.code != "not_supported":
             raise
         log.info("%s runs in the server's process: %s", request.spec.id, refusal.message)
         env = make.ask(_make_with, request, sub_env, 0)

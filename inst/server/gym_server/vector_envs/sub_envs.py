@@ -129,6 +129,16 @@ class SubEnvs:
                 (group, "begin_make", (sub_env, numbers, self.autoreset_mode))
                 for group, numbers in zip(self._groups, groups, strict=True)
             )
+        except GymServerError as refusal:
+            self.kill()
+            if refusal.code == "environment_died":
+                raise
+            # One was made in this process without an error.
+            raise GymServerError(
+                "not_supported",
+                f"This environment cannot be made in another process: {refusal.message}",
+                "num_workers 0 runs the sub-environments in the server's process",
+            ) from refusal
         except BaseException:
             self.kill()
             raise

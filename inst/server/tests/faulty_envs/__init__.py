@@ -23,6 +23,7 @@ from faulty_envs.odd_spaces import (
 from faulty_envs.raising import (
     ExitsInStep,
     ImportsInStep,
+    RaisesElsewhere,
     RaisesInClose,
     RaisesInConstructor,
     RaisesInReset,
@@ -53,6 +54,7 @@ for _kind in (
     Nested,
     NotANumber,
     OldRenderModes,
+    RaisesElsewhere,
     RaisesInClose,
     RaisesInConstructor,
     RaisesInReset,

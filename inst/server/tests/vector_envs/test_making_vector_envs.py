@@ -282,23 +282,24 @@ def test_a_number_of_processes_that_cannot_be_is_refused(client, fields, wanted)
     assert wanted in refusal["message"]
 
 
-def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeypatch):
+@pytest.mark.parametrize(
+    ("env_id", "why"),
+    [
+        ("faulty_envs:RaisesElsewhere-v0", "The environment raised RuntimeError: not here"),
+        # Only this process knows its class.
+        ("faultyLocal-v0", "pickle"),
+    ],
+)
+def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeypatch, env_id, why):
     monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
-    # A class that only this process knows.
-    gymnasium.register("faultyLocal-v0", entry_point=lambda: SlowCounting())
+    gymnasium.register("faultyLocal-v0", entry_point=lambda: Counting(seconds=0.001))
     try:
-        found = about(client, "faultyLocal-v0", num_envs=64)
+        found = about(client, env_id, num_envs=64)
         assert (found["vectorization_mode"], found["num_workers"]) == ("sync", 0)
-        answer = client.post(
-            "/v1/envs/", json={"env_id": "faultyLocal-v0", "num_envs": 64, "num_workers": 2}
-        )
+        answer = client.post("/v1/envs/", json={"env_id": env_id, "num_envs": 64, "num_workers": 2})
         assert (answer.status_code, answer.json["code"]) == (400, "not_supported")
-        assert "cannot be made in another process" in answer.json["message"]
+        assert "cannot be made in another process: " in answer.json["message"]
+        assert why in answer.json["message"]
         assert "num_workers 0" in answer.json["hint"]
     finally:
         del gymnasium.registry["faultyLocal-v0"]
-
-
-class SlowCounting(Counting):
-    def __init__(self):
-        super().__init__(seconds=0.001)
