@@ -33,10 +33,10 @@
 #'   with a pipe.
 #' @param vectorization_mode How the sub-environments are run: `"vector_entry_point"`, by the
 #'   environment's own implementation, by far the fastest where there is one, as in
-#'   CartPole; `"sync"`, one after the other; `"async"`, each in a process of its own,
-#'   for environments that take long for a step. `NULL`, the default, takes the
-#'   environment's own implementation where there is one that does what is asked for,
-#'   else `"sync"`. Only with `num_envs`.
+#'   CartPole; `"sync"`, one after the other in the server's own process; `"async"`, in groups, each
+#'   in a worker process, which pays where a step takes long. `"sync"` and `"async"` behave alike.
+#'   `NULL`, the default, takes the environment's own implementation where there is one that does
+#'   what is asked for, else lets `num_workers` decide. Only with `num_envs`.
 #' @param autoreset_mode What becomes of a sub-environment whose episode has ended:
 #'   `"NextStep"`, it is reset by the next step, whose action and reward do not
 #'   count; `"SameStep"`, it is reset within the step, and its last observation is in
@@ -45,6 +45,10 @@
 #' @param name What you call it, a string of at most 100 printable characters, by
 #'   which [env_list()] shows it to those who share the server; `NULL`, the default,
 #'   for no name.
+#' @param num_workers How many worker processes run the sub-environments, a whole number: 0 is
+#'   `"sync"`, more are `"async"`. What comes of it is the same for any number. `NULL`, the default,
+#'   lets the server choose: none where steps are cheap, else at most as many as there are cores
+#'   that it may use. Only with `num_envs`, and not with `"vector_entry_point"`.
 #' @return The instance's id, a string of 8 hexadecimal digits.
 #' @section Errors: `gym_error_http_400` for an id that the server does not
 #'   know, with the nearest ones as a hint, for arguments that the environment
@@ -79,13 +83,13 @@
 #' env_close(client, three)
 env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NULL,
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
-                       autoreset_mode = NULL, name = NULL) {
+                       autoreset_mode = NULL, name = NULL, num_workers = NULL) {
   check_client(x)
   check_not_registered(env_id)
   check_named_list(kwargs)
   create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
-    name
+    name, num_workers
   )
 }
 

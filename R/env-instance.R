@@ -2,7 +2,7 @@
 
 create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
-                            call = rlang::caller_env()) {
+                            num_workers = NULL, call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
   if (inherits(env_id, "gym_wrapped")) {
     wrappers <- c(env_id$wrappers, wrappers)
@@ -13,10 +13,12 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_count(num_envs, allow_null = TRUE, call = call)
   check_vector_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
   check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_num_workers(num_workers, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
     num_envs = if (!is.null(num_envs)) whole_text(num_envs),
+    num_workers = if (!is.null(num_workers)) whole_text(num_workers),
     vectorization_mode = if (!is.null(vectorization_mode)) json_string(vectorization_mode),
     autoreset_mode = if (!is.null(autoreset_mode)) json_string(autoreset_mode),
     seed = encode_seed(seed, num_envs, call),
@@ -86,6 +88,7 @@ ask_instance <- function(client, instance_id, call) {
   instance$reset_route <- paste0(route, "reset/")
   instance$step_route <- paste0(route, "step/")
   instance$num_envs <- answer$num_envs
+  instance$num_workers <- answer$num_workers
   instance$vectorization_mode <- shown_line(answer$vectorization_mode)
   instance$autoreset_mode <- shown_line(answer$autoreset_mode)
   instance$single_action_space <- read_values(space_of(answer$action_space), "Its `action_space`")
@@ -139,7 +142,8 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
   )
 }
 
-# One seed for all, or in a vector environment one for each sub-environment, NA for none.
+# One seed for all, or in a vector environment one for each sub-environment, NA for none; or a list
+# with several for a sub-environment, the later ones for the episodes that it begins by itself.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)

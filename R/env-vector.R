@@ -122,6 +122,17 @@ check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), 
     return(invisible())
   }
   check_choice(x, choices, arg, call)
+  check_has_sub_envs(num_envs, x, arg, call)
+}
+
+check_num_workers <- function(num_workers, num_envs, call) {
+  check_count(num_workers, min = 0, allow_null = TRUE, call = call)
+  if (!is.null(num_workers)) {
+    check_has_sub_envs(num_envs, num_workers, "num_workers", call)
+  }
+}
+
+check_has_sub_envs <- function(num_envs, x, arg, call) {
   if (is.null(num_envs)) {
     gym_abort(
       c(

@@ -2,9 +2,10 @@
 # environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
 # played again, and it does not matter in which order batches are played, and by whom.
 #
-# Each sub-environment plays one episode at a time, and one whose episode has ended waits for the
-# others. If it began another episode at once, and playing stopped at the number of episodes asked
-# for, short episodes would be favoured.
+# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. Which of them
+# plays an episode is written down before the first step. If the next one were given to whichever
+# ends first, and playing stopped at the number of episodes asked for, short episodes would be
+# favoured.
 
 #' Play a batch of episodes
 #'
@@ -28,26 +29,27 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
                        each = 1L, keep_steps = FALSE, keep_next = FALSE,
                        report = function(ended) NULL) {
   n <- length(episodes$episode)
-  sub_env <- (seq_len(n) - 1L) %% vector_env$num_envs + 1L
+  at_once <- vector_env$num_envs
   batch <- rlang::env(
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
-    sub_env = sub_env, return = numeric(n), length = integer(n), terminated = logical(n),
-    truncated = logical(n), ended = logical(n), needed = rep(TRUE, n), steps = list(),
-    frames = list(), target = target, each = each, report = report
+    sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
+    terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
+    steps = list(), frames = list(), target = target, each = each, report = report
   )
+  # Where all sub-environments must be reset together, they wait for each other after each episode.
+  together <- if (vector_env$one_seed) at_once else n
   play <- function() {
-    for (first in which(sub_env == 1L)) {
-      numbers <- seq(first, min(n, first + vector_env$num_envs - 1L))
-      numbers <- numbers[batch$needed[numbers]]
-      if (length(numbers)) {
-        play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps, keep_next)
+    for (first in seq(1L, n, by = together)) {
+      if (first <= batch$needed) {
+        last <- min(n, first + together - 1L)
+        play_episodes(vector_env, batch, first, last, policy, max_steps, keep_steps, keep_next)
       }
     }
   }
   with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
-  c(lapply(mget(columns, batch), `[`, batch$needed), mget(c("steps", "frames"), batch))
+  c(lapply(mget(columns, batch), utils::head, batch$needed), mget(c("steps", "frames"), batch))
 }
 
 # An error of the environment names the user's call, not the step that was taken for it.
@@ -63,59 +65,115 @@ naming_call <- function(code, vector_env) {
   )
 }
 
-# Plays some episodes of a batch, one in each sub-environment. They begin together, so that all that
-# are still playing have taken the same number of steps, which is `taken`.
-play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, keep_steps,
-                              keep_next) {
-  space <- vector_env$observation_space
-  observation <- begin_episodes(vector_env, batch, playing)
-  keep_frame(batch, vector_env, playing)
-  if (batch$episode[[playing[[1L]]]] == 1L) {
-    ask_beforehand(policy, batch$candidate[playing], observation, vector_env)
-  }
-  which <- batch$sub_env[playing]
-  acting <- policy_rows(policy, batch$candidate[playing])
-  returns <- numeric(length(playing))
+# Plays the episodes from `first` to `last` of a batch. `rows` has an element for each
+# sub-environment that plays: which episode of the batch, the sub-environment's number, the return
+# so far, and how many steps had been taken when the episode began.
+play_episodes <- function(vector_env, batch, first, last, policy, max_steps, keep_steps,
+                          keep_next) {
+  episode <- seq.int(first, min(last, batch$needed, first + vector_env$num_envs - 1L))
+  rows <- list(episode = episode, sub_env = batch$sub_env[episode],
+               return = numeric(length(episode)), began = integer(length(episode)))
+  observation <- begin_episodes(vector_env, batch, episode, last)
+  ask_beforehand(policy, batch, episode, observation, vector_env)
+  candidate <- batch$candidate[episode]
+  acting <- policy_rows(policy, candidate)
   taken <- 0L
   repeat {
-    action <- act_batch(acting, observation, length(playing), vector_env)
-    out <- vector_env$step(action, which)
+    action <- act_batch(acting, observation, length(rows$episode), vector_env)
+    out <- vector_env$step(action, rows$sub_env)
     taken <- taken + 1L
-    keep_frame(batch, vector_env, playing)
-    returns <- returns + out$reward
+    keep_frame(batch, vector_env, rows$episode)
+    rows$return <- rows$return + out$reward
     if (keep_steps) {
       batch$steps[[length(batch$steps) + 1L]] <- list(
-        at = playing, observation = observation, action = action, reward = out$reward,
+        at = rows$episode, observation = observation, action = action, reward = out$reward,
         terminated = out$terminated, truncated = out$truncated,
         next_observation = if (keep_next) out$next_observation
       )
     }
     observation <- out$observation
-    ended <- out$terminated | out$truncated | taken >= max_steps
+    ended <- out$terminated | out$truncated
+    # Where an episode is cut short the environment begins no other by itself.
+    waiting <- if (isTRUE(vector_env$begins_next)) !ended else TRUE
+    if (max_steps < Inf) {
+      ended <- ended | taken - rows$began >= max_steps
+    }
     if (any(ended)) {
-      end_episodes(batch, playing[ended], returns[ended], taken, lapply(out[flags], `[`, ended))
-      going <- which(!ended & batch$needed[playing])
+      end_episodes(batch, rows$episode[ended], rows$return[ended], (taken - rows$began)[ended],
+                   lapply(out[flags], `[`, ended))
+      rows$waiting <- ended & waiting
+      rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
+      rows$return[ended] <- 0
+      rows$began[ended] <- taken
+      going <- which(rows$episode <= min(last, batch$needed))
       if (!length(going)) {
         return(invisible())
       }
-      playing <- playing[going]
-      which <- which[going]
-      returns <- returns[going]
-      observation <- batch_rows(space, observation, going)
-      acting <- policy_rows(policy, batch$candidate[playing])
+      if (length(going) < length(ended)) {
+        rows <- lapply(rows, `[`, going)
+        observation <- batch_rows(vector_env$observation_space, observation, going)
+      }
+      observation <- begin_waiting(vector_env, batch, rows, observation, last)
+      begun <- which(rows$began == taken)
+      ask_beforehand(policy, batch, rows$episode, observation, vector_env, begun)
+      if (!identical(batch$candidate[rows$episode], candidate)) {
+        candidate <- batch$candidate[rows$episode]
+        acting <- policy_rows(policy, candidate)
+      }
     }
   }
 }
 
-# Resets the sub-environments of the episodes that begin. Where all must be reset together, those
-# that play none are left out of what it returns.
-begin_episodes <- function(vector_env, batch, playing) {
-  seeds <- batch$seed[playing]
-  sub_envs <- batch$sub_env[playing]
-  if (vector_env$one_seed) {
-    batch_rows(vector_env$observation_space, vector_env$reset(seeds[[1L]]), sub_envs)
+# Puts the first observations of the episodes that the environment does not begin by itself in the
+# place of the last observations of those before.
+begin_waiting <- function(vector_env, batch, rows, observation, last) {
+  waiting <- which(rows$waiting)
+  if (!length(waiting)) {
+    return(observation)
+  }
+  begun <- begin_episodes(vector_env, batch, rows$episode[waiting], last)
+  n <- length(rows$episode)
+  if (length(waiting) == n) {
+    begun
   } else {
+    replace_rows(vector_env$observation_space, observation, n, waiting, begun)
+  }
+}
+
+# Resets the sub-environments of the episodes that begin. Where all must be reset together, those
+# that play none are left out of what it returns. One that begins its next episodes by itself gets
+# the seeds of all of them, up to the episode `last`.
+begin_episodes <- function(vector_env, batch, episode, last) {
+  sub_envs <- batch$sub_env[episode]
+  observation <- if (vector_env$one_seed) {
+    of_all <- vector_env$reset(batch$seed[[episode[[1L]]]])
+    batch_rows(vector_env$observation_space, of_all, sub_envs)
+  } else if (isTRUE(vector_env$begins_next)) {
+    last <- min(last, batch$needed)
+    seeds <- lapply(episode, function(first) {
+      batch$seed[seq.int(first, last, by = vector_env$num_envs)]
+    })
     vector_env$reset(seeds, sub_envs)
+  } else {
+    vector_env$reset(batch$seed[episode], sub_envs)
+  }
+  keep_frame(batch, vector_env, episode)
+  observation
+}
+
+# A function is asked about a single episode before it plays several of them side by side.
+ask_beforehand <- function(policy, batch, episode, observation, vector_env,
+                           begun = seq_along(episode)) {
+  if (vector_env$num_envs == 1L || !(is.function(policy) || inherits(policy, "gym_policy_list"))) {
+    return(invisible())
+  }
+  for (row in begun[batch$episode[episode[begun]] == 1L]) {
+    candidate <- batch$candidate[[episode[[row]]]]
+    asked <- policy_subset(policy, candidate)
+    if (is.function(asked) && sum(batch$candidate == candidate) > 1L) {
+      one <- batch_rows(vector_env$observation_space, observation, row)
+      ask_about_one(asked, one, vector_env)
+    }
   }
 }
 
@@ -142,13 +200,14 @@ end_episodes <- function(batch, at, returns, length, out) {
 }
 
 # A candidate whose mean return reaches the target makes all later ones needless, which are not
-# played on. Candidates before it are, because one of them may reach the target, too.
+# played on: of the batch's episodes the first `needed` are. Candidates before it are played on,
+# because one of them may reach the target, too.
 drop_needless_candidates <- function(batch, candidates) {
   for (candidate in candidates) {
     own <- batch$candidate == candidate
     if (sum(own) == batch$each && all(batch$ended[own]) &&
           isTRUE(mean(batch$return[own]) >= batch$target)) {
-      batch$needed <- batch$needed & batch$candidate <= candidate
+      batch$needed <- min(batch$needed, sum(batch$candidate <= candidate))
     }
   }
 }

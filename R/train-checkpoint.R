@@ -46,7 +46,8 @@ environment_traits <- function(env) {
   } else {
     list(
       env_id = env$spec$id, num_envs = env$num_envs,
-      vectorization_mode = env$vectorization_mode, autoreset_mode = env$autoreset_mode
+      own_implementation = identical(env$vectorization_mode, "vector_entry_point"),
+      autoreset_mode = env$autoreset_mode
     )
   }
 }

@@ -144,8 +144,7 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-# With so many sub-environments playing takes seconds. More of them gain little, because the server
-# steps one after the other.
+# With so many sub-environments playing takes seconds.
 landscape_sub_envs <- 128L
 
 # Each sub-environment has a seed of its own, so that all networks can play the same episodes.
@@ -153,7 +152,7 @@ make_seeded_sub_envs <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_sub_envs))
   if_supported(
     make_unseeded(
-      env_id, num_envs = n, vectorization_mode = "sync", autoreset_mode = "Disabled",
+      env_id, num_envs = n, vectorization_mode = "sync", autoreset_mode = "SameStep",
       client = client
     )
   ) %||% make_unseeded(env_id, client = client)
