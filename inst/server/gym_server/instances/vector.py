@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
 from gym_server.instances.vector_modes import MODES, Mode
 from gym_server.json_values import plain
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
 
@@ -115,7 +118,7 @@ class VectorEnvironment:
             "create the environment with vectorization_mode 'sync'",
         )
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
         """Reset all sub-environments, or those of a mask."""
         if isinstance(seed, tuple):
             seed = list(seed)
@@ -154,9 +157,12 @@ class VectorEnvironment:
                 "reset with a reset_mask, or step the others with a step_mask",
             )
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Step some sub-environments."""
-        return self._mode.step_some(which, actions)
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step all sub-environments, or some."""
+        if which is None:
+            outcome: tuple = self.gym_env.step(action)
+            return outcome
+        return self._mode.step_some(which, action)
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
@@ -177,19 +183,19 @@ class VectorEnvironment:
         truncated: np.ndarray,
         done: np.ndarray,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step: arrays where ``Parts`` are wanted, else lists."""
-        final = self._take_final(info, tensors) if info else {}
+        final = self._take_final(info, form) if info else {}
         answer = {
-            "observation": self.encode(observation, tensors),
+            "observation": self.encode(observation, form),
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
-            "info": plain(info) if info else {},
+            "info": plain(info) if info and form.infos else {},
             **final,
         }
-        if tensors:
+        if isinstance(answer["observation"], spaces.Parts):
             return answer
         answer["done"] = done
         return {
@@ -197,7 +203,7 @@ class VectorEnvironment:
             for name, value in answer.items()
         }
 
-    def _take_final(self, info: dict, tensors: bool) -> dict:
+    def _take_final(self, info: dict, form: AnswerForm) -> dict:
         """Take the last observations of the sub-environments that were reset out of an info."""
         if self._autoreset_mode is not AutoresetMode.SAME_STEP or "final_obs" not in info:
             return {}
@@ -205,17 +211,28 @@ class VectorEnvironment:
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {
-            "final_obs": self.encode(batch, tensors, "final_obs"),
+            "final_obs": self.encode(batch, form, "final_obs"),
             "final_sub_envs": rows.tolist(),
         }
 
     # Values ---------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, tensors: bool, name: str = "observation") -> object:
+    def encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
         """Return a batch of observations as JSON values or as ``Parts``."""
-        if tensors:
-            return spaces.encode_batch_tensors(self.single_observation_space, name, observation)
-        return spaces.encode_batch(self.single_observation_space, observation)
+        if form.tensors and self._write_tensors:
+            return self._write_tensors[name](observation, form.by_column)
+        return self._write_json(observation)
+
+    # Made once, and only for a space that LocalBackend has found to be supported.
+    @cached_property
+    def _write_json(self) -> Callable[[Any], object]:
+        return spaces.batch_json_writer(self.single_observation_space)
+
+    @cached_property
+    def _write_tensors(self) -> dict[str, Callable[[Any, bool], spaces.Parts]]:
+        space = self.single_observation_space
+        names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
+        return {name: spaces.batch_tensor_writer(space, name) for name in names}
 
     def encode_action(self, action: Any) -> object:
         """Return one action for each sub-environment as JSON values."""
