@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-import gymnasium
 from gymnasium.spaces import Space
-from gymnasium.vector import VectorEnv
 
 from gym_server.envs.config import EnvConfig
+from gym_server.errors import GymServerError
 from gym_server.instances.episode_statistics import Statistics
 from gym_server.protocol.answers import AnswerForm
 
@@ -28,6 +28,8 @@ class Environment(Protocol):
         single_observation_space: of an observation of one sub-environment.
         statistics: of its episodes.
         vectorization_mode: what runs the sub-environments; None for a single environment.
+        num_workers: how many processes run them; None for a single environment, and for an
+            implementation of the environment's own.
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
@@ -42,6 +44,7 @@ class Environment(Protocol):
     single_observation_space: Space
     statistics: Statistics
     vectorization_mode: str | None
+    num_workers: int | None
     autoreset_mode: str | None
     draws_when_stepped: bool
     draws_on_render_thread: bool
@@ -134,11 +137,14 @@ class Environment(Protocol):
     def close(self) -> None:
         """Close it."""
 
-    def kill(self) -> None:
-        """Kill the processes that it runs in, if it has any."""
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when a process that it runs in ends by itself, or if it has."""
+
+    def kill(self, why: GymServerError) -> None:
+        """Kill the processes that it runs in, if it has any; the reason is for calls that wait."""
 
 
-def env_id_of(config: EnvConfig, gym_env: gymnasium.Env | VectorEnv) -> str:
+def env_id_of(config: EnvConfig, gym_env: Any) -> str:
     """Return what an environment can be created by again: its module, and the version found."""
     module, colon, name = str(config.env_id).rpartition(":")
     return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"

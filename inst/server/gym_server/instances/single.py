@@ -13,6 +13,7 @@ from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
@@ -27,6 +28,7 @@ class SingleEnvironment:
     """A single environment; see ``Environment`` for the methods."""
 
     vectorization_mode: str | None = None
+    num_workers: int | None = None
     autoreset_mode: str | None = None
     fails_as_a_whole = False
 
@@ -135,5 +137,8 @@ class SingleEnvironment:
         """Close the environment on the render thread."""
         self._renderer.run(self.gym_env.close)
 
-    def kill(self) -> None:
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Do nothing: this process does not end by itself."""
+
+    def kill(self, why: GymServerError) -> None:
         """Do nothing: it runs in this process."""
