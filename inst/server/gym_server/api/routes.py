@@ -16,11 +16,9 @@ from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
-from gym_server.protocol.answers import HTML, Content, Ready
+from gym_server.protocol.answers import HTML, Content, Ready, frame_tensor
 from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
-from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor
-from gym_server.protocol.safetensors import write as write_tensors
 from gym_server.rendering.png import png
 
 ROUTES = Table()
@@ -269,9 +267,7 @@ def env_render(call: Call) -> Content:
     """Draw the current state."""
     frame = call.instance.render(call.fields["sub_env"] or 0)
     if call.form.tensors:
-        by_column = call.form.by_column
-        file = write_tensors({"frame": Tensor.of(frame, by_column)}, {})
-        return Content(file, COLUMN_TENSORS if by_column else TENSORS)
+        return frame_tensor(frame, call.form)
     return Content(png(frame), "image/png")
 
 

@@ -79,6 +79,12 @@ class Ready(NamedTuple):
     content_type: str
 
 
+def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Content:
+    """Return a frame as a file of one tensor."""
+    file = join_tensors({"frame": Tensor.of(frame, form.by_column)}, b"")
+    return Content(file, COLUMN_TENSORS if form.by_column else TENSORS)
+
+
 def answer(
     result: dict | Content | Ready | None, request_id: RequestId | None, status: int = 200
 ) -> Answer:
