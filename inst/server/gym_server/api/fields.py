@@ -11,7 +11,16 @@ from gymnasium.vector import AutoresetMode
 
 from gym_server.envs.config import Wrapper
 from gym_server.errors import invalid_parameter
-from gym_server.protocol.fields import TRUE_OR_FALSE, Kind, boolean, integer, json_object, text
+from gym_server.protocol.fields import (
+    BOOLEAN,
+    TRUE_OR_FALSE,
+    Field,
+    Kind,
+    boolean,
+    integer,
+    json_object,
+    text,
+)
 
 # Whatever can be seen on a line of its own, and does not turn the direction of the others.
 _NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
@@ -202,3 +211,6 @@ MASK = Kind(
 QUERY_INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _query_integer)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
+INFO = Field(
+    "info", BOOLEAN, "Whether infos are made and sent (the default); with false they are empty."
+)

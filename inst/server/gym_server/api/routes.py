@@ -16,11 +16,9 @@ from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
-from gym_server.protocol.answers import HTML, Content, Ready
+from gym_server.protocol.answers import HTML, Content, Ready, frame_tensor
 from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
-from gym_server.protocol.safetensors import TENSORS, Tensor
-from gym_server.protocol.safetensors import write as write_tensors
 from gym_server.rendering.png import png
 
 ROUTES = Table()
@@ -125,6 +123,7 @@ def env_about(call: Call) -> dict:
     ),
     Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
+    fields.INFO,
     answer="observation, info; with sub-environments one row for each",
     once=True,
     tensors=True,
@@ -136,7 +135,7 @@ def env_reset(call: Call) -> dict | Ready:
     """Start an episode."""
     fields = call.fields
     return call.instance.reset(
-        fields["seed"], fields["options"], call.tensors, fields["reset_mask"]
+        fields["seed"], fields["options"], call.wanted_form, fields["reset_mask"]
     )
 
 
@@ -157,6 +156,7 @@ def env_reset(call: Call) -> dict | Ready:
         "has come so far.",
     ),
     Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
+    fields.INFO,
     answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
     "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
     "reset at once",
@@ -179,7 +179,7 @@ def env_step(call: Call) -> dict | Ready:
     """Take one step."""
     fields = call.fields
     return call.instance.step(
-        fields["action"], call.tensors, fields["step_mask"], fields["render"] or False
+        fields["action"], call.wanted_form, fields["step_mask"], fields["render"] or False
     )
 
 
@@ -266,8 +266,8 @@ def env_observation_space_contains(call: Call) -> dict:
 def env_render(call: Call) -> Content:
     """Draw the current state."""
     frame = call.instance.render(call.fields["sub_env"] or 0)
-    if call.tensors:
-        return Content(write_tensors({"frame": Tensor.of(frame)}, {}), TENSORS)
+    if call.form.tensors:
+        return frame_tensor(frame, call.form)
     return Content(png(frame), "image/png")
 
 

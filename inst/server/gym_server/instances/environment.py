@@ -10,6 +10,7 @@ from gymnasium.spaces import Space
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError
 from gym_server.instances.episode_statistics import Statistics
+from gym_server.protocol.answers import AnswerForm
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,8 +57,8 @@ class Environment(Protocol):
     ) -> None:
         """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
-        """Reset the environment, or the sub-environments of a mask."""
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
+        """Reset the environment, or the sub-environments of a mask; see ``step()`` for infos."""
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
         """Remember that episodes have begun, in the sub-environments of a mask."""
@@ -76,8 +77,14 @@ class Environment(Protocol):
     def check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
 
-    def step(self, which: np.ndarray | None, actions: Any) -> tuple:
-        """Step the environment, or some sub-environments."""
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step the environment, or the sub-environments that ``select()`` returned.
+
+        Args:
+            which: the sub-environments.
+            action: one, or one for each.
+            infos: whether somebody wants the infos; where it saves work, none are made then.
+        """
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
@@ -92,13 +99,13 @@ class Environment(Protocol):
         truncated: Any,
         done: Any,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step, as JSON values or with ``Parts``."""
 
     # Values --------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, tensors: bool) -> object:
+    def encode(self, observation: Any, form: AnswerForm) -> object:
         """Return an observation as a JSON value or as ``Parts``."""
 
     def encode_action(self, action: Any) -> object:

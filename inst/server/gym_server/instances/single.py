@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -16,6 +17,7 @@ from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
 if TYPE_CHECKING:
@@ -48,7 +50,7 @@ class SingleEnvironment:
         """Refuse options that make a loop."""
         argument_limits.check_reset_options(self.gym_env, options)
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
         """Reset the environment."""
         start: tuple = self.gym_env.reset(seed=seed, options=options)
         return start
@@ -64,9 +66,9 @@ class SingleEnvironment:
     def check_running(self, which: np.ndarray | None) -> None:
         """Leave it to the environment what comes after an episode's end."""
 
-    def step(self, which: np.ndarray | None, actions: Any) -> tuple:
-        """Step the environment."""
-        outcome: tuple = self.gym_env.step(actions)
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step the environment, which makes its info in any case."""
+        outcome: tuple = self.gym_env.step(action)
         return outcome
 
     def read_outcome(
@@ -85,24 +87,35 @@ class SingleEnvironment:
         truncated: bool,
         done: bool,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step."""
         return {
-            "observation": self.encode(observation, tensors),
+            "observation": self.encode(observation, form),
             "reward": reward,
             "done": done,
             "terminated": terminated,
             "truncated": truncated,
             # Converted while the environment cannot change it.
-            "info": plain(info) if info else {},
+            "info": plain(info) if info and form.infos else {},
         }
 
-    def encode(self, observation: Any, tensors: bool) -> object:
+    def encode(self, observation: Any, form: AnswerForm) -> object:
         """Return an observation as a JSON value or as ``Parts``."""
-        if tensors:
-            return spaces.encode_tensors(self.observation_space, "observation", observation)
-        return spaces.encode(self.observation_space, observation)
+        if form.tensors and self._write_tensors is not None:
+            return self._write_tensors(observation, form.by_column)
+        return self._write_json(observation)
+
+    # Made once, and only for a space that LocalBackend has found to be supported.
+    @cached_property
+    def _write_json(self) -> Callable[[Any], object]:
+        return spaces.json_writer(self.observation_space)
+
+    @cached_property
+    def _write_tensors(self) -> Callable[[Any, bool], spaces.Parts] | None:
+        space = self.observation_space
+        travels = spaces.travels_as_tensors(space)
+        return spaces.tensor_writer(space, "observation") if travels else None
 
     def encode_action(self, action: Any) -> object:
         """Return an action as a JSON value."""

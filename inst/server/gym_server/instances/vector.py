@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
 from gym_server.json_values import plain
+from gym_server.protocol.answers import AnswerForm
 from gym_server.vector_envs.entry_point import EntryPointEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
@@ -119,9 +121,9 @@ class VectorEnvironment:
             "create the environment with vectorization_mode 'sync'",
         )
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
         """Reset all sub-environments, or those of a mask."""
-        start: tuple = self.gym_env.reset(seed, options, mask)
+        start: tuple = self.gym_env.reset(seed, options, mask, infos)
         return start
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
@@ -151,9 +153,9 @@ class VectorEnvironment:
                 "reset with a reset_mask, or step the others with a step_mask",
             )
 
-    def step(self, which: np.ndarray | None, actions: Any) -> tuple:
-        """Step some sub-environments."""
-        outcome: tuple = self.gym_env.step(which, actions)
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step all sub-environments, or some."""
+        outcome: tuple = self.gym_env.step(which, action, infos)
         return outcome
 
     def read_outcome(
@@ -172,19 +174,19 @@ class VectorEnvironment:
         truncated: np.ndarray,
         done: np.ndarray,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step: arrays where ``Parts`` are wanted, else lists."""
-        final = self._take_final(info, tensors) if info else {}
+        final = self._take_final(info, form) if info else {}
         answer = {
-            "observation": self.encode(observation, tensors),
+            "observation": self.encode(observation, form),
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
-            "info": plain(info) if info else {},
+            "info": plain(info) if info and form.infos else {},
             **final,
         }
-        if tensors:
+        if isinstance(answer["observation"], spaces.Parts):
             return answer
         answer["done"] = done
         return {
@@ -192,7 +194,7 @@ class VectorEnvironment:
             for name, value in answer.items()
         }
 
-    def _take_final(self, info: dict, tensors: bool) -> dict:
+    def _take_final(self, info: dict, form: AnswerForm) -> dict:
         """Take the last observations of the sub-environments that were reset out of an info."""
         if "final_obs" not in info:
             return {}
@@ -200,17 +202,28 @@ class VectorEnvironment:
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {
-            "final_obs": self.encode(batch, tensors, "final_obs"),
+            "final_obs": self.encode(batch, form, "final_obs"),
             "final_sub_envs": rows.tolist(),
         }
 
     # Values ---------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, tensors: bool, name: str = "observation") -> object:
+    def encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
         """Return a batch of observations as JSON values or as ``Parts``."""
-        if tensors:
-            return spaces.encode_batch_tensors(self.single_observation_space, name, observation)
-        return spaces.encode_batch(self.single_observation_space, observation)
+        if form.tensors and self._write_tensors:
+            return self._write_tensors[name](observation, form.by_column)
+        return self._write_json(observation)
+
+    # Made once, and only for a space that LocalBackend has found to be supported.
+    @cached_property
+    def _write_json(self) -> Callable[[Any], object]:
+        return spaces.batch_json_writer(self.single_observation_space)
+
+    @cached_property
+    def _write_tensors(self) -> dict[str, Callable[[Any, bool], spaces.Parts]]:
+        space = self.single_observation_space
+        names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
+        return {name: spaces.batch_tensor_writer(space, name) for name in names}
 
     def encode_action(self, action: Any) -> object:
         """Return one action for each sub-environment as JSON values."""

@@ -26,6 +26,7 @@ from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import answer_to
+from gym_server.instances.backend import Seed
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.monitoring.monitor_directory import claim
@@ -35,6 +36,7 @@ from gym_server.processes.messages import read_call, refusal_message, value_mess
 from gym_server.processes.pipe import Pipe
 from gym_server.processes.set_up import set_up_process
 from gym_server.protocol import answers
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
 # Its imports take longer than the start of a process.
@@ -163,11 +165,12 @@ class _Methods:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: Any) -> answers.Answer:
-        return answers.answer(self._instance.reset(*args), None)
+    def reset(self, seed: Seed, options: dict | None, form: tuple, mask: Any) -> answers.Answer:
+        start = self._instance.reset(seed, options, AnswerForm(*form), mask)
+        return answers.answer(start, None)
 
-    def step(self, *args: Any) -> answers.Answer:
-        return answers.answer(self._instance.step(*args), None)
+    def step(self, action: object, form: tuple, mask: Any) -> answers.Answer:
+        return answers.answer(self._instance.step(action, AnswerForm(*form), mask), None)
 
     def sample_action(self) -> object:
         return self._instance.sample_action()

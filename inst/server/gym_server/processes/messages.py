@@ -22,14 +22,15 @@ import numpy as np
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import MalformedMessageError, Pipe
 from gym_server.protocol.answers import JSON, Answer, Ready, dumps
-from gym_server.protocol.safetensors import TENSORS
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 # The number of the call, the kind of the result, and the length of its text.
 _HEAD = struct.Struct("<QBI")
 
-_REFUSAL, _VALUE, _JSON, _TENSORS, _OBJECT = range(5)
+_REFUSAL, _VALUE, _JSON, _TENSORS, _OBJECT, _COLUMN_TENSORS = range(6)
 
-_CONTENT_TYPES = {_JSON: JSON, _TENSORS: TENSORS}
+_CONTENT_TYPES = {_JSON: JSON, _TENSORS: TENSORS, _COLUMN_TENSORS: COLUMN_TENSORS}
+_KINDS = {content_type: kind for kind, content_type in _CONTENT_TYPES.items()}
 
 _LONGEST_TEXT = 100_000
 
@@ -52,8 +53,7 @@ def read_call(raw: bytes) -> tuple[int, str, tuple]:
 
 def answer_message(number: int, answer: Answer) -> bytes:
     """Return the message that carries the answer to a reset or a step."""
-    kind = _TENSORS if answer.content_type == TENSORS else _JSON
-    return _HEAD.pack(number, kind, 0) + answer.body
+    return _HEAD.pack(number, _KINDS[answer.content_type], 0) + answer.body
 
 
 def value_message(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
