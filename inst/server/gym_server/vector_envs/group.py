@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces import Box, Discrete, MultiBinary, MultiDiscrete, Space
+from gymnasium.spaces import Space
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import concatenate, create_empty_array
 
+from gym_server.envs.drawing_on_demand import allow_drawing, save_drawing
 from gym_server.errors import GymServerError, environment_error
-
-ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
+from gym_server.spaces.stacking import ARRAYS
 
 
 class Info(NamedTuple):
@@ -51,7 +51,12 @@ class Outcome(NamedTuple):
 
 
 class Group:
-    """Some of the sub-environments of a vector environment."""
+    """Some of the sub-environments of a vector environment.
+
+    Attributes:
+        envs: they themselves.
+        render_mode: that of each of them.
+    """
 
     def __init__(
         self,
@@ -76,6 +81,9 @@ class Group:
             self._check_spaces()
             undo.pop_all()
         self._observation_space = self.envs[0].observation_space
+        # Of those that nobody has drawn so far.
+        self._render_modes = [save_drawing(env) for env in self.envs]
+        self.render_mode = self._render_modes[0] or self.envs[0].render_mode
         self._steps = [env.step for env in self.envs]
         self._last: list[object] = [None] * len(numbers)
         # The next move of these begins an episode, with mode NEXT_STEP.
@@ -186,6 +194,7 @@ class Group:
     def render(self, index: int) -> object:
         """Draw one of them."""
         with self._naming(index):
+            allow_drawing(self.envs[index], self._render_modes[index])
             return self.envs[index].render()
 
     def observed(self, index: int) -> object:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.spaces import Dict, Space, Tuple
+from gymnasium.spaces import Space
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
@@ -21,10 +21,11 @@ from gym_server import spaces
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.spaces.stacking import unstack
-from gym_server.vector_envs.group import ARRAYS, Group, Outcome
+from gym_server.spaces.stacking import ARRAYS, join, unstack
+from gym_server.vector_envs.group import Group, Outcome
 from gym_server.vector_envs.group_process import GroupProcess
 from gym_server.vector_envs.infos import final_only, gather
+from gym_server.vector_envs.local_group import LocalGroup
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.warm_processes import warm_processes
 
@@ -88,11 +89,11 @@ class SubEnvs:
         # The place of each group's first sub-environment, and how many there are in all.
         self._bounds = _bounds(num_envs, max(1, num_workers))
         groups = [range(first, end) for first, end in pairwise(self._bounds)]
-        self._groups: list[_LocalGroup | GroupProcess] = []
+        self._groups: list[LocalGroup | GroupProcess] = []
         if num_workers == 0:
             group = Group(sub_env, groups[0], autoreset_mode)
-            self._groups.append(_LocalGroup(group, renderer))
-            self._describe(group.envs[0])
+            self._groups.append(LocalGroup(group, renderer))
+            self._describe(group.envs[0], group.render_mode)
         else:
             self._describe_one(sub_env)
             self._start(sub_env, groups)
@@ -106,14 +107,14 @@ class SubEnvs:
             # Refuses a space that is not supported before any process starts.
             spaces.describe(one.observation_space)
             spaces.describe(one.action_space)
-            self._describe(one)
+            self._describe(one, one.render_mode)
         finally:
             self._renderer.run(one.close)
         self.draws_when_stepped = self.draws_in_process = False
 
-    def _describe(self, env: Any) -> None:
+    def _describe(self, env: Any, render_mode: str | None) -> None:
         self.metadata = {**(env.metadata or {}), "autoreset_mode": self.autoreset_mode}
-        self.render_mode = env.render_mode
+        self.render_mode = render_mode
         self.single_observation_space: Space = env.observation_space
         self.single_action_space: Space = env.action_space
         self.observation_space = batch_space(env.observation_space, self.num_envs)
@@ -178,7 +179,7 @@ class SubEnvs:
         self.ended[which] = False
         self._to_begin[which] = [-1 if seeds is None else len(seeds) for seeds in later]
         space = self.single_observation_space
-        observation = _join(space, [batch for batch, _ in results])
+        observation = join(space, [batch for batch, _ in results])
         if not with_infos:
             return observation, {}
         infos: list = [None] * self.num_envs
@@ -222,7 +223,7 @@ class SubEnvs:
         if outcomes[0].infos is not None:
             infos = [info for one in outcomes for info in one.infos or ()]
         return Outcome(
-            _join(self.single_observation_space, [one.observation for one in outcomes]),
+            join(self.single_observation_space, [one.observation for one in outcomes]),
             np.concatenate([one.reward for one in outcomes]),
             np.concatenate([one.terminated for one in outcomes]),
             np.concatenate([one.truncated for one in outcomes]),
@@ -262,7 +263,7 @@ class SubEnvs:
         """
         bounds = self._bounds if which is None else np.searchsorted(which, self._bounds).tolist()
 
-        def calls() -> Iterator[tuple[_LocalGroup | GroupProcess, str, tuple]]:
+        def calls() -> Iterator[tuple[LocalGroup | GroupProcess, str, tuple]]:
             for group, (first, last), start in zip(
                 self._groups, pairwise(bounds), self._bounds, strict=False
             ):
@@ -273,7 +274,7 @@ class SubEnvs:
 
         return self._wait_for(calls())
 
-    def _wait_for(self, calls: Iterator[tuple[_LocalGroup | GroupProcess, str, tuple]]) -> list:
+    def _wait_for(self, calls: Iterator[tuple[LocalGroup | GroupProcess, str, tuple]]) -> list:
         """Begin all calls, wait for all results; then raise the first error."""
         results = []
         begun = []
@@ -336,7 +337,7 @@ class SubEnvs:
             return
         self._is_closed = True
         for group in self._groups:
-            if isinstance(group, _LocalGroup):
+            if isinstance(group, LocalGroup):
                 self._renderer.run(group.close)
             else:
                 group.release()
@@ -372,26 +373,6 @@ class SubEnvs:
                 group.kill(why)
 
 
-class _LocalGroup:
-    """A group in this process, called as one in another process is."""
-
-    def __init__(self, group: Group, renderer: RenderThread) -> None:
-        self._group = group
-        self._renderer = renderer
-        self._call: Callable[[], Any] = lambda: None
-
-    def begin(self, method: str, *args: object) -> None:
-        self._call = lambda: getattr(self._group, method)(*args)
-        if method == "render":
-            self._call = lambda: self._renderer.run(self._group.render, *args)
-
-    def finish(self) -> Any:
-        return self._call()
-
-    def close(self) -> None:
-        self._group.close()
-
-
 def _bounds(num_envs: int, groups: int) -> list[int]:
     """Return where groups of nearly the same size begin, and the number of all."""
     return [num_envs * group // groups for group in range(groups + 1)]
@@ -403,24 +384,3 @@ def _seeds_of(seed: Any, num_envs: int) -> Sequence[int | Sequence[int] | None]:
     if isinstance(seed, int):
         return [seed + sub_env for sub_env in range(num_envs)]
     return list(seed)
-
-
-def _join(space: Space, batches: list) -> Any:
-    """Return batches of members of a space as one."""
-    if len(batches) == 1:
-        return batches[0]
-    match space:
-        case Tuple():
-            return tuple(
-                _join(part, [batch[index] for batch in batches])
-                for index, part in enumerate(space.spaces)
-            )
-        case Dict():
-            return {
-                key: _join(part, [batch[key] for batch in batches])
-                for key, part in space.spaces.items()
-            }
-        case _ if isinstance(space, ARRAYS):
-            return np.concatenate(batches)
-        case _:
-            return tuple(member for batch in batches for member in batch)
