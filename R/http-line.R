@@ -63,7 +63,7 @@ call_line <- function(client, line, content, call) {
   }
   sent <- list(key = key, number = number)
   response <- fetch(
-    client, connection, handle$curl, line$route, sent, !isTRUE(state$classic), call,
+    client, connection, handle, line$route, sent, !isTRUE(state$classic), call,
     received = attr(result, "unread")
   )
   response$key <- sent
