@@ -4,16 +4,17 @@
 # step. All in one run, turn by turn.
 #
 #   make bench              half an hour; writes vignettes/bench.csv, vignettes/bench.md,
-#                           man/figures/bench.png and man/figures/bench-environments.png
+#                           man/figures/bench.png, man/figures/bench-environments.png and
+#                           the figures in README.md
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
-# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts] [wire]
-#   [memory] runs parts.
+# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
+#   [wire] [memory] runs parts.
 
 library(gym)
 for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "tasks", "rollouts",
                "wire", "results", "goals", "table", "figure",
-               "figure-environments")) {
+               "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
 
@@ -129,3 +130,4 @@ report(
   environments = if (whole) "man/figures/bench-environments.png"
   else "pictures/bench-environments.png"
 )
+if (whole) write_readme(result$rows, result$run)

@@ -9,7 +9,7 @@ draw_environments <- function(rows, run, file) {
   draw_steps(rows)
   turns <- max(rows$turn[rows$part == "env_rollouts"])
   graphics::mtext(
-    sprintf("medians and ranges of the paired ratios of %.0f turns, %s", turns, run[["date"]]),
+    sprintf("medians and ranges of %.0f turns' ratios, %s", turns, run[["date"]]),
     side = 1L, outer = TRUE, line = -1, adj = 0.99, cex = 0.65, col = "grey40"
   )
 }
@@ -58,9 +58,14 @@ draw_rollouts <- function(rows) {
     draw_spread(line$reticulate, heights[i] - 0.12, reticulate_colour, 15L)
     draw_spread(line$gym, heights[i] + 0.12, gym_colour, 16L)
   }
-  graphics::title("rollout() by id, a linear policy, two cores", line = 2.6, adj = 0)
-  draw_key(c("gym, over HTTP", "reticulate in process", "goal"),
-           c(gym_colour, reticulate_colour, "grey50"), c(16L, 15L, 124L))
+  cores <- sub(".*, ([0-9]+) cores$", "\\1", rows$called[rows$part == "env_rollouts"][1L])
+  graphics::title(sprintf("rollout() by id, a linear policy, %s cores", cores), line = 2.6, adj = 0)
+  corner <- graphics::par("usr")
+  graphics::legend(
+    10^corner[1L], corner[4L], c("gym, over HTTP", "reticulate in process", "goal"),
+    col = c(gym_colour, reticulate_colour, "grey50"), pch = c(16L, 15L, 124L), bty = "n",
+    cex = 0.8, horiz = TRUE, xpd = NA, yjust = 0.1, pt.cex = 1.2
+  )
 }
 
 # The median as a point, the range as a line.
@@ -82,42 +87,33 @@ draw_scale <- function(heights, labels, values) {
   graphics::axis(2L, heights, labels, cex.axis = 0.8, tick = FALSE)
 }
 
-draw_key <- function(labels, colours, shapes) {
-  corner <- graphics::par("usr")
-  graphics::legend(
-    10^corner[1L], corner[4L], labels, col = colours, pch = shapes, bty = "n", cex = 0.8,
-    horiz = TRUE, xpd = NA, yjust = 0.1, pt.cex = 1.2, x.intersp = 0.7
-  )
-}
+# How the contenders for a step are drawn, by their names in wire_names.
+step_styles <- data.frame(
+  name = c("bare", "parsed", "gym", "isolated"),
+  label = c("the same bytes", "and parsed", "env$step()", "env$step(), isolated"),
+  colour = c("black", "grey50", gym_colour, "#CC79A7")
+)
 
 draw_steps <- function(rows) {
-  steps <- rows[rows$part == "wire", ]
-  sizes <- sort(unique(steps$num_envs))
+  sizes <- sort(unique(rows$num_envs[rows$part == "wire"]))
   heights <- rev(seq_along(sizes))
-  took <- function(name, num_envs) values_of(rows, "wire", wire_names[[name]], num_envs)
-  medians <- vapply(split(steps$value, paste(steps$contender, steps$num_envs)), stats::median, 0)
-  graphics::par(mar = c(5.5, 6, 4, 1))
-  graphics::plot(NA, log = "x", xlim = range(medians) * c(0.85, 1.2),
-                 ylim = c(0.5, length(sizes) + 0.5), xlab = "microseconds", ylab = "",
-                 axes = FALSE)
-  labels <- ifelse(sizes == 0, "single", paste0(format(sizes, big.mark = ",", trim = TRUE),
-                                                "\nsub-envs"))
-  draw_scale(heights, labels, range(medians) * c(0.85, 1.2))
-  names <- c(bare = "black", parsed = "grey50", gym = gym_colour, isolated = "#CC79A7")
+  took <- function(name, num_envs) {
+    stats::median(values_of(rows, "wire", wire_names[[name]], num_envs))
+  }
+  medians <- outer(step_styles$name, sizes, Vectorize(took))
+  limits <- range(medians, na.rm = TRUE) * c(0.85, 1.2)
+  graphics::par(mar = c(5.5, 4, 4, 1))
+  graphics::plot(NA, log = "x", xlim = limits, ylim = c(0.5, length(sizes) + 0.8),
+                 xlab = "microseconds", ylab = "", axes = FALSE)
+  labels <- ifelse(sizes == 0, "single", format(sizes, big.mark = ",", trim = TRUE))
+  draw_scale(heights, labels, limits)
+  graphics::segments(medians[1L, ], heights, medians[3L, ], heights, col = gym_colour)
   for (i in seq_along(sizes)) {
-    for (name in names(names)) {
-      values <- took(name, sizes[i])
-      draw_point(values, heights[i], names[[name]])
-    }
-    graphics::segments(stats::median(took("bare", sizes[i])), heights[i],
-                       stats::median(took("gym", sizes[i])), heights[i], col = gym_colour)
+    graphics::points(medians[, i], rep(heights[i], nrow(medians)), pch = 16L, cex = 1.4,
+                     col = step_styles$colour)
   }
-  graphics::title("one step of CartPole-v1", line = 2.6, adj = 0)
-  draw_key(c("bytes only", "and parsed", "env$step()", "isolated"), names, 16L)
-}
-
-draw_point <- function(values, height, colour) {
-  if (length(values)) {
-    graphics::points(stats::median(values), height, pch = 16L, col = colour, cex = 1.4)
-  }
+  graphics::title("a step of CartPole-v1", line = 2.6, adj = 0)
+  graphics::mtext("num_envs", adj = -0.15, line = 0.5, cex = 0.8)
+  graphics::legend("topright", step_styles$label, col = step_styles$colour, pch = 16L,
+                   bty = "n", cex = 0.8, pt.cex = 1.2)
 }

@@ -56,9 +56,7 @@ def vector(seconds: str, number: str, mode: str) -> float:
             return steps / elapsed
 
 
-def episodes(
-    env_id: str, kind: str, file: str, outputs: str, policies: str, number: str
-) -> float:
+def episodes(env_id: str, kind: str, file: str, outputs: str, policies: str, number: str) -> float:
     """Play whole episodes in one environment, one after the other."""
     played = make_policies(env_id, kind, file, int(outputs), int(policies))
     started = time.perf_counter()

@@ -4,8 +4,8 @@
 measured <- function(part, num_envs, contender, called, turn, value, unit,
                      env_id = "CartPole-v1") {
   data.frame(
-    part = part, env_id = env_id, num_envs = num_envs, contender = contender, called = called, turn = turn,
-    value = value, unit = unit
+    part = part, env_id = env_id, num_envs = num_envs, contender = contender, called = called,
+    turn = turn, value = value, unit = unit
   )
 }
 

@@ -86,18 +86,18 @@ paired <- function(part, task, name, called, play, warm_up = play) {
 
 rollout_contenders <- function(setup, task, episodes) {
   policy <- task_policy(task)
-  steps_a_second <- function(episodes) {
-    rate_of(function() play_by_id(task, policy, episodes, setup$client))
+  steps_a_second <- function(episodes, repeats = 1L) {
+    rate_of(function() sum(replicate(repeats, play_by_id(task, policy, episodes, setup$client))))
   }
   loop <- python_loop(setup$python, task, list(task_numbers(task)))
   c(
     list(
       paired("env_rollouts", task, rollout_names[["gym"]],
              sprintf("rollout(id, policy, %d)", episodes),
-             function() steps_a_second(episodes), function() steps_a_second(2L)),
+             function() steps_a_second(episodes, task$repeats), function() steps_a_second(2L)),
       paired("env_rollouts", task, rollout_names[["python"]],
              sprintf("env.step(a) in a loop, %d episodes", episodes),
-             function() loop(episodes), function() loop(2L))
+             function() mean(replicate(task$repeats, loop(episodes))), function() loop(2L))
     ),
     if (task$reticulate) lapply(setup$reticulate, reticulate_episodes, task),
     if (task$env_id == "FrozenLake-v1") list(steps_by_hand(setup, task))
@@ -154,8 +154,7 @@ reticulate_episodes <- function(worker, task) {
 steps_by_hand <- function(setup, task) {
   n <- 1024L
   env <- gym_make(task$env_id, num_envs = n, vectorization_mode = "sync", client = setup$client)
-  paired("env_rollouts", task, rollout_names[["by_hand"]], "env$step(random actions), sync",
-         function() rate_of(function() {
+  play <- function() {
     env$reset(seed = 1)
     ended <- logical(n)
     steps <- 0
@@ -164,7 +163,9 @@ steps_by_hand <- function(setup, task) {
       ended <- env$step(sample.int(task$outputs, n, replace = TRUE) - 1L)$done
     }
     steps
-  }))
+  }
+  paired("env_rollouts", task, rollout_names[["by_hand"]], "env$step(random actions), sync",
+         function() rate_of(play))
 }
 
 # An iteration of a search: 16 candidates, 2 episodes each. Short, so a turn has several.
@@ -174,19 +175,17 @@ candidate_contenders <- function(setup, task, candidates = 16L, episodes = 2L, i
   policies <- policy_candidates(task_policy(task), weights)
   loop <- python_loop(setup$python, task, numbers)
   called <- sprintf("%d candidates, %d episodes each", candidates, episodes)
+  play <- function() {
+    sum(vapply(seq_len(iterations), function(iteration) {
+      played <- rollout(task$env_id, policies, episodes, seed = iteration, client = setup$client)
+      sum(played$episodes$length)
+    }, 0))
+  }
   list(
-    paired("candidates", task, rollout_names[["gym"]], called, function() {
-      rate_of(function() {
-        sum(vapply(seq_len(iterations), function(iteration) {
-          played <- rollout(task$env_id, policies, episodes, seed = iteration,
-                            client = setup$client)
-          sum(played$episodes$length)
-        }, 0))
-      })
-    }),
+    paired("candidates", task, rollout_names[["gym"]], called, function() rate_of(play)),
     # The same steps again and again: the rate of several iterations is that of one.
     paired("candidates", task, rollout_names[["python"]], called, function() {
-      mean(vapply(seq_len(iterations), function(iteration) loop(episodes), 0))
+      mean(replicate(iterations, loop(episodes)))
     })
   )
 }
@@ -198,9 +197,9 @@ worker_contenders <- function(setup, task, episodes, num_envs = 128L) {
     env <- gym_make(
       task$env_id, num_envs = num_envs, num_workers = num_workers, client = setup$client
     )
+    play <- function() sum(rollout(env, policy, episodes, seed = 1)$episodes$length)
     paired("workers", task, sprintf(rollout_names[["workers"]], num_workers),
-           sprintf("%d sub-environments, %d episodes", num_envs, episodes), function() {
-      rate_of(function() sum(rollout(env, policy, episodes, seed = 1)$episodes$length))
-    })
+           sprintf("%d sub-environments, %d episodes", num_envs, episodes),
+           function() rate_of(play))
   })
 }

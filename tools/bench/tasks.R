@@ -5,16 +5,17 @@
 # tanh() of each output to the action's bounds, `table` has an action for each observation, `cards`
 # takes a card below 17.
 task <- function(env_id, kind, inputs = 0L, outputs = 0L, episodes = 512L, quick = 512L,
-                 goal = NA, reticulate = FALSE, stack = FALSE) {
+                 goal = NA, reticulate = FALSE, stack = FALSE, repeats = 1L) {
   list(
     env_id = env_id, kind = kind, inputs = inputs, outputs = outputs, episodes = episodes,
-    quick = quick, goal = goal, reticulate = reticulate, stack = stack
+    quick = quick, goal = goal, reticulate = reticulate, stack = stack,
+    repeats = repeats
   )
 }
 
 # `goal` is how many times as fast as Python's loop rollout() is to be. Pong plays fewer episodes
-# than the others, because one takes a sixth of a second in Python; a quick run fewer of all that
-# are long.
+# than the others, because one takes most of a second in Python; a quick run fewer of all that
+# are long. What is over in some milliseconds is played `repeats` times in a turn.
 tasks <- list(
   task("LunarLander-v3", "discrete", 8L, 4L, quick = 128L, goal = 1.3, reticulate = TRUE),
   task("BipedalWalker-v3", "box", 24L, 4L, quick = 128L, goal = 1.3, reticulate = TRUE),
@@ -24,9 +25,9 @@ tasks <- list(
        reticulate = TRUE, stack = TRUE),
   task("Pendulum-v1", "box", 3L, 1L, quick = 64L, goal = 0.8),
   task("MountainCar-v0", "discrete", 2L, 3L, quick = 64L, goal = 0.8),
-  task("FrozenLake-v1", "table", 16L, 4L, goal = 0.5),
+  task("FrozenLake-v1", "table", 16L, 4L, goal = 0.5, repeats = 5L),
   task("Taxi-v4", "table", 500L, 6L, quick = 64L, goal = 0.5),
-  task("Blackjack-v1", "cards", goal = 0.5)
+  task("Blackjack-v1", "cards", goal = 0.5, repeats = 5L)
 )
 names(tasks) <- vapply(tasks, function(task) task$env_id, "")
 
