@@ -86,15 +86,15 @@ paired <- function(part, task, name, called, play, warm_up = play) {
 
 rollout_contenders <- function(setup, task, episodes) {
   policy <- task_policy(task)
-  steps_a_second <- function(episodes, repeats = 1L) {
-    rate_of(function() sum(replicate(repeats, play_by_id(task, policy, episodes, setup$client))))
-  }
+  play <- function(...) play_by_id(task, policy, episodes, setup$client, ...)
   loop <- python_loop(setup$python, task, list(task_numbers(task)))
   c(
     list(
       paired("env_rollouts", task, rollout_names[["gym"]],
              sprintf("rollout(id, policy, %d)", episodes),
-             function() steps_a_second(episodes, task$repeats), function() steps_a_second(2L)),
+             function() rate_of(function() sum(replicate(task$repeats, play()))),
+             # As many episodes, so that all worker processes run, but short ones.
+             function() play(max_steps = 2)),
       paired("env_rollouts", task, rollout_names[["python"]],
              sprintf("env.step(a) in a loop, %d episodes", episodes),
              function() mean(replicate(task$repeats, loop(episodes))), function() loop(2L))
@@ -111,15 +111,15 @@ rate_of <- function(play) {
   steps / (now() - started)
 }
 
-play_by_id <- function(task, policy, episodes, client) {
+play_by_id <- function(task, policy, episodes, client, max_steps = NULL) {
   env_id <- task$env_id
   played <- if (task$stack) {
     env_id |>
       gym_wrap("AtariPreprocessing") |>
       gym_wrap("FrameStackObservation", stack_size = 4) |>
-      rollout(policy, episodes, seed = 1, client = client, frameskip = 1)
+      rollout(policy, episodes, max_steps, seed = 1, client = client, frameskip = 1)
   } else {
-    rollout(env_id, policy, episodes, seed = 1, client = client)
+    rollout(env_id, policy, episodes, max_steps, seed = 1, client = client)
   }
   sum(played$episodes$length)
 }
