@@ -28,10 +28,13 @@ def row(info, index):
     }
 
 
+@pytest.mark.parametrize("num_workers", [0, 3])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Text", "Sequence"])
-def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(client, sub_envs, kind, mode):
-    url = sub_envs(kind, num_envs=4, autoreset_mode=mode, vectorization_mode="sync")
+def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(
+    client, sub_envs, kind, mode, num_workers
+):
+    url = sub_envs(kind, num_envs=4, autoreset_mode=mode, num_workers=num_workers)
     alone = [twin(kind, num_envs=1, autoreset_mode=mode) for _ in range(4)]
     post(client, url, "reset", seed=20)
     for sub_env, env in enumerate(alone):
@@ -150,18 +153,19 @@ def test_what_is_no_mask_for_these_sub_envs_is_refused(client, sub_envs, route, 
     check_that_no_sub_env_moved(client, url, "Discrete", seed=1)
 
 
-def test_what_an_implementation_has_not_is_refused(client, create, sub_envs):
-    own, processes = create(num_envs=3), sub_envs("Discrete", vectorization_mode="async")
-    for url in (own, processes):
-        post(client, url, "reset", seed=1)
+def test_what_an_implementation_has_not_is_refused(client, create):
+    own = create(num_envs=3)
+    before = post(client, own, "reset", seed=1)
     refused = client.post(f"{own}/reset/", json={"reset_mask": [True] * 3}).json
     assert refused["code"] == "not_supported"
     assert refused["hint"] == "create the environment with vectorization_mode 'sync'"
     assert refusal(client, own, "reset", seed=[1, 2, 3])[0] == "not_supported"
-    for url in (own, processes):
-        code, _ = refusal(client, url, "step", action=[0] * 3, step_mask=[True] * 3)
-        assert code == "not_supported"
-    check_that_no_sub_env_moved(client, processes, "Discrete", seed=1)
+    assert refusal(client, own, "reset", seed=[[1, 2], 2, 3])[0] == "not_supported"
+    code, _ = refusal(client, own, "step", action=[0] * 3, step_mask=[True] * 3)
+    assert code == "not_supported"
+    again = create(num_envs=3)
+    assert post(client, again, "reset", seed=1) == before
+    assert post(client, own, "step", action=[0] * 3) == post(client, again, "step", action=[0] * 3)
 
 
 def test_a_mask_in_the_options_is_refused(client, sub_envs):

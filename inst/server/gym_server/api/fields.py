@@ -62,6 +62,29 @@ def _seed(value: object) -> int | tuple[int | None, ...]:
         raise invalid_parameter("seed", value, wanted) from None
 
 
+def _reset_seed(value: object) -> int | tuple[int | tuple[int, ...] | None, ...]:
+    if not isinstance(value, list) or not any(isinstance(item, list) for item in value):
+        return _seed(value)
+    try:
+        return tuple(_later_seeds(item) if isinstance(item, list) else _own(item) for item in value)
+    except ValueError:
+        wanted = (
+            "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
+            "sub-environment"
+        )
+        raise invalid_parameter("seed", value, wanted) from None
+
+
+def _own(value: object) -> int | None:
+    return None if value is None else _one_seed(value)
+
+
+def _later_seeds(values: list) -> tuple[int, ...]:
+    if not values:
+        raise ValueError
+    return tuple(map(_one_seed, values))
+
+
 def _one_seed(value: object) -> int:
     # A classic client may count with what it calls true and false.
     return int(value) if isinstance(value, bool) else integer(value)
@@ -146,6 +169,30 @@ SEED = Kind(
     "an integer, 0 or greater",
     _seed,
 )
+RESET_SEED = Kind(
+    {
+        "oneOf": [
+            {"type": ["integer", "boolean"], "minimum": 0},
+            {
+                "type": "array",
+                "items": {
+                    "oneOf": [
+                        {"type": ["integer", "boolean", "null"], "minimum": 0},
+                        {
+                            "type": "array",
+                            "items": {"type": ["integer", "boolean"], "minimum": 0},
+                            "minItems": 1,
+                        },
+                    ]
+                },
+                "minItems": 1,
+            },
+        ]
+    },
+    "an integer, 0 or greater",
+    _reset_seed,
+)
+NUM_WORKERS = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 MASK = Kind(
     {"type": "array", "items": {"type": "boolean"}, "minItems": 1},
     "a list of true or false for each sub-environment",

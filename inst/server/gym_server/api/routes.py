@@ -53,6 +53,12 @@ ROUTES = Table()
         "What runs the sub-environments; absent for the fastest that can do what is asked.",
     ),
     Field(
+        "num_workers",
+        fields.NUM_WORKERS,
+        "How many processes run the sub-environments; 0 for the server's own, absent to let the "
+        "server choose.",
+    ),
+    Field(
         "autoreset_mode",
         fields.AUTORESET_MODE,
         "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
@@ -112,9 +118,10 @@ def env_about(call: Call) -> dict:
     INSTANCE + "reset/",
     Field(
         "seed",
-        fields.SEED,
+        fields.RESET_SEED,
         "Seeds the environment and its action space; with sub-environments also a list of one for "
-        "each.",
+        "each. One of these may be a list: the first for now, the others for the episodes that the "
+        "sub-environment begins by itself; after these it begins none.",
     ),
     Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),

@@ -13,7 +13,7 @@ from gym_server.viewing.watchable import Moves
 if TYPE_CHECKING:
     import numpy as np
 
-Seed = int | tuple[int | None, ...] | None
+Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
 
 class Backend(Protocol):

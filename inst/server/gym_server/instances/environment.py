@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-import gymnasium
 from gymnasium.spaces import Space
-from gymnasium.vector import VectorEnv
 
 from gym_server.envs.config import EnvConfig
+from gym_server.errors import GymServerError
 from gym_server.instances.episode_statistics import Statistics
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ class Environment(Protocol):
         single_observation_space: of an observation of one sub-environment.
         statistics: of its episodes.
         vectorization_mode: what runs the sub-environments; None for a single environment.
+        num_workers: how many processes run them; None for a single environment, and for an
+            implementation of the environment's own.
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
@@ -41,6 +43,7 @@ class Environment(Protocol):
     single_observation_space: Space
     statistics: Statistics
     vectorization_mode: str | None
+    num_workers: int | None
     autoreset_mode: str | None
     draws_when_stepped: bool
     draws_on_render_thread: bool
@@ -73,8 +76,8 @@ class Environment(Protocol):
     def check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Step some sub-environments."""
+    def step(self, which: np.ndarray | None, actions: Any) -> tuple:
+        """Step the environment, or some sub-environments."""
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
@@ -127,11 +130,14 @@ class Environment(Protocol):
     def close(self) -> None:
         """Close it."""
 
-    def kill(self) -> None:
-        """Kill the processes that it runs in, if it has any."""
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when a process that it runs in ends by itself, or if it has."""
+
+    def kill(self, why: GymServerError) -> None:
+        """Kill the processes that it runs in, if it has any; the reason is for calls that wait."""
 
 
-def env_id_of(config: EnvConfig, gym_env: gymnasium.Env | VectorEnv) -> str:
+def env_id_of(config: EnvConfig, gym_env: Any) -> str:
     """Return what an environment can be created by again: its module, and the version found."""
     module, colon, name = str(config.env_id).rpartition(":")
     return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"

@@ -59,19 +59,19 @@ class LocalBackend:
         self.draws_when_stepped = env.draws_when_stepped
         self.draws_on_render_thread = env.draws_on_render_thread
         self._monitor: Monitor | None = None
-        self._seed_for_reset = config.seed
+        self._seed_for_reset: Seed = config.seed
         self._was_reset = False
         self._observation: object = None
         self._max_episode_steps = time_limit(env.gym_env)
         if config.seed is not None:
             self._seed_actions(config.seed)
 
-    def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
+    def _seed_actions(self, seed: Seed) -> None:
         # One generator serves all sub-environments.
         seeds = seed if isinstance(seed, tuple) else (seed,)
         first = next((one for one in seeds if one is not None), None)
         if first is not None:
-            self.env.action_space.seed(first)
+            self.env.action_space.seed(first[0] if isinstance(first, tuple) else first)
 
     # Moves ----------------------------------------------------------------------------------
 
@@ -121,12 +121,10 @@ class LocalBackend:
         self, action: object, which: np.ndarray | None, rows: int | None, tensors: bool
     ) -> dict:
         env = self.env
-        if which is not None:
-            outcome = self._move(env.step_some, which, action)
-        elif self._monitor is not None:
+        if self._monitor is not None:
             outcome = self._move(self._monitor.step, action)
         else:
-            outcome = self._move(env.gym_env.step, action)
+            outcome = self._move(env.step, which, action)
         observation, reward, terminated, truncated, info = outcome
         reward, terminated, truncated, done = env.read_outcome(which, reward, terminated, truncated)
         self.steps += rows or 1
@@ -223,6 +221,7 @@ class LocalBackend:
             "max_episode_steps": self._max_episode_steps,
             "render_fps": plain((gym_env.metadata or {}).get("render_fps")),
             "vectorization_mode": self.env.vectorization_mode,
+            "num_workers": self.env.num_workers,
             "autoreset_mode": self.env.autoreset_mode,
             "render_mode": config.render_mode or gym_env.render_mode,
             "kwargs": config.kwargs or {},
@@ -235,7 +234,8 @@ class LocalBackend:
         }
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Do nothing: this process does not end by itself."""
+        """From now on report when a process of sub-environments ends by itself."""
+        self.env.report_end(on_end)
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -283,7 +283,7 @@ class LocalBackend:
 
     def kill(self, why: GymServerError) -> None:
         """Kill the processes of sub-environments, which ends what hangs in them."""
-        self.env.kill()
+        self.env.kill(why)
 
     def close_abandoned(self) -> None:
         """Close what was abandoned, once the call that took too long has come back."""

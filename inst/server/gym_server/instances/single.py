@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -11,6 +12,7 @@ from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
@@ -24,6 +26,7 @@ class SingleEnvironment:
     """A single environment; see ``Environment`` for the methods."""
 
     vectorization_mode: str | None = None
+    num_workers: int | None = None
     autoreset_mode: str | None = None
     fails_as_a_whole = False
 
@@ -61,9 +64,10 @@ class SingleEnvironment:
     def check_running(self, which: np.ndarray | None) -> None:
         """Leave it to the environment what comes after an episode's end."""
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Refuse: there are no sub-environments to select."""
-        raise NotImplementedError
+    def step(self, which: np.ndarray | None, actions: Any) -> tuple:
+        """Step the environment."""
+        outcome: tuple = self.gym_env.step(actions)
+        return outcome
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
@@ -120,5 +124,8 @@ class SingleEnvironment:
         """Close the environment on the render thread."""
         self._renderer.run(self.gym_env.close)
 
-    def kill(self) -> None:
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Do nothing: this process does not end by itself."""
+
+    def kill(self, why: GymServerError) -> None:
         """Do nothing: it runs in this process."""

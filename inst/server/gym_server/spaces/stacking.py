@@ -58,3 +58,15 @@ def _(space: Tuple, batch: tuple) -> list:
 def _(space: Dict, batch: dict) -> list:
     parts = [unstack(part, batch[key]) for key, part in space.spaces.items()]
     return [dict(zip(space.spaces, member, strict=True)) for member in zip(*parts, strict=True)]
+
+
+def member_of(space: Space, batch: Any, row: int) -> object:
+    """Return one member of a batch as Gymnasium's vector environments have it."""
+    match space:
+        case Dict():
+            return {key: member_of(part, batch[key], row) for key, part in space.spaces.items()}
+        case Tuple():
+            parts = zip(space.spaces, batch, strict=True)
+            return tuple(member_of(part, items, row) for part, items in parts)
+        case _:
+            return batch[row]

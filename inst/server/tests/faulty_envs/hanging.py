@@ -1,5 +1,6 @@
 """Environments that take long, or never return."""
 
+import multiprocessing
 import os
 import time
 from pathlib import Path
@@ -83,3 +84,11 @@ class Spins(Counting):
 
     def close(self):
         self.spin("close")
+
+
+class HangsWhenClosedElsewhere(Counting):
+    """Hangs when it is closed in a process that another one has started."""
+
+    def close(self):
+        if multiprocessing.parent_process() is not None:
+            time.sleep(3600)

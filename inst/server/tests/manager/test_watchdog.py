@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from conftest import ServerProcess, created
 from faulty_envs import HangsWhere
+from running import is_running
 
 from gym_server.manager.limits import Limits
 
@@ -169,13 +170,13 @@ def test_sub_envs_in_processes_end_with_it(quick, eventually):
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}
     url = created(client, "faulty_envs:Hanging-v0", **fields)
-    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.processes
+    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.pids
     client.post(f"{url}/reset/")
     # Their start takes its time.
     app._watchdog._limits = Limits(max_call_seconds=0.2)
     answer = client.post(f"{url}/step/", json={"action": [0, 0]})
     assert (answer.status_code, answer.json["code"]) == (504, "call_too_long")
-    eventually(lambda: not any(map(is_alive, processes)))
+    eventually(lambda: not any(map(is_running, processes)))
 
 
 def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
@@ -216,14 +217,6 @@ def test_what_is_slow_but_not_too_slow_delays_nobody(serve):
 
 
 # Without HTTP --------------------------------------------------------------------------------
-
-
-def is_alive(process):
-    try:
-        return process.is_alive()
-    except ValueError:
-        # It is closed already.
-        return False
 
 
 def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, eventually):
