@@ -51,6 +51,8 @@
 #'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, which is what
 #'       the step led to. `observation` is the same, but where another episode began in this step:
 #'       there it is the first one of that episode.}
+#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, where that is quicker;
+#'       otherwise `NULL`.}
 #'     \item{frame()}{A function that returns the current frame as the bytes of a PNG file; `NULL`
 #'       where no frames are wanted.}
 #'     \item{remembers}{The names of wrappers that remember something over episodes, strings; then
@@ -216,16 +218,46 @@ independent_sub_envs <- function(env) {
     was_reset <<- TRUE
     batch_rows(space, observation, which)
   }
+  step <- function(action, which) {
+    out <- take_step(env, length(which), action, if (length(which) < n) which)
+    out$next_observation <- out$next_observation %||% out$observation
+    out
+  }
+  begins_next <- !is.null(env$num_workers) && identical(env$autoreset_mode, "SameStep")
   list(
     observation_space = space, action_space = env$single_action_space, num_envs = n,
-    one_seed = FALSE, reset = reset,
-    begins_next = !is.null(env$num_workers) && identical(env$autoreset_mode, "SameStep"),
-    step = function(action, which) {
-      out <- take_step(env, length(which), action, if (length(which) < n) which)
-      out$next_observation <- out$next_observation %||% out$observation
-      out
-    }
+    one_seed = FALSE, reset = reset, begins_next = begins_next, step = step,
+    step_bare = if (begins_next) bare_stepper(env)
   )
+}
+
+# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those that
+# rest are stepped along, which changes nothing: a request for others is another request, which has
+# to be prepared. When fewer than half of them still play, the others are left out.
+bare_stepper <- function(env) {
+  n <- env$num_envs
+  observed <- env$single_observation_space
+  actions <- env$single_action_space
+  stepped <- NULL
+  function(action, which) {
+    playing <- length(which)
+    if (playing == n) {
+      stepped <<- NULL
+      return(take_step(env, n, action, finals = FALSE))
+    }
+    all <- stepped %||% seq_len(n)
+    row <- match(which, all)
+    if (anyNA(row) || 2L * playing <= length(all)) {
+      stepped <<- which
+      return(take_step(env, playing, action, which, finals = FALSE))
+    }
+    action <- actions_of_all(actions, action, row, length(all))
+    out <- take_step(env, length(all), action, stepped, finals = FALSE)
+    list(
+      observation = batch_rows(observed, out$observation, row), reward = out$reward[row],
+      terminated = out$terminated[row], truncated = out$truncated[row]
+    )
+  }
 }
 
 # With "vector_entry_point" one generator serves all sub-environments, so there is one seed for all.

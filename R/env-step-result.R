@@ -13,10 +13,11 @@ begin_all <- function(env, seeds) {
 #' Take a step, and check what it returns where a user has written the environment
 #' @param n How many sub-environments step.
 #' @param which The numbers of these, `NULL` for all.
+#' @param finals Whether `next_observation` is wanted.
 #' @noRd
-take_step <- function(env, n, action, which = NULL) {
+take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   if (is_server_env(env)) {
-    return(step_bare(env, action, which))
+    return(step_bare(env, action, which, finals))
   }
   out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
   if (!inherits(env, "gym_r_env")) {

@@ -53,14 +53,16 @@ reset_line <- function(client, instance, named, infos) {
 
 #' Take a step
 #' @inheritParams reset_instance
+#' @param finals Whether the server is to send the last observations of episodes after which another
+#'   one began.
 #' @noRd
 step_instance <- function(client, instance, action, render, which = NULL, named = FALSE,
-                          infos = TRUE, call = rlang::caller_env()) {
-  slot <- 1L + named + 2L * infos + 4L * render
+                          infos = TRUE, finals = TRUE, call = rlang::caller_env()) {
+  slot <- 1L + named + 2L * infos + 4L * render + 8L * finals
   line <- instance$step_lines[[slot]]
   if (is.null(line) || !identical(line$which, which)) {
     check_which(which, instance, call)
-    line <- step_line(client, instance, render, which, named, infos)
+    line <- step_line(client, instance, render, which, named, infos, finals)
     instance$step_lines[[slot]] <- line
   }
   result <- call_line(client, line, line$write(action) %||% line$check(action, call), call)
@@ -74,8 +76,11 @@ step_instance <- function(client, instance, action, render, which = NULL, named 
   result
 }
 
-step_line <- function(client, instance, render, which, named, infos) {
-  fields <- c(render = if (render) "true" else "false", bare_fields(instance, infos))
+step_line <- function(client, instance, render, which, named, infos, finals) {
+  fields <- c(
+    render = if (render) "true" else "false", bare_fields(instance, infos),
+    final_obs = if (!finals && !instance$classic) "false"
+  )
   n <- instance$num_envs
   line <- if (is.null(n)) {
     single_step_line(client, instance, fields, named)
@@ -253,6 +258,8 @@ info_from <- function(instance, answer) {
 #' @param seeds A seed for each of `which`, or a list with a vector of seeds for each: the first for
 #'   now, the others for the episodes that the sub-environment begins by itself.
 #' @param which The numbers of the sub-environments, in increasing order; `NULL` for all.
+#' @param finals Whether `next_observation` has the last observations of episodes after which another
+#'   one began. Without them all answers have one form, which is read more quickly.
 #' @return `reset_bare()` the first observations, a row for each of `which`; `step_bare()` what
 #'   `$step()` returns, with an empty info.
 #' @noRd
@@ -276,10 +283,11 @@ reset_bare <- function(env, seeds, which = NULL, call = rlang::caller_env()) {
   if (some) batch_rows(instance$single_observation_space, observation, which) else observation
 }
 
-step_bare <- function(env, action, which = NULL, call = rlang::caller_env()) {
+step_bare <- function(env, action, which = NULL, finals = TRUE, call = rlang::caller_env()) {
   instance <- open_instance(env, call)
   step_instance(
-    env$client, instance, action, FALSE, which, named = TRUE, infos = FALSE, call = call
+    env$client, instance, action, FALSE, which, named = TRUE, infos = FALSE, finals = finals,
+    call = call
   )
 }
 

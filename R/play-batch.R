@@ -57,7 +57,7 @@ naming_call <- function(code, vector_env) {
   withCallingHandlers(
     code,
     gym_error = function(cnd) {
-      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(vector_env$step))) {
+      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(step))) {
         cnd["call"] <- list(rlang::error_call(vector_env$call))
         rlang::cnd_signal(cnd)
       }
@@ -77,10 +77,11 @@ play_episodes <- function(vector_env, batch, first, last, policy, max_steps, kee
   ask_beforehand(policy, batch, episode, observation, vector_env)
   candidate <- batch$candidate[episode]
   acting <- policy_rows(policy, candidate)
+  step <- if (keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
   taken <- 0L
   repeat {
     action <- act_batch(acting, observation, length(rows$episode), vector_env)
-    out <- vector_env$step(action, rows$sub_env)
+    out <- step(action, rows$sub_env)
     taken <- taken + 1L
     keep_frame(batch, vector_env, rows$episode)
     rows$return <- rows$return + out$reward

@@ -190,3 +190,36 @@ def test_a_list_of_seeds_for_a_single_environment_is_refused(client, create):
     code, message = refusal(client, create(), "reset", seed=[5])
     assert code == "invalid_parameter"
     assert message == "The parameter 'seed' must be an integer, 0 or greater, not [5]"
+
+
+@pytest.mark.parametrize("num_workers", [0, 2])
+def test_sub_envs_rest_when_their_seeds_are_used_up(client, sub_envs, num_workers):
+    url = sub_envs(autoreset_mode="SameStep", num_workers=num_workers)
+    post(client, url, "reset", seed=[[1, 2], [3], [4]])
+    action = np.zeros((3, 2, 3)).tolist()
+    steps, ended = 0, np.zeros(3, dtype=int)
+    while ended.tolist() != [2, 1, 1]:
+        steps += int((ended < [2, 1, 1]).sum())
+        answer = post(client, url, "step", action=action, final_obs=False)
+        assert "final_obs" not in answer
+        ended += answer["done"]
+    after = post(client, url, "step", action=action)
+    assert (after["observation"], after["reward"]) == (answer["observation"], [0.0] * 3)
+    assert after["done"] == [False] * 3
+    about = client.get(url).json
+    assert (about["steps"], about["needs_reset"]) == (steps, True)
+    post(client, url, "reset", seed=9, reset_mask=[False, True, False])
+    assert post(client, url, "step", action=action)["reward"][1] != 0
+
+
+def test_seeds_for_later_need_episodes_that_begin_by_themselves(client, sub_envs):
+    code, message = refusal(
+        client, sub_envs(autoreset_mode="Disabled"), "reset", seed=[[1, 2], 3, 4]
+    )
+    assert code == "invalid_parameter"
+    assert "autoreset_mode 'Disabled'" in message
+    url = sub_envs(autoreset_mode="SameStep")
+    for seed in ([[], 1, 2], [[-1], 1, 2], [["1"], 1, 2]):
+        code, message = refusal(client, url, "reset", seed=seed)
+        assert code == "invalid_parameter"
+        assert "'seed' must be an integer, 0 or greater, or a list of one, null, or" in message

@@ -66,6 +66,8 @@ class Call(NamedTuple):
     def wanted_form(self) -> AnswerForm:
         """What the client wants of the answer, on a route that has the field ``info``."""
         form = self.form
-        if self.fields["info"] is False:
-            return AnswerForm(form.tensors, form.by_column, infos=False)
-        return form
+        infos = self.fields["info"] is not False
+        finals = self.fields.get("final_obs") is not False
+        if infos and finals:
+            return form
+        return AnswerForm(form.tensors, form.by_column, infos, finals)

@@ -211,6 +211,12 @@ MASK = Kind(
 QUERY_INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _query_integer)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
+FINAL_OBS = Field(
+    "final_obs",
+    BOOLEAN,
+    "Whether the last observations of episodes after which another one began are sent (the "
+    "default).",
+)
 INFO = Field(
     "info", BOOLEAN, "Whether infos are made and sent (the default); with false they are empty."
 )

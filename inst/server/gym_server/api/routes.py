@@ -119,7 +119,8 @@ def env_about(call: Call) -> dict:
         fields.RESET_SEED,
         "Seeds the environment and its action space; with sub-environments also a list of one for "
         "each. One of these may be a list: the first for now, the others for the episodes that the "
-        "sub-environment begins by itself; after these it begins none.",
+        "sub-environment begins by itself. After the last one it rests: in a step it returns its "
+        "last observation and the reward 0.",
     ),
     Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
@@ -157,6 +158,7 @@ def env_reset(call: Call) -> dict | Ready:
     ),
     Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
     fields.INFO,
+    fields.FINAL_OBS,
     answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
     "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
     "reset at once",

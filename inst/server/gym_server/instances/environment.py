@@ -91,6 +91,9 @@ class Environment(Protocol):
     ) -> tuple[Any, Any, Any, Any]:
         """Return reward, terminated, truncated and done in their types; remember the last."""
 
+    def count(self, which: np.ndarray | None, reward: Any, done: Any) -> int:
+        """Count a step in the statistics, and return how many sub-environments took part in it."""
+
     def answer(
         self,
         observation: object,

@@ -112,16 +112,14 @@ class LocalBackend:
         decoded = self._actions.read(action, rows)
         self.env.check_running(which)
         try:
-            return ask(self._step, decoded, which, rows, form)
+            return ask(self._step, decoded, which, form)
         except GymServerError as failure:
             if self.env.fails_as_a_whole:
                 self._was_reset = False
             self._actions.explain(failure, action, rows)
             raise
 
-    def _step(
-        self, action: object, which: np.ndarray | None, rows: int | None, form: AnswerForm
-    ) -> dict:
+    def _step(self, action: object, which: np.ndarray | None, form: AnswerForm) -> dict:
         env = self.env
         if self._monitor is not None:
             outcome = self._move(self._monitor.step, action)
@@ -129,8 +127,7 @@ class LocalBackend:
             outcome = self._move(env.step, which, action, form.infos)
         observation, reward, terminated, truncated, info = outcome
         reward, terminated, truncated, done = env.read_outcome(which, reward, terminated, truncated)
-        self.steps += rows or 1
-        env.statistics.step(reward, done, which)
+        self.steps += env.count(which, reward, done)
         self._observation = observation
         return env.answer(observation, reward, terminated, truncated, done, info, form)
 

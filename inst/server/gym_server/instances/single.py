@@ -79,6 +79,11 @@ class SingleEnvironment:
         self.has_ended = done = terminated or truncated
         return float(reward), terminated, truncated, done
 
+    def count(self, which: np.ndarray | None, reward: float, done: bool) -> int:
+        """Count a step, and return 1."""
+        self.statistics.step(reward, done, None)
+        return 1
+
     def answer(
         self,
         observation: object,

@@ -143,6 +143,8 @@ class VectorEnvironment:
 
     def check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
+        if self.gym_env.autoreset_mode is not AutoresetMode.DISABLED:
+            return
         waiting = self.gym_env.ended
         ended = np.flatnonzero(waiting) if which is None else which[waiting[which]]
         if len(ended):
@@ -165,6 +167,15 @@ class VectorEnvironment:
         terminated = np.asarray(terminated, dtype=bool)
         truncated = np.asarray(truncated, dtype=bool)
         return _reward(reward), terminated, truncated, terminated | truncated
+
+    def count(self, which: np.ndarray | None, reward: np.ndarray, done: np.ndarray) -> int:
+        """Count a step of those that took part in it; return how many they are."""
+        moved = self.gym_env.moved
+        if moved is not None:
+            which = np.flatnonzero(moved) if which is None else which[moved]
+            reward, done = reward[moved], done[moved]
+        self.statistics.step(reward, done, which)
+        return len(reward)
 
     def answer(
         self,
@@ -199,6 +210,8 @@ class VectorEnvironment:
         if "final_obs" not in info:
             return {}
         final, which = info.pop("final_obs"), info.pop("_final_obs")
+        if not form.finals:
+            return {}
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {

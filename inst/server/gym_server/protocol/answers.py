@@ -44,11 +44,13 @@ class AnswerForm(NamedTuple):
         tensors: whether observations are tensors, where their space can travel so.
         by_column: whether these are transposed, see ``COLUMN_TENSORS``.
         infos: whether there are infos; without them an answer has an empty one.
+        finals: whether there are the last observations of episodes after which another one began.
     """
 
     tensors: bool = False
     by_column: bool = False
     infos: bool = True
+    finals: bool = True
 
 
 JSON_FORM = AnswerForm()

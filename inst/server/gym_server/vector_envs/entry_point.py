@@ -26,6 +26,7 @@ class EntryPointEnv:
     draws_when_stepped = False
     draws_in_process = True
     num_workers = None
+    moved = None
 
     def __init__(self, env: VectorEnv, renderer: RenderThread) -> None:
         """Take over an environment.

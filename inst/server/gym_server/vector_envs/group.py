@@ -86,6 +86,8 @@ class Group:
         self.render_mode = self._render_modes[0] or self.envs[0].render_mode
         self._steps = [env.step for env in self.envs]
         self._last: list[object] = [None] * len(numbers)
+        # These have played all episodes that they had seeds for, and move no more.
+        self._rests = [False] * len(numbers)
         # The next move of these begins an episode, with mode NEXT_STEP.
         self._ended = [False] * len(numbers)
         # The seeds of the episodes that they begin by themselves, the next one last; None for
@@ -117,7 +119,7 @@ class Group:
             which: their places in this group.
             seeds: theirs.
             later: for each the seeds of the episodes that it begins by itself after this one, and
-                none after these; None for episodes without seeds, one after the other.
+                then it rests; None for episodes without seeds, one after the other.
             options: the environment's own.
 
         Returns:
@@ -128,7 +130,7 @@ class Group:
             with self._naming(index):
                 self._last[index], info = self.envs[index].reset(seed=seed, options=options)
             infos.append(Info(info))
-            self._ended[index] = False
+            self._ended[index] = self._rests[index] = False
             self._seeds[index] = None if seeds_later is None else list(reversed(seeds_later))
         return stack_observations(self._observation_space, self._last), infos
 
@@ -138,30 +140,38 @@ class Group:
         """Step some of them.
 
         Args:
-            which: their places in this group, in increasing order; None for all.
+            which: their places in this group, in increasing order; None for all. One that rests
+                returns its last observation and the reward 0.
             actions: one for each of them.
             with_infos: whether infos are wanted.
         """
         which = range(len(self.envs)) if which is None else which
-        steps, last, ended = self._steps, self._last, self._ended
+        steps, last, ended, rests = self._steps, self._last, self._ended, self._rests
         reward = np.zeros(len(which))
         terminated = np.zeros(len(which), dtype=bool)
         truncated = np.zeros(len(which), dtype=bool)
         final: dict[int, object] = {}
         infos: list[Info] = []
+        info: dict
         index = 0
         try:
             for row, (index, action) in enumerate(zip(which, actions, strict=True)):
                 final_info = None
-                if ended[index]:
+                if rests[index]:
+                    info = {}
+                elif ended[index]:
                     ended[index] = False
                     last[index], info = self._begin_next(index)
                 else:
                     last[index], reward[row], terminated[row], truncated[row], info = steps[index](
                         action
                     )
-                    if (terminated[row] or truncated[row]) and self._begins_another(index):
-                        if self._mode is AutoresetMode.NEXT_STEP:
+                    if terminated[row] or truncated[row]:
+                        if self._mode is AutoresetMode.DISABLED:
+                            pass
+                        elif self._seeds[index] == []:
+                            rests[index] = True
+                        elif self._mode is AutoresetMode.NEXT_STEP:
                             ended[index] = True
                         else:
                             final[row], final_info = last[index], info
@@ -179,9 +189,6 @@ class Group:
             final,
             infos if with_infos else None,
         )
-
-    def _begins_another(self, index: int) -> bool:
-        return self._mode is not AutoresetMode.DISABLED and self._seeds[index] != []
 
     def _begin_next(self, index: int) -> tuple[object, dict]:
         seeds = self._seeds[index]

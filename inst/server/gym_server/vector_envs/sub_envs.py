@@ -40,7 +40,8 @@ class SubEnvs:
         num_envs: how many there are.
         num_workers: how many processes run them; 0 for this process.
         autoreset_mode: when a sub-environment whose episode ended is reset.
-        ended: which of them have ended and take no step until they are reset.
+        ended: which of them have ended and do not move until they are reset.
+        moved: which rows of the last step moved; None for all.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_in_process: whether sub-environments draw in this process.
         metadata, render_mode: as Gymnasium's environments have them.
@@ -80,6 +81,7 @@ class SubEnvs:
         self.autoreset_mode = autoreset_mode
         self.spec: EnvSpec | None = None
         self.ended = np.zeros(num_envs, dtype=bool)
+        self.moved: np.ndarray | None = None
         self._renderer = renderer
         self._keeps_processes = keeps_processes
         self._on_end: Callable[[GymServerError], None] = lambda why: None
@@ -201,6 +203,8 @@ class SubEnvs:
         """
         if which is not None and len(which) == self.num_envs:
             which = None
+        resting = self.ended if which is None else self.ended[which]
+        self.moved = ~resting if resting.any() else None
         space = self.single_action_space
         members = actions if isinstance(space, ARRAYS) else unstack(space, actions)
         outcomes: list[Outcome] = self._ask("step", which, lambda rows: (members[rows], with_infos))

@@ -128,6 +128,11 @@ def test_episodes_begin_with_the_seeds_that_were_given(make, mode, num_workers):
             if mode == "NextStep" and ended[row] and len(current[sub_env]) > 1:
                 current[sub_env][0] = "over"
     assert env.ended.all()
+    last = env.step(None, zeros(env))
+    assert (last[1].tolist(), last[2].any(), last[3].any()) == ([0.0] * 3, False, False)
+    assert last[4] == {}
+    for sub_env, own in enumerate(seeds):
+        assert last[0][sub_env].tolist() == played[own[-1]][-1]
     for seed, observations in played.items():
         first, _ = alone.reset(seed, None, None)
         expected = [first[0].tolist()]
