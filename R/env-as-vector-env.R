@@ -51,8 +51,8 @@
 #'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, which is what
 #'       the step led to. `observation` is the same, but where another episode began in this step:
 #'       there it is the first one of that episode.}
-#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, where that is quicker;
-#'       otherwise `NULL`.}
+#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, where that is
+#'       quicker; otherwise `NULL`.}
 #'     \item{frame()}{A function that returns the current frame as the bytes of a PNG file; `NULL`
 #'       where no frames are wanted.}
 #'     \item{remembers}{The names of wrappers that remember something over episodes, strings; then
@@ -231,9 +231,9 @@ independent_sub_envs <- function(env) {
   )
 }
 
-# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those that
-# rest are stepped along, which changes nothing: a request for others is another request, which has
-# to be prepared. When fewer than half of them still play, the others are left out.
+# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those
+# that rest are stepped along, which changes nothing: a request for others is another request, which
+# has to be prepared. When fewer than half of them still play, the others are left out.
 bare_stepper <- function(env) {
   n <- env$num_envs
   observed <- env$single_observation_space

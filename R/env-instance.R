@@ -120,7 +120,7 @@ ask_instance <- function(client, instance_id, call) {
   instance$done <- FALSE
   # One for each form of the call, made when it is first called so.
   instance$reset_lines <- vector("list", 4L)
-  instance$step_lines <- vector("list", 8L)
+  instance$step_lines <- vector("list", 16L)
   instance
 }
 

@@ -258,8 +258,8 @@ info_from <- function(instance, answer) {
 #' @param seeds A seed for each of `which`, or a list with a vector of seeds for each: the first for
 #'   now, the others for the episodes that the sub-environment begins by itself.
 #' @param which The numbers of the sub-environments, in increasing order; `NULL` for all.
-#' @param finals Whether `next_observation` has the last observations of episodes after which another
-#'   one began. Without them all answers have one form, which is read more quickly.
+#' @param finals Whether `next_observation` has the last observations of episodes after which
+#'   another one began. Without them all answers have one form, which is read more quickly.
 #' @return `reset_bare()` the first observations, a row for each of `which`; `step_bare()` what
 #'   `$step()` returns, with an empty info.
 #' @noRd
