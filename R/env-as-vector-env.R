@@ -227,7 +227,7 @@ independent_sub_envs <- function(env) {
   list(
     observation_space = space, action_space = env$single_action_space, num_envs = n,
     one_seed = FALSE, reset = reset, begins_next = begins_next, step = step,
-    step_bare = if (begins_next) bare_stepper(env)
+    step_bare = if (begins_next && is_server_env(env)) bare_stepper(env)
   )
 }
 
