@@ -21,27 +21,39 @@ free_connection <- function(client) {
   connection <- client_state(client)$connection
   while (connection$busy) {
     if (is.null(connection$inner)) {
-      connection$inner <- new_connection(client, new_idempotency_keys(), fetch_in_own_pool)
+      connection$inner <- new_connection(client, new_idempotency_keys(), fetch_in_own_pool())
     }
     connection <- connection$inner
   }
   connection
 }
 
-# Does what curl_fetch_memory() does, which has one pool for all and cannot run inside of itself.
-fetch_in_own_pool <- function(url, handle) {
+# Makes a function that does what curl_fetch_memory() does, but in a pool of its own: the one pool
+# of curl_fetch_memory() cannot run inside of itself, and an interrupt can make it unusable. Here
+# interrupts wait until curl has returned, which is up to a second.
+fetch_in_own_pool <- function() {
   pool <- curl::new_pool()
-  outcome <- NULL
-  curl::handle_setopt(handle, url = url)
-  curl::multi_add(
-    handle,
-    done = function(response) outcome <<- response,
-    fail = function(reason) outcome <<- simpleError(reason),
-    pool = pool
-  )
-  curl::multi_run(pool = pool)
-  if (inherits(outcome, "error")) stop(outcome)
-  outcome
+  function(url, handle) {
+    outcome <- NULL
+    on.exit(suspendInterrupts(curl::multi_cancel(handle)))
+    suspendInterrupts({
+      curl::handle_setopt(handle, url = url)
+      curl::multi_add(
+        handle,
+        done = function(response) outcome <<- response,
+        fail = function(reason) outcome <<- simpleError(reason),
+        pool = pool
+      )
+    })
+    repeat {
+      state <- suspendInterrupts(curl::multi_run(timeout = 0.1, pool = pool))
+      # An interrupt that has waited comes now.
+      Sys.sleep(0)
+      if (!is.null(outcome) || state$pending == 0) break
+    }
+    if (inherits(outcome, "error")) stop(outcome)
+    outcome
+  }
 }
 
 # Idempotency keys ------------------------------------------------------------------
@@ -99,17 +111,31 @@ handle_of_kind <- function(client, connection, kind) {
 }
 
 new_handle_of_kind <- function(client, connection, kind) {
-  kind <- handle_kinds[[kind]]
   handle <- new.env(parent = emptyenv())
+  handle$kind <- kind
+  kind <- handle_kinds[[kind]]
   handle$curl <- new_handle(client, kind$sends, kind$accepts)
   handle$body_size <- -1
-  handle$kind <- kind
+  handle$sends <- kind$sends
   if (kind$post) {
     curl::handle_setopt(handle$curl, post = TRUE, readfunction = function(nbytes, ...) {
       read_body(connection, nbytes)
     })
   }
   handle
+}
+
+# Gives a connection new handles and a pool of its own, and returns the new handle of the same kind.
+#
+# While curl allocates what it calls our functions with, R may collect garbage, and at the end of
+# that R takes a waiting interrupt: it jumps out of the middle of libcurl. From then on libcurl
+# believes itself within a callback, and refuses every use of curl_fetch_memory()'s pool.
+replace_handle <- function(client, connection, handle) {
+  connection$fetch <- fetch_in_own_pool()
+  connection$handles <- new.env(parent = emptyenv())
+  fresh <- handle_of_kind(client, connection, handle$kind)
+  if (handle$body_size >= 0) set_body_size(fresh, handle$body_size)
+  fresh
 }
 
 # Called by curl when it wants more of the body. When curl repeats a request by itself it asks for

@@ -8,26 +8,30 @@ fetch <- function(client, connection, handle, route, key, repeatable, call) {
   state <- client$state
   state$too_large <- FALSE
   repeat {
-    response <- attempt_request(client, connection, handle, url, key)
+    response <- attempt_request(client, connection, handle$curl, url, key)
     if (!inherits(response, "error")) {
       state$may_prompt <- FALSE
       return(response)
     }
     reason <- conditionMessage(response)
     raise_own_stop(client, reason, call)
-    reached <- reached | curl::handle_data(handle)$times[["pretransfer"]] > 0
+    reached <- reached | curl::handle_data(handle$curl)$times[["pretransfer"]] > 0
     left <- timeout_of(client) - (proc.time()[["elapsed"]] - started) - 0.1 * attempt
-    again <- repeatable && attempt < max_attempts && left > 0 && connection_broke(reason)
+    refused <- curl_refused(reason)
+    if (refused) {
+      handle <- replace_handle(client, connection, handle)
+    }
+    again <- attempt < max_attempts && left > 0 && may_repeat(connection, repeatable, reason)
     if (!again && prompted_server_starts(client, reached, call)) {
       return(fetch(client, connection, handle, route, key, repeatable, call))
     }
     if (!again) {
       abort_connection(client$remote_base, reason, call, reached)
     }
-    Sys.sleep(0.1 * attempt)
+    if (!refused) Sys.sleep(0.1 * attempt)
     # All attempts together may take as long as one request.
-    curl::handle_setopt(handle, timeout_ms = left * 1000)
-    on.exit(curl::handle_setopt(handle, timeout_ms = timeout_of(client) * 1000))
+    curl::handle_setopt(handle$curl, timeout_ms = left * 1000)
+    on.exit(curl::handle_setopt(handle$curl, timeout_ms = timeout_of(client) * 1000))
     attempt <- attempt + 1L
   }
 }
@@ -37,7 +41,7 @@ raise_own_stop <- function(client, reason, call) {
   if (client$state$too_large) {
     abort_too_large(base = client$remote_base, call = call)
   }
-  if (grepl("aborted by an application callback", reason, fixed = TRUE)) {
+  if (grepl("aborted by (an application )?callback|Callback aborted", reason)) {
     rlang::interrupt()
   }
 }
@@ -99,6 +103,15 @@ ends_in_header <- function(response) {
 
 max_attempts <- 4L
 
+# What curl refuses may be repeated in any case as long as it has not asked for the body.
+may_repeat <- function(connection, repeatable, reason) {
+  if (curl_refused(reason)) {
+    repeatable || connection$sent == 0L
+  } else {
+    repeatable && connection_broke(reason)
+  }
+}
+
 # What libcurl says when an open connection was lost, as opposed to one that could not be made or
 # an answer that took too long.
 connection_broke <- function(reason) {
@@ -111,4 +124,10 @@ connection_broke <- function(reason) {
     ),
     reason
   )
+}
+
+# What curl_fetch_memory() says when its pool refuses the handle, see replace_handle(). Nothing was
+# sent then. It says the same, though, when waiting in the pool fails, and that may be later.
+curl_refused <- function(reason) {
+  grepl("Failed initialization", reason, fixed = TRUE)
 }

@@ -24,7 +24,7 @@ create_on_server <- function(client, fields, call) {
   place <- paste(key$key, key$number)
   outcome <- "lost"
   on.exit(end_creation(state, place, outcome))
-  remember_instance(place, client, body = padded(request_body(fields, key), handle_kinds$post))
+  remember_instance(place, client, body = padded(request_body(fields, key), json_type))
   answer <- withCallingHandlers(
     post_once(client, "/v1/envs/", fields, key = key, call = call),
     gym_error_http = function(cnd) outcome <<- "refused",

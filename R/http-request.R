@@ -31,7 +31,7 @@ send <- function(client, route, fields = NULL, tensors = NULL, take_tensors = FA
   }
   # A server with the classic protocol knows no idempotency keys and would do the repeat, too.
   repeatable <- once && !isTRUE(client$state$classic) || is.null(fields)
-  response <- fetch(client, connection, handle$curl, route, key, repeatable, call)
+  response <- fetch(client, connection, handle, route, key, repeatable, call)
   response$key <- key
   response
 }
@@ -60,20 +60,24 @@ key_json <- function(key) {
 # curl needs the length of a body beforehand, and setting it costs as much as half a
 # request: small bodies are padded with blanks to one length.
 load_body <- function(connection, handle, bytes) {
-  connection$body <- padded(bytes, handle$kind)
+  connection$body <- padded(bytes, handle$sends)
   size <- length(connection$body)
   if (size != handle$body_size) {
-    suspendInterrupts({
-      curl::handle_setopt(handle$curl, postfieldsize_large = size)
-      handle$body_size <- size
-    })
+    set_body_size(handle, size)
   }
 }
 
+set_body_size <- function(handle, size) {
+  suspendInterrupts({
+    curl::handle_setopt(handle$curl, postfieldsize_large = size)
+    handle$body_size <- size
+  })
+}
+
 # Blanks at the end of a JSON text mean nothing.
-padded <- function(bytes, kind) {
+padded <- function(bytes, type) {
   padding <- 256L - length(bytes)
-  if (padding > 0L && kind$sends == json_type) c(bytes, rep(as.raw(0x20), padding)) else bytes
+  if (padding > 0L && type == json_type) c(bytes, rep(as.raw(0x20), padding)) else bytes
 }
 
 # Makes a POST that the server carries out exactly once, and reads its answer.
