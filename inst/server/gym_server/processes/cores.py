@@ -1,10 +1,11 @@
-"""How many cores this process may use."""
+"""How many cores this process may use, and which of them the processes use that it has started."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 _CGROUP = Path("/sys/fs/cgroup")
@@ -33,3 +34,20 @@ def _cgroup_limit(cgroup: Path) -> float:
         period = (cgroup / "cpu" / "cpu.cfs_period_us").read_text()
         return float(quota) / float(period) if float(quota) > 0 else math.inf
     return math.inf
+
+
+def spread(pids: Sequence[int]) -> None:
+    """Give each of some processes cores of its own, of those that this process may use.
+
+    They are woken at the same time, and Linux often wakes two of them on the same core and leaves
+    them there: 256 sub-environments of LunarLander in two processes on two cores took 36 us a step
+    each, and take 25 us since (medians of three runs in turns).
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    shares = [cores[place::len(pids)] or [cores[place % len(cores)]] for place in range(len(pids))]
+    for pid, share in zip(pids, shares, strict=True):
+        # It may have ended, or be kept from it by the system's administrator.
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(pid, share)

@@ -20,6 +20,7 @@ from gymnasium.vector.utils import batch_space
 from gym_server import spaces
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError
+from gym_server.processes.cores import spread
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.vector_envs.group import Group, Outcome
@@ -145,6 +146,7 @@ class SubEnvs:
         except BaseException:
             self.kill()
             raise
+        spread(self.pids)
 
     # Moves ----------------------------------------------------------------------------------
 
