@@ -10,7 +10,8 @@
 #' (`NormalizeObservation`, `NormalizeReward`). A server that cannot make so many makes a quarter of
 #' them, 16, or a single environment. Where Gymnasium has a vector implementation that plays the
 #' same game it is taken; elsewhere each sub-environment has a seed of its own, and the server
-#' divides them among processes. One that was made before is played as it is, and left open.
+#' divides them among processes where that pays. One that was made before is played as it is, and
+#' left open.
 #'
 #' @param x The environment: an id such as `"CartPole-v1"`, perhaps with wrappers (see
 #'   [gym_wrap()]), an environment made by [gym_make()] or [gym_env()], or any list or environment
@@ -19,9 +20,9 @@
 #' @param num_envs How many sub-environments to make, a whole number of at least 1. `NULL`, the
 #'   default, chooses; an environment that was made before has the number that it has.
 #' @param num_workers How many processes run the sub-environments, a whole number: 0 for none but
-#'   the server itself. `NULL`, the default, lets the server choose, and takes none for less than
-#'   32 episodes. What is played does not depend on it. Only where the environment is named by its
-#'   id and has no vector implementation of its own.
+#'   the server itself. `NULL`, the default, lets the server choose, and takes none for fewer than
+#'   32 episodes (`max_envs`). What is played does not depend on it. Only where the environment is
+#'   named by its id and has no vector implementation of its own.
 #' @param ... The environment's own arguments, by name, where it is named by its id.
 #' @param max_envs No more sub-environments than this are made where `num_envs` is `NULL` and each
 #'   has a seed of its own, a number; by default there is no limit.

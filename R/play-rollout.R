@@ -65,8 +65,8 @@
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_workers How many processes of the server run the sub-environments, a whole number; 0
 #'   for none but the server itself. What is played does not depend on it. `NULL`, the default,
-#'   lets the server choose, see [env_create()]. Only where the environment is named by its id and
-#'   has no vector implementation of its own, such as CartPole has.
+#'   lets the server choose, see [as_vector_env()]. Only where the environment is named by its id
+#'   and has no vector implementation of its own, such as CartPole has.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
