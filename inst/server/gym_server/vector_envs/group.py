@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -15,6 +15,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array
 from gym_server.envs.drawing_on_demand import allow_drawing, save_drawing
 from gym_server.errors import GymServerError, environment_error
 from gym_server.spaces.stacking import ARRAYS
+from gym_server.vector_envs.sub_env import SubEnv
 
 
 class Info(NamedTuple):
@@ -60,14 +61,14 @@ class Group:
 
     def __init__(
         self,
-        make_one: Callable[[], gymnasium.Env],
+        sub_env: SubEnv,
         numbers: Sequence[int],
         autoreset_mode: AutoresetMode,
     ) -> None:
         """Make them.
 
         Args:
-            make_one: makes one of them.
+            sub_env: makes them.
             numbers: theirs among all sub-environments, from 0; for errors.
             autoreset_mode: when a sub-environment whose episode ended is reset.
         """
@@ -75,9 +76,9 @@ class Group:
         self._mode = autoreset_mode
         with contextlib.ExitStack() as undo:
             self.envs: list[gymnasium.Env] = []
-            for _ in numbers:
-                self.envs.append(make_one())
-                undo.callback(self.envs[-1].close)
+            for env in sub_env.make_all(len(numbers)):
+                self.envs.append(env)
+                undo.callback(env.close)
             self._check_spaces()
             undo.pop_all()
         self._observation_space = self.envs[0].observation_space
@@ -98,10 +99,11 @@ class Group:
         first = self.envs[0]
         for env in self.envs:
             for name in ("observation_space", "action_space"):
-                if getattr(env, name) != getattr(first, name):
+                space, wanted = getattr(env, name), getattr(first, name)
+                if space is not wanted and space != wanted:
                     raise RuntimeError(
-                        f"its sub-environments differ: one has the {name} {getattr(first, name)}, "
-                        f"another one {getattr(env, name)}"
+                        f"its sub-environments differ: one has the {name} {wanted}, "
+                        f"another one {space}"
                     )
 
     # Moves ----------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
-"""What makes one sub-environment: in this process, or after a journey in another one."""
+"""What makes sub-environments: in this process, or after a journey in another one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import gymnasium
@@ -13,10 +13,11 @@ from gym_server.envs.make import load_creator, make_from_spec
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.wrappers import wrap
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.vector_envs.copies import can_copy, copy_new
 
 
 class SubEnv:
-    """Makes one sub-environment: an environment and the wrappers around it."""
+    """Makes sub-environments, each an environment and the wrappers around it."""
 
     def __init__(
         self,
@@ -55,6 +56,15 @@ class SubEnv:
         """Make another one."""
         memory, self._memory = self._memory, None
         return wrap(make_from_spec(*self._make_args), self._wrappers, self._renderer, memory)
+
+    def make_all(self, count: int) -> Iterator[gymnasium.Env]:
+        """Make some, one after the other; none may be played or drawn before the last is made."""
+        first = self()
+        yield first
+        # The client's wrappers may hold what they change in place, such as queues.
+        copies = not self._wrappers and can_copy(first)
+        for _ in range(count - 1):
+            yield copy_new(first) if copies else self()
 
 
 class _ThisThread:
