@@ -232,33 +232,48 @@ independent_sub_envs <- function(env) {
   )
 }
 
-# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those
-# that rest are stepped along, which changes nothing: a request for others is another request, which
-# has to be prepared. When fewer than half of them still play, the others are left out.
+# Makes the function `step_bare()` of sub-environments that rest after their last episode.
 bare_stepper <- function(env) {
+  choose <- step_chooser(env)
+  function(action, which) {
+    step <- choose(action, which)
+    out <- take_step(env, step$n, step$action, step$which, finals = FALSE)
+    if (is.null(step$row)) out else rows_of_step(env, out, step$row)
+  }
+}
+
+# Makes a function that decides which sub-environments are stepped for those that play. Others that
+# were stepped before are stepped along, whose results nobody uses: a request for other
+# sub-environments is another request, which has to be prepared. When fewer than half of them still
+# play, the others are left out.
+step_chooser <- function(env) {
   n <- env$num_envs
-  observed <- env$single_observation_space
   actions <- env$single_action_space
   stepped <- NULL
   function(action, which) {
-    playing <- length(which)
-    if (playing == n) {
-      stepped <<- NULL
-      return(take_step(env, n, action, finals = FALSE))
-    }
-    all <- stepped %||% seq_len(n)
-    row <- match(which, all)
-    if (anyNA(row) || 2L * playing <= length(all)) {
+    row <- match(which, stepped)
+    if (anyNA(row) || 2L * length(which) <= length(stepped)) {
       stepped <<- which
-      return(take_step(env, playing, action, which, finals = FALSE))
+      row <- seq_along(which)
     }
-    action <- actions_of_all(actions, action, row, length(all))
-    out <- take_step(env, length(all), action, stepped, finals = FALSE)
+    count <- length(stepped)
+    along <- length(which) < count
     list(
-      observation = batch_rows(observed, out$observation, row), reward = out$reward[row],
-      terminated = out$terminated[row], truncated = out$truncated[row]
+      action = if (along) actions_of_all(actions, action, row, count) else action,
+      which = if (count < n) stepped, n = count, row = if (along) row
     )
   }
+}
+
+rows_of_step <- function(env, out, row) {
+  space <- env$single_observation_space
+  same <- identical(out$observation, out$next_observation)
+  observation <- batch_rows(space, out$observation, row)
+  list(
+    observation = observation, reward = out$reward[row], terminated = out$terminated[row],
+    truncated = out$truncated[row],
+    next_observation = if (same) observation else batch_rows(space, out$next_observation, row)
+  )
 }
 
 # With "vector_entry_point" one generator serves all sub-environments, so there is one seed for all.

@@ -65,79 +65,108 @@ naming_call <- function(code, vector_env) {
   )
 }
 
-# Plays the episodes from `first` to `last` of a batch. `rows` has an element for each
-# sub-environment that plays: which episode of the batch, the sub-environment's number, the return
-# so far, and how many steps had been taken when the episode began.
+# Plays the episodes from `first` to `last` of a batch. `game` is what stays the same, `player` what
+# changes: `rows` has an element for each sub-environment that plays (which episode of the batch, the
+# sub-environment's number, the return so far, and how many steps had been taken when the episode
+# began), and `observation` a row.
 play_episodes <- function(vector_env, batch, first, last, policy, max_steps, keep_steps,
                           keep_next) {
+  game <- list(
+    vector_env = vector_env, batch = batch, last = last, policy = policy, max_steps = max_steps,
+    keep_steps = keep_steps, keep_next = keep_next
+  )
   episode <- seq.int(first, min(last, batch$needed, first + vector_env$num_envs - 1L))
-  rows <- list(episode = episode, sub_env = batch$sub_env[episode],
-               return = numeric(length(episode)), began = integer(length(episode)))
   observation <- begin_episodes(vector_env, batch, episode, last)
   ask_beforehand(policy, batch, episode, observation, vector_env)
-  candidate <- batch$candidate[episode]
-  acting <- policy_rows(policy, candidate)
+  rows <- list(episode = episode, sub_env = batch$sub_env[episode],
+               return = numeric(length(episode)), began = integer(length(episode)))
+  player <- new_player(game, rows, observation)
   step <- if (keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
-  taken <- 0L
-  repeat {
-    action <- act_batch(acting, observation, length(rows$episode), vector_env)
-    out <- step(action, rows$sub_env)
-    taken <- taken + 1L
-    keep_frame(batch, vector_env, rows$episode)
-    rows$return <- rows$return + out$reward
-    if (keep_steps) {
-      batch$steps[[length(batch$steps) + 1L]] <- list(
-        at = rows$episode, observation = observation, action = action, reward = out$reward,
-        terminated = out$terminated, truncated = out$truncated,
-        next_observation = if (keep_next) out$next_observation
-      )
-    }
-    observation <- out$observation
-    ended <- out$terminated | out$truncated
-    # Where an episode is cut short the environment begins no other by itself.
-    waiting <- if (isTRUE(vector_env$begins_next)) !ended else TRUE
-    if (max_steps < Inf) {
-      ended <- ended | taken - rows$began >= max_steps
-    }
-    if (any(ended)) {
-      end_episodes(batch, rows$episode[ended], rows$return[ended], (taken - rows$began)[ended],
-                   lapply(out[flags], `[`, ended))
-      rows$waiting <- ended & waiting
-      rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
-      rows$return[ended] <- 0
-      rows$began[ended] <- taken
-      going <- which(rows$episode <= min(last, batch$needed))
-      if (!length(going)) {
-        return(invisible())
-      }
-      if (length(going) < length(ended)) {
-        rows <- lapply(rows, `[`, going)
-        observation <- batch_rows(vector_env$observation_space, observation, going)
-      }
-      observation <- begin_waiting(vector_env, batch, rows, observation, last)
-      begun <- which(rows$began == taken)
-      ask_beforehand(policy, batch, rows$episode, observation, vector_env, begun)
-      if (!identical(batch$candidate[rows$episode], candidate)) {
-        candidate <- batch$candidate[rows$episode]
-        acting <- policy_rows(policy, candidate)
-      }
-    }
+  while (length(player$rows$episode)) {
+    n <- length(player$rows$episode)
+    player$action <- act_batch(player$acting, player$observation, n, vector_env)
+    end_step(game, player, step(player$action, player$rows$sub_env))
+  }
+}
+
+new_player <- function(game, rows, observation) {
+  candidate <- game$batch$candidate[rows$episode]
+  rlang::env(
+    rows = rows, observation = observation, taken = 0L, action = NULL,
+    candidate = candidate, acting = policy_rows(game$policy, candidate)
+  )
+}
+
+#' Note what came of a step, and begin the next episodes where some have ended
+#' @param out As a step of [as_vector_env()] returns it.
+#' @noRd
+end_step <- function(game, player, out) {
+  batch <- game$batch
+  rows <- player$rows
+  player$taken <- player$taken + 1L
+  keep_frame(batch, game$vector_env, rows$episode)
+  player$rows$return <- rows$return + out$reward
+  if (game$keep_steps) {
+    batch$steps[[length(batch$steps) + 1L]] <- list(
+      at = rows$episode, observation = player$observation, action = player$action,
+      reward = out$reward, terminated = out$terminated, truncated = out$truncated,
+      next_observation = if (game$keep_next) out$next_observation
+    )
+  }
+  player$observation <- out$observation
+  ended <- out$terminated | out$truncated
+  # Where an episode is cut short the environment begins no other by itself.
+  waiting <- if (isTRUE(game$vector_env$begins_next)) !ended else TRUE
+  if (game$max_steps < Inf) {
+    ended <- ended | player$taken - rows$began >= game$max_steps
+  }
+  if (any(ended)) {
+    length <- (player$taken - rows$began)[ended]
+    end_episodes(batch, rows$episode[ended], player$rows$return[ended], length,
+                 lapply(out[flags], `[`, ended))
+    begin_next_episodes(game, player, ended, ended & waiting)
+  }
+}
+
+# `waiting` are those that have `ended` and that the environment does not begin by itself.
+begin_next_episodes <- function(game, player, ended, waiting) {
+  vector_env <- game$vector_env
+  batch <- game$batch
+  rows <- player$rows
+  rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
+  rows$return[ended] <- 0
+  rows$began[ended] <- player$taken
+  going <- which(rows$episode <= min(game$last, batch$needed))
+  if (length(going) < length(ended)) {
+    rows <- lapply(rows, `[`, going)
+    waiting <- waiting[going]
+    player$observation <- batch_rows(vector_env$observation_space, player$observation, going)
+  }
+  player$rows <- rows
+  if (!length(going)) {
+    return(invisible())
+  }
+  if (any(waiting)) {
+    player$observation <- begin_waiting(game, rows, player$observation, which(waiting))
+  }
+  begun <- which(rows$began == player$taken)
+  ask_beforehand(game$policy, batch, rows$episode, player$observation, vector_env, begun)
+  candidate <- batch$candidate[rows$episode]
+  if (!identical(candidate, player$candidate)) {
+    player$candidate <- candidate
+    player$acting <- policy_rows(game$policy, candidate)
   }
 }
 
 # Puts the first observations of the episodes that the environment does not begin by itself in the
 # place of the last observations of those before.
-begin_waiting <- function(vector_env, batch, rows, observation, last) {
-  waiting <- which(rows$waiting)
-  if (!length(waiting)) {
-    return(observation)
-  }
-  begun <- begin_episodes(vector_env, batch, rows$episode[waiting], last)
+begin_waiting <- function(game, rows, observation, waiting) {
+  begun <- begin_episodes(game$vector_env, game$batch, rows$episode[waiting], game$last)
   n <- length(rows$episode)
   if (length(waiting) == n) {
     begun
   } else {
-    replace_rows(vector_env$observation_space, observation, n, waiting, begun)
+    replace_rows(game$vector_env$observation_space, observation, n, waiting, begun)
   }
 }
 

@@ -81,7 +81,7 @@ def _json_metadata(name: str, text: str) -> object:
 
 
 # Writers such as safetensors' own add texts of theirs ("format": "pt").
-_JSON_METADATA = ("info", "render", "request", "step_mask", "texts")
+_JSON_METADATA = ("final_obs", "info", "render", "request", "step_mask", "texts")
 
 _KIND_NAMES = {
     bool: "a boolean",
