@@ -154,6 +154,19 @@ def test_last_observations_come_without_infos(client, sub_envs):
     assert len(answer["final_obs"]) == 3
 
 
+@pytest.mark.parametrize("wanted", [True, False])
+def test_tensors_can_be_sent_with_the_wish_for_no_last_observations(client, create, wanted):
+    url = create(num_envs=2, autoreset_mode="SameStep", kwargs={"max_episode_steps": 1})
+    client.post(f"{url}/reset/", json={"seed": 1})
+    parts = spaces.batch_tensor_writer(gymnasium.make("CartPole-v1").action_space, "action")
+    answer = client.post(
+        f"{url}/step/",
+        data=safetensors.write(parts(np.array([0, 1])).tensors, {"final_obs": json.dumps(wanted)}),
+        headers={"Content-Type": TENSORS},
+    )
+    assert ("final_obs" in answer.json) is wanted
+
+
 def test_tensors_can_be_sent_with_the_wish_for_no_infos(client, create):
     url = create(num_envs=2, vectorization_mode="sync")
     client.post(f"{url}/reset/", json={"seed": 1})

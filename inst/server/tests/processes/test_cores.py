@@ -2,7 +2,7 @@ import os
 
 import pytest
 
-from gym_server.processes.cores import usable_cores
+from gym_server.processes.cores import spread, usable_cores
 
 HAS_AFFINITY = hasattr(os, "sched_getaffinity")
 
@@ -41,3 +41,38 @@ def test_so_does_an_old_one(eight, tmp_path, quota, cores):
 
 def test_without_a_limit_all_cores_of_the_affinity_count(eight, tmp_path):
     assert usable_cores(tmp_path) == 8
+
+
+@pytest.mark.parametrize(
+    ("cores", "count", "shares"),
+    [
+        ({0, 1}, 2, [{0}, {1}]),
+        ({2, 3, 5}, 2, [{2, 5}, {3}]),
+        ({4, 6}, 3, [{4}, {6}, {4}]),
+        ({7}, 1, [{7}]),
+    ],
+)
+def test_each_process_gets_cores_of_its_own(monkeypatch, cores, count, shares):
+    given = {}
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: cores, raising=False)
+    monkeypatch.setattr(
+        os,
+        "sched_setaffinity",
+        lambda process, share: given.update({process: set(share)}),
+        raising=False,
+    )
+    spread(range(count))
+    assert list(given.values()) == shares
+
+
+def test_a_process_that_has_ended_gets_none(monkeypatch):
+    asked = []
+
+    def refuse(process, share):
+        asked.append(process)
+        raise ProcessLookupError
+
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
+    monkeypatch.setattr(os, "sched_setaffinity", refuse, raising=False)
+    spread([11, 12])
+    assert asked == [11, 12]
