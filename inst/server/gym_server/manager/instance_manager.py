@@ -309,10 +309,7 @@ class InstanceManager:
             creation.kill(why)
         elif not self._renderer.abandon(thread, why):
             answer_for(thread, why)
-            # Where the thread starts processes it must go on: an interrupt while it talks to the
-            # fork server would break that, and with it the processes of all others.
-            if not creation.share.room.processes:
-                interrupt(thread)
+            interrupt(thread)
         self._creating.answered(creation)
 
     def _evict(
