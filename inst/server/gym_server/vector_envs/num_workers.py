@@ -59,8 +59,10 @@ def choose_num_workers(config: EnvConfig, spec: EnvSpec, sub_env: SubEnv) -> int
         sub_env: makes one, to measure a step where that is not known.
     """
     most = min(most_workers(config), config.max_workers)
-    if config.wants_workers or most < 2:
+    if config.wants_workers:
         return most
+    if most < 2:
+        return 0
     work = (config.num_envs or 1) * _step_seconds(spec, config, sub_env)
     chosen = min(most, int(work / _LEAST_SECONDS))
     return chosen if chosen > 1 else 0
