@@ -118,7 +118,8 @@ class InstanceManager:
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
-            self._note_processes(instance, creation.share, isolated)
+            if not isolated:
+                self._note_processes(instance, creation.share)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -166,9 +167,12 @@ class InstanceManager:
         finally:
             self._release(creation)
 
-    def _note_processes(self, instance: Instance, share: _Share, isolated: bool) -> None:
-        """Give back the room for processes that were not needed."""
-        processes = isolated + (instance.about()["num_workers"] or 0)
+    def _note_processes(self, instance: Instance, share: _Share) -> None:
+        """Give back the room for processes that were not needed.
+
+        Not for an isolated environment: its process, which nobody trusts, would tell how many.
+        """
+        processes = instance.about()["num_workers"] or 0
         with self._lock:
             share.room = replace(share.room, processes=processes)
 
