@@ -27,6 +27,7 @@ from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt
 from gym_server.vector_envs import make as vector_make
 from gym_server.vector_envs.num_workers import most_workers
+from gym_server.vector_envs.warm_processes import warm_processes
 
 log = logging.getLogger(__name__)
 
@@ -371,7 +372,7 @@ class InstanceManager:
             instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
-        """Close every instance and take no more."""
+        """Close every instance and take no more; end the processes that wait for another one."""
         with self._lock:
             self._stopping = True
             instances = list(self._instances.values())
@@ -385,6 +386,8 @@ class InstanceManager:
             thread.start()
         for thread in threads:
             thread.join()
+        # After them: closing them leaves processes there.
+        warm_processes.end()
 
     def _new_id(self) -> str:
         while True:
