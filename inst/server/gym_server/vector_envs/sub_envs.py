@@ -356,19 +356,25 @@ class SubEnvs:
                 group.release()
         if self.num_workers == 0:
             return
-        overdue = threading.Timer(_CLOSE_SECONDS, self._kill_processes)
-        overdue.daemon = True
-        overdue.start()
+        is_overdue = threading.Event()
+
+        def end_overdue() -> None:
+            is_overdue.set()
+            self._kill_processes()
+
+        timer = threading.Timer(_CLOSE_SECONDS, end_overdue)
+        timer.daemon = True
+        timer.start()
         try:
             self._wait_for((group, "begin", ("close",)) for group in self._groups)
         except BaseException:
             self._kill_processes()
-            if overdue.is_alive():
+            if not is_overdue.is_set():
                 raise
             # It was killed because it took too long, which is no error of the client's.
             return
         finally:
-            overdue.cancel()
+            timer.cancel()
         for group in self._groups:
             if isinstance(group, GroupProcess) and self._keeps_processes:
                 warm_processes.put(group)
