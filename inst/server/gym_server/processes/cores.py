@@ -46,7 +46,9 @@ def spread(pids: Sequence[int]) -> None:
     if not hasattr(os, "sched_setaffinity"):
         return
     cores = sorted(os.sched_getaffinity(0))
-    shares = [cores[place::len(pids)] or [cores[place % len(cores)]] for place in range(len(pids))]
+    shares = [
+        cores[place :: len(pids)] or [cores[place % len(cores)]] for place in range(len(pids))
+    ]
     for pid, share in zip(pids, shares, strict=True):
         # It may have ended, or be kept from it by the system's administrator.
         with contextlib.suppress(OSError):

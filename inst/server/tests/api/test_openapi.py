@@ -26,13 +26,13 @@ def test_the_document_is_made_of_the_fields_that_are_parsed():
     schema = body["content"]["application/json"]["schema"]
     assert schema["required"] == ["action"]
     assert set(schema["properties"]) == {
-            "action",
-            "final_obs",
-            "info",
-            "render",
-            "request",
-            "step_mask",
-        }
+        "action",
+        "final_obs",
+        "info",
+        "render",
+        "request",
+        "step_mask",
+    }
     json.dumps(schema, allow_nan=False)
 
 
