@@ -24,7 +24,7 @@ from gym_server.manager.limits import Limits, Room
 from gym_server.manager.tombstones import Tombstones
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt
+from gym_server.threads.interrupt import interrupt, interrupted_by
 from gym_server.vector_envs import make as vector_make
 from gym_server.vector_envs.num_workers import most_workers
 from gym_server.vector_envs.warm_processes import warm_processes
@@ -200,9 +200,11 @@ class InstanceManager:
         settings = self._isolation.settings(
             config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        backend = WorkerBackend(config, settings)
-        undo.callback(backend.kill, shutting_down())
-        creation.kill = backend.kill
+        # An interrupt must wait until the process has started; see ``SubEnvs``.
+        with interrupted_by(lambda: None):
+            backend = WorkerBackend(config, settings)
+            undo.callback(backend.kill, shutting_down())
+            creation.kill = backend.kill
         backend.create(creation.share.reservation)
         return Instance(backend, config, self._renderer)
 

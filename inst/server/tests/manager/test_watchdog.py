@@ -13,6 +13,8 @@ from conftest import ServerProcess, created
 from faulty_envs import HangsWhere
 from running import descendants, is_running
 
+from gym_server.api.app import Config, create_app
+from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.limits import Limits
 
 # Ample for whatever does not hang.
@@ -305,6 +307,29 @@ def test_a_loop_without_an_end_is_broken_off(serve, eventually, where, fields):
     eventually(lambda: _busy_threads(server.process.pid) == 0)
     # None is left but the two from which processes start.
     eventually(lambda: len(descendants(server.process.pid)) <= 2)
+
+
+def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
+    started = []
+
+    class StartsSlowly(WorkerBackend):
+        def __init__(self, *args):
+            end = time.monotonic() + 1
+            while time.monotonic() < end:
+                pass
+            super().__init__(*args)
+            started.append(self._worker.pid)
+
+    monkeypatch.setattr("gym_server.manager.instance_manager.WorkerBackend", StartsSlowly)
+    limits = Limits(max_call_seconds=0.3)
+    app = create_app(Config(limits=limits, isolate="all"))
+    try:
+        answer = app.test_client().post("/v1/envs/", json={"env_id": "CartPole-v1"})
+        assert too_long((answer.status_code, answer.json))
+        assert len(started) == 1
+        eventually(lambda: not is_running(started[0]))
+    finally:
+        app.close()
 
 
 def _busy_threads(pid):
