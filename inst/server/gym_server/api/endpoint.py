@@ -148,8 +148,14 @@ def _created(result: object) -> str | None:
 _ROWS = AnswerForm(tensors=True)
 _COLUMNS = AnswerForm(tensors=True, by_column=True)
 
-# Most clients send one of these. To parse the header takes as long as many a step.
-_FORMS = {JSON: JSON_FORM, TENSORS: _ROWS, COLUMN_TENSORS: _COLUMNS}
+# Most clients send one of these, the R client the last one. To parse the header takes as long as
+# many a step.
+_FORMS = {
+    JSON: JSON_FORM,
+    TENSORS: _ROWS,
+    COLUMN_TENSORS: _COLUMNS,
+    f"{COLUMN_TENSORS}, {TENSORS};q=0.9": _COLUMNS,
+}
 
 
 def _wanted_form(accept: str, content_type: str) -> AnswerForm:

@@ -24,9 +24,10 @@ from gym_server.manager.limits import Limits, Room
 from gym_server.manager.tombstones import Tombstones
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt
+from gym_server.threads.interrupt import interrupt, interrupted_by
 from gym_server.vector_envs import make as vector_make
 from gym_server.vector_envs.num_workers import most_workers
+from gym_server.vector_envs.warm_processes import warm_processes
 
 log = logging.getLogger(__name__)
 
@@ -118,7 +119,8 @@ class InstanceManager:
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
-            self._note_processes(instance, creation.share, isolated)
+            if not isolated:
+                self._note_processes(instance, creation.share)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -166,9 +168,12 @@ class InstanceManager:
         finally:
             self._release(creation)
 
-    def _note_processes(self, instance: Instance, share: _Share, isolated: bool) -> None:
-        """Give back the room for processes that were not needed."""
-        processes = isolated + (instance.about()["num_workers"] or 0)
+    def _note_processes(self, instance: Instance, share: _Share) -> None:
+        """Give back the room for processes that were not needed.
+
+        Not for an isolated environment: its process, which nobody trusts, would tell how many.
+        """
+        processes = instance.about()["num_workers"] or 0
         with self._lock:
             share.room = replace(share.room, processes=processes)
 
@@ -195,9 +200,11 @@ class InstanceManager:
         settings = self._isolation.settings(
             config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        backend = WorkerBackend(config, settings)
-        undo.callback(backend.kill, shutting_down())
-        creation.kill = backend.kill
+        # An interrupt must wait until the process has started; see ``SubEnvs``.
+        with interrupted_by(lambda: None):
+            backend = WorkerBackend(config, settings)
+            undo.callback(backend.kill, shutting_down())
+            creation.kill = backend.kill
         backend.create(creation.share.reservation)
         return Instance(backend, config, self._renderer)
 
@@ -309,10 +316,7 @@ class InstanceManager:
             creation.kill(why)
         elif not self._renderer.abandon(thread, why):
             answer_for(thread, why)
-            # Where the thread starts processes it must go on: an interrupt while it talks to the
-            # fork server would break that, and with it the processes of all others.
-            if not creation.share.room.processes:
-                interrupt(thread)
+            interrupt(thread)
         self._creating.answered(creation)
 
     def _evict(
@@ -370,7 +374,7 @@ class InstanceManager:
             instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
-        """Close every instance and take no more."""
+        """Close every instance and take no more; end the processes that wait for another one."""
         with self._lock:
             self._stopping = True
             instances = list(self._instances.values())
@@ -384,6 +388,8 @@ class InstanceManager:
             thread.start()
         for thread in threads:
             thread.join()
+        # After them: closing them leaves processes there.
+        warm_processes.end()
 
     def _new_id(self) -> str:
         while True:

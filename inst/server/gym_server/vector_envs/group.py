@@ -148,6 +148,10 @@ class Group:
             with_infos: whether infos are wanted.
         """
         which = range(len(self.envs)) if which is None else which
+        # Before any steps, and where no sub-environment is to blame.
+        actions = list(actions)
+        if len(actions) != len(which):
+            raise ValueError(f"{len(actions)} actions for {len(which)} sub-environments")
         steps, last, ended, rests = self._steps, self._last, self._ended, self._rests
         reward = np.zeros(len(which))
         terminated = np.zeros(len(which), dtype=bool)
@@ -171,7 +175,7 @@ class Group:
                     if terminated[row] or truncated[row]:
                         if self._mode is AutoresetMode.DISABLED:
                             pass
-                        elif self._seeds[index] == []:
+                        elif self._has_used_its_seeds(index):
                             rests[index] = True
                         elif self._mode is AutoresetMode.NEXT_STEP:
                             ended[index] = True
@@ -191,6 +195,10 @@ class Group:
             final,
             infos if with_infos else None,
         )
+
+    def _has_used_its_seeds(self, index: int) -> bool:
+        seeds = self._seeds[index]
+        return seeds is not None and not seeds
 
     def _begin_next(self, index: int) -> tuple[object, dict]:
         seeds = self._seeds[index]

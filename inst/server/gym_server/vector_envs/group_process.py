@@ -62,7 +62,9 @@ class _Methods:
 
     _group: Group
 
-    def make(self, sub_env: SubEnv, numbers: Sequence[int], mode: AutoresetMode) -> None:
+    def make(self, pickled: bytes, numbers: Sequence[int], mode: AutoresetMode) -> None:
+        # Pickled by itself: a call that cannot be read ends the process, and this is an error.
+        sub_env: SubEnv = pickle.loads(pickled)
         sub_env.prepare()
         self._group = Group(sub_env, numbers, mode)
 
@@ -122,10 +124,10 @@ class GroupProcess:
             GymServerError: for an environment that cannot be sent there.
         """
         try:
-            pickle.dumps(sub_env, 5)
+            pickled = pickle.dumps(sub_env, 5)
         except Exception as failure:
             raise GymServerError("not_supported", str(failure)) from failure
-        self.begin("make", sub_env, numbers, mode)
+        self.begin("make", pickled, numbers, mode)
 
     def begin(self, method: str, *args: object) -> None:
         """Begin a call of one of its group's methods; ``finish()`` must follow.

@@ -259,7 +259,9 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
         request.renderer,
         request.memory,
     )
-    num_workers = make.ask(choose_num_workers, request.config, request.spec, sub_env)
+    num_workers = make.ask(
+        choose_num_workers, request.config, request.spec, sub_env, request.renderer
+    )
     try:
         env = make.ask(_make_with, request, sub_env, num_workers)
     except GymServerError as refusal:

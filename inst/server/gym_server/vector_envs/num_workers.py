@@ -8,7 +8,9 @@ of processes gives the same results.
 from __future__ import annotations
 
 import json
+import threading
 import time
+from hashlib import blake2b
 
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
@@ -16,14 +18,16 @@ from gymnasium.envs.registration import EnvSpec
 from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
 from gym_server.processes.cores import usable_cores
+from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
 
 # A process has at least so many sub-environments, and so many seconds of work in a step.
 _FEWEST_SUB_ENVS = 16
 _LEAST_SECONDS = 0.0005
 
-# Seconds of a step, by the beginning of the module's name, the longest first (Gymnasium 1.4,
-# ale_py 0.12, Python 3.11; the median of 3,000 steps with random actions).
+# Seconds of a step, by the beginning of the module's name, the more particular one before the more
+# general one (Gymnasium 1.4, ale_py 0.12, Python 3.11; the median of 3,000 steps with random
+# actions).
 _STEP_SECONDS = {
     "gymnasium.envs.toy_text": 5e-6,
     "gymnasium.envs.classic_control.acrobot": 27e-6,
@@ -35,6 +39,9 @@ _STEP_SECONDS = {
     "ale_py": 200e-6,
 }
 _MEASURED_STEPS = 20
+
+# Clients say what is measured: of so many kinds, the latest, the seconds are remembered.
+_MOST_MEASURED = 1000
 
 
 def most_workers(config: EnvConfig) -> int:
@@ -50,18 +57,23 @@ def most_workers(config: EnvConfig) -> int:
     return most if most > 1 else 0
 
 
-def choose_num_workers(config: EnvConfig, spec: EnvSpec, sub_env: SubEnv) -> int:
+def choose_num_workers(
+    config: EnvConfig, spec: EnvSpec, sub_env: SubEnv, renderer: RenderThread
+) -> int:
     """Return how many processes run the sub-environments.
 
     Args:
         config: what the client wants, and the most that may be.
         spec: the environment's.
         sub_env: makes one, to measure a step where that is not known.
+        renderer: the process's render thread.
     """
     most = min(most_workers(config), config.max_workers)
-    if config.wants_workers or most < 2:
+    if config.wants_workers:
         return most
-    work = (config.num_envs or 1) * _step_seconds(spec, config, sub_env)
+    if most < 2:
+        return 0
+    work = (config.num_envs or 1) * _step_seconds(spec, config, sub_env, renderer)
     chosen = min(most, int(work / _LEAST_SECONDS))
     return chosen if chosen > 1 else 0
 
@@ -71,21 +83,32 @@ def may_share_processes(spec: EnvSpec) -> bool:
     return registry.module_of(spec).partition(".")[0] in registry.KNOWN_PACKAGES
 
 
-def _step_seconds(spec: EnvSpec, config: EnvConfig, sub_env: SubEnv) -> float:
+def _step_seconds(
+    spec: EnvSpec, config: EnvConfig, sub_env: SubEnv, renderer: RenderThread
+) -> float:
     module = registry.module_of(spec)
     for beginning, seconds in _STEP_SECONDS.items():
         if module.startswith(beginning):
             return seconds
-    key = json.dumps([spec.id, config.kwargs, config.wrappers], default=str, sort_keys=True)
-    if key not in _measured:
-        _measured[key] = _measure(sub_env())
-    return _measured[key]
+    kind = json.dumps([spec.id, config.kwargs, config.wrappers], default=str, sort_keys=True)
+    # A kind may be as long as a request.
+    key = blake2b(kind.encode()).digest()
+    known = _measured.get(key)
+    if known is not None:
+        return known
+    measured = _measure(sub_env(), renderer)
+    with _lock:
+        _measured[key] = measured
+        while len(_measured) > _MOST_MEASURED:
+            del _measured[next(iter(_measured))]
+    return measured
 
 
-_measured: dict[str, float] = {}
+_lock = threading.Lock()
+_measured: dict[bytes, float] = {}
 
 
-def _measure(env: gymnasium.Env) -> float:
+def _measure(env: gymnasium.Env, renderer: RenderThread) -> float:
     """Return the seconds of a step, of an environment that is closed then."""
     try:
         env.reset(seed=0)
@@ -98,4 +121,4 @@ def _measure(env: gymnasium.Env) -> float:
                 env.reset()
         return (time.perf_counter() - began) / _MEASURED_STEPS
     finally:
-        env.close()
+        renderer.run(env.close)

@@ -19,10 +19,11 @@ from gymnasium.vector.utils import batch_space
 
 from gym_server import spaces
 from gym_server.envs.wrappers import draws_when_stepped
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, shutting_down
 from gym_server.processes.cores import spread
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
+from gym_server.threads.interrupt import interrupted_by
 from gym_server.vector_envs.group import Group, Outcome
 from gym_server.vector_envs.group_process import GroupProcess
 from gym_server.vector_envs.infos import final_only, gather
@@ -99,7 +100,10 @@ class SubEnvs:
             self._describe(group.envs[0], group.render_mode)
         else:
             self._describe_one(sub_env)
-            self._start(sub_env, groups)
+            # An interrupt while the thread talks to the fork server would break that, and with it
+            # the processes of all others.
+            with interrupted_by(self.kill):
+                self._start(sub_env, groups)
 
     # Making ---------------------------------------------------------------------------------
 
@@ -129,6 +133,9 @@ class SubEnvs:
         try:
             for _ in groups:
                 self._groups.append(warm_processes.take())
+                # After it is where kill() looks: one of the two finds it.
+                if self._is_closed:
+                    raise shutting_down()
             self._wait_for(
                 (group, "begin_make", (sub_env, numbers, self.autoreset_mode))
                 for group, numbers in zip(self._groups, groups, strict=True)
@@ -349,19 +356,25 @@ class SubEnvs:
                 group.release()
         if self.num_workers == 0:
             return
-        overdue = threading.Timer(_CLOSE_SECONDS, self._kill_processes)
-        overdue.daemon = True
-        overdue.start()
+        is_overdue = threading.Event()
+
+        def end_overdue() -> None:
+            is_overdue.set()
+            self._kill_processes()
+
+        timer = threading.Timer(_CLOSE_SECONDS, end_overdue)
+        timer.daemon = True
+        timer.start()
         try:
             self._wait_for((group, "begin", ("close",)) for group in self._groups)
         except BaseException:
             self._kill_processes()
-            if overdue.is_alive():
+            if not is_overdue.is_set():
                 raise
             # It was killed because it took too long, which is no error of the client's.
             return
         finally:
-            overdue.cancel()
+            timer.cancel()
         for group in self._groups:
             if isinstance(group, GroupProcess) and self._keeps_processes:
                 warm_processes.put(group)

@@ -46,6 +46,7 @@ class WarmProcesses:
         """Keep a process that has closed its group, or end it if there are enough."""
         process.release()
         with self._lock:
+            self._idle = [one for one in self._idle if one[1].is_alive]
             keeps = process.is_alive and len(self._idle) < self._most
             if keeps:
                 self._idle.append((time.monotonic(), process))
@@ -55,7 +56,9 @@ class WarmProcesses:
             process.kill()
 
     def _start_timer(self) -> None:
-        self._timer = threading.Timer(self._idle_seconds, self._end_old)
+        oldest, _ = self._idle[0]
+        left = oldest + self._idle_seconds - time.monotonic()
+        self._timer = threading.Timer(max(0.0, left), self._end_old)
         self._timer.daemon = True
         self._timer.start()
 

@@ -6,6 +6,7 @@ import pytest
 
 from gym_server.api.app import Config, create_app
 from gym_server.errors import GymServerError
+from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.limits import Limits, Room, Watchers
 from gym_server.vector_envs.sub_envs import SubEnvs
 
@@ -157,17 +158,30 @@ def test_processes_that_nobody_asked_for_are_no_more_than_there_is_room_for(limi
     monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
     client = limited(max_processes=3)
 
-    def chosen():
+    def chosen_of(client):
         instance_id = make(client, env_id="Acrobot-v1", num_envs=128).json["instance_id"]
         return client.get(f"/v1/envs/{instance_id}").json["num_workers"]
 
-    assert [chosen(), chosen()] == [3, 0]
+    assert [chosen_of(client), chosen_of(client)] == [3, 0]
     refusal = ask_for_processes(client, 1)
     assert refused(refusal, "too_many_processes")
+    # One alone would run nothing beside another one.
+    assert chosen_of(limited(max_processes=1)) == 0
     # A choice of fewer than what was kept ready leaves room.
     client = limited(max_processes=4)
     assert make(client, env_id="CliffWalking-v1", num_envs=64).status_code == 200
-    assert chosen() == 4
+    assert chosen_of(client) == 4
+
+
+@pytest.mark.parametrize("told", [-5, "many", None])
+def test_what_an_isolated_environment_tells_of_its_processes_frees_no_room(
+    limited, monkeypatch, told
+):
+    about = WorkerBackend.about
+    monkeypatch.setattr(WorkerBackend, "about", lambda self: {**about(self), "num_workers": told})
+    client = limited(isolate="all", max_processes=3)
+    assert ask_for_processes(client, 2).status_code == 200
+    assert refused(make(client), "too_many_processes")
 
 
 def test_processes_that_are_started_at_once_are_no_more(limited):

@@ -1,3 +1,6 @@
+import sys
+import types
+
 import gymnasium
 import pytest
 from faulty_envs import Counting
@@ -37,6 +40,11 @@ class OtherSubEnvs(OwnSubEnvs):
         super().__init__(num_envs)
         self.single_action_space = gymnasium.spaces.Discrete(9)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
+
+
+class SlowCounting(Counting):
+    def __init__(self):
+        super().__init__(seconds=0.001)
 
 
 gymnasium.register("faultyOtherSubEnvs-v0", entry_point=Counting, vector_entry_point=OtherSubEnvs)
@@ -288,11 +296,17 @@ def test_a_number_of_processes_that_cannot_be_is_refused(client, fields, wanted)
         ("faulty_envs:RaisesElsewhere-v0", "The environment raised RuntimeError: not here"),
         # Only this process knows its class.
         ("faultyLocal-v0", "pickle"),
+        ("faultyUnread-v0", "known_here"),
     ],
 )
 def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeypatch, env_id, why):
     monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
     gymnasium.register("faultyLocal-v0", entry_point=lambda: Counting(seconds=0.001))
+    # A name can be sent whatever it means there.
+    known_here = types.ModuleType("known_here")
+    known_here.Slow = type("Slow", (SlowCounting,), {"__module__": "known_here"})
+    monkeypatch.setitem(sys.modules, "known_here", known_here)
+    gymnasium.register("faultyUnread-v0", entry_point=known_here.Slow)
     try:
         found = about(client, env_id, num_envs=64)
         assert (found["vectorization_mode"], found["num_workers"]) == ("sync", 0)
@@ -302,4 +316,4 @@ def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeyp
         assert why in answer.json["message"]
         assert "num_workers 0" in answer.json["hint"]
     finally:
-        del gymnasium.registry["faultyLocal-v0"]
+        del gymnasium.registry["faultyLocal-v0"], gymnasium.registry["faultyUnread-v0"]

@@ -200,6 +200,20 @@ def test_closing_does_not_wait_for_a_process_that_hangs(make, monkeypatch):
     assert not any(map(is_running, pids))
 
 
+def test_closing_is_no_error_while_what_hangs_is_still_being_killed(make, monkeypatch):
+    monkeypatch.setattr("gym_server.vector_envs.sub_envs._CLOSE_SECONDS", 0.3)
+    env = make("HangsWhenClosedElsewhere", num_workers=1)
+    kill = env._kill_processes
+
+    def kill_slowly(*args):
+        kill(*args)
+        if threading.current_thread() is not threading.main_thread():
+            time.sleep(1)
+
+    monkeypatch.setattr(env, "_kill_processes", kill_slowly)
+    env.close()
+
+
 def test_what_cannot_be_sent_is_refused(make):
     gymnasium.register("Local-v0", entry_point=lambda: gymnasium.make("CartPole-v1"))
     try:

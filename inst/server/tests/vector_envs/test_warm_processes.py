@@ -1,5 +1,6 @@
 import os
 import signal
+import time
 
 import gymnasium
 import pytest
@@ -17,7 +18,8 @@ from gym_server.vector_envs.warm_processes import WarmProcesses
 def warm(monkeypatch):
     def warm(**how):
         made.append(WarmProcesses(**how))
-        monkeypatch.setattr("gym_server.vector_envs.sub_envs.warm_processes", made[-1])
+        for user in ("vector_envs.sub_envs", "manager.instance_manager"):
+            monkeypatch.setattr(f"gym_server.{user}.warm_processes", made[-1])
         return made[-1]
 
     made = []
@@ -73,6 +75,41 @@ def test_they_end_after_a_while(warm, eventually):
     env.close()
     assert all(map(is_running, pids))
     eventually(lambda: not any(map(is_running, pids)))
+
+
+def test_none_waits_longer_because_another_one_came_later(warm, eventually):
+    pool = warm(most=2, idle_seconds=2.0)
+    first, second = pool.take(), pool.take()
+    pool.put(first)
+    time.sleep(1.4)
+    pool.put(second)
+    began = time.monotonic()
+    eventually(lambda: not is_running(first.pid))
+    assert is_running(second.pid)
+    eventually(lambda: not is_running(second.pid))
+    # Not after twice as long, when the timer would ring again.
+    assert time.monotonic() - began < 2.5
+
+
+def test_one_that_has_ended_takes_no_place(warm, eventually):
+    pool = warm(most=1)
+    first, second = pool.take(), pool.take()
+    pool.put(first)
+    os.kill(first.pid, signal.SIGKILL)
+    eventually(lambda: not first.is_alive)
+    pool.put(second)
+    assert is_running(second.pid)
+    assert pool.take() is second
+    second.kill()
+
+
+def test_the_end_of_a_server_ends_them(warm, quick, eventually):
+    pool = warm(most=1)
+    app = quick()
+    process = pool.take()
+    pool.put(process)
+    app.close()
+    eventually(lambda: not is_running(process.pid))
 
 
 def test_one_that_has_ended_is_not_given_out(warm, eventually):
