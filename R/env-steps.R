@@ -237,7 +237,8 @@ read_quick_observation <- function(instance, answer, named) {
 
 # The observation in tensors that were read by a form. An array has its names already.
 tensors_observation <- function(instance, space, tensors, named) {
-  tensors$observation %||% read_observation(instance, space, list(tensors = tensors), named)
+  # Not with `$`, which would find the only part of a Tuple or Dict, "observation/...".
+  tensors[["observation"]] %||% read_observation(instance, space, list(tensors = tensors), named)
 }
 
 info_from <- function(instance, answer) {

@@ -80,19 +80,27 @@ make_sub_envs <- function(make, num_envs, num_workers, max_envs, call) {
     }
   }
   full <- num_envs %||% count_sub_envs(traits$observation_bytes %||% 0)
-  make_seeded <- function(n) {
-    make(
-      n, num_workers = num_workers %||% if (max_envs < few_episodes) 0L,
-      vectorization_mode = if (isTRUE(traits$own_implementation)) "sync",
-      autoreset_mode = "SameStep"
+  # No more sub-environments are made than there are episodes.
+  most_workers <- num_workers %||% if (max_envs < few_episodes) 0L
+  env <- if (!is.null(num_envs)) {
+    make_seeded(make, num_envs, traits, most_workers)
+  } else if (!is.null(traits)) {
+    first_supported(
+      function(n) make_seeded(make, n, traits, most_workers), counts_to_try(min(max_envs, full))
     )
   }
-  env <- if (!is.null(num_envs)) {
-    make_seeded(num_envs)
-  } else if (!is.null(traits)) {
-    first_supported(make_seeded, counts_to_try(min(max_envs, full)))
-  }
   list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
+}
+
+# Makes sub-environments with seeds of their own. What has a vector implementation uses no workers.
+# `NULL` as `most_workers` lets the server choose; no more than one for each sub-environment are
+# possible.
+make_seeded <- function(make, n, traits, most_workers = NULL) {
+  own <- isTRUE(traits$own_implementation)
+  make(
+    n, num_workers = if (!is.null(most_workers)) min(most_workers, n),
+    vectorization_mode = if (own) "sync", autoreset_mode = "SameStep"
+  )
 }
 
 # Fewer sub-environments are tried where the server refuses so many.

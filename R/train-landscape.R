@@ -150,12 +150,10 @@ landscape_sub_envs <- 128L
 # Each sub-environment has a seed of its own, so that all networks can play the same episodes.
 make_seeded_sub_envs <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_sub_envs))
-  if_supported(
-    make_unseeded(
-      env_id, num_envs = n, vectorization_mode = "sync", autoreset_mode = "SameStep",
-      client = client
-    )
-  ) %||% make_unseeded(env_id, client = client)
+  make <- env_maker(env_id, list(), client, rlang::caller_env())
+  traits <- sub_env_traits(make)
+  seeded <- if (!is.null(traits)) if_supported(make_seeded(make, n, traits))
+  seeded %||% make(NULL)
 }
 
 #' Play the episodes of all points, side by side

@@ -62,3 +62,18 @@ test_that("tensors by column are what tensors by row are", {
     expect_equal(by_row$tensors$x, values)
   }
 })
+
+test_that("a Tuple or Dict of a single part stays one, step after step", {
+  wrapped <- gym_wrap("Blackjack-v1", "FilterObservation", filter_keys = list(0))
+  env <- gym_make(wrapped, num_envs = 3, autoreset_mode = "SameStep", client = test_client())
+  withr::defer(env$close())
+  env$reset(seed = 1)
+  for (i in 1:4) {
+    out <- env$step(c(0L, 1L, 1L))
+    expect_type(out$observation, "list")
+    expect_length(out$observation, 1L)
+    expect_length(out$observation[[1L]], 3L)
+    bare <- step_bare(env, c(0L, 1L, 1L), finals = FALSE)
+    expect_type(bare$observation, "list")
+  }
+})

@@ -126,3 +126,10 @@ test_that("a worker killed in the middle ends a rollout with the batches before 
   expect_identical(nrow(cnd$result$episodes) %% 8L, 0L)
   expect_identical(nrow(rollout("FrozenLake-v1", policy_random(), 3, client = server)$episodes), 3L)
 })
+
+test_that("no more workers are asked for than there are sub-environments", {
+  client <- test_client()
+  play <- function(...) rollout("FrozenLake-v1", policy_random(), seed = 1, client = client, ...)
+  expect_identical(play(1, num_workers = 2)$episodes, play(1)$episodes)
+  expect_identical(play(3, num_workers = 5)$episodes, play(3)$episodes)
+})
