@@ -66,8 +66,8 @@ naming_call <- function(code, vector_env) {
 }
 
 # Plays the episodes from `first` to `last` of a batch. `game` is what stays the same, `player` what
-# changes: `rows` has an element for each sub-environment that plays (which episode of the batch, its
-# number, the return so far, and how many steps had been taken when the episode began), and
+# changes: `rows` has an element for each sub-environment that plays (which episode of the batch,
+# its number, the return so far, and how many steps had been taken when the episode began), and
 # `observation` a row.
 play_episodes <- function(vector_env, batch, first, last, policy, max_steps, keep_steps,
                           keep_next) {
