@@ -2,13 +2,18 @@ import gymnasium
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
+from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
+from gym_server.vector_envs.sub_env import SubEnv
 
 
 @pytest.fixture
 def group():
-    group = Group(lambda: gymnasium.make("CartPole-v1"), [4, 5, 6], AutoresetMode.NEXT_STEP)
+    spec = gymnasium.spec("CartPole-v1")
+    sub_env = SubEnv(spec, None, {}, (), RenderThread(), MemoryReservation())
+    group = Group(sub_env, [4, 5, 6], AutoresetMode.NEXT_STEP)
     group.reset([0, 1, 2], [1, 2, 3], [None] * 3, None)
     yield group
     group.close()
