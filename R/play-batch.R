@@ -85,7 +85,8 @@ play_episodes <- function(vector_env, batch, first, last, policy, max_steps, kee
   while (length(player$rows$episode)) {
     n <- length(player$rows$episode)
     player$action <- act_batch(player$acting, player$observation, n, vector_env)
-    end_step(game, player, step(player$action, player$rows$sub_env))
+    out <- step(player$action, player$rows$sub_env)
+    end_step(game, player, out)
   }
 }
 
