@@ -88,6 +88,9 @@ class Bounds:
     @cached_property
     def _same_for_all(self) -> tuple[Any, Any] | None:
         """The bounds as two numbers, where all elements have the same."""
+        # What is derived from NumPy's arrays compares as it likes.
+        if not {type(self.low), type(self.high)} <= {np.ndarray, int}:
+            return None
         low, high = np.asarray(self.low), np.asarray(self.high)
         if not low.size or low.min() != low.max() or high.min() != high.max():
             return None
