@@ -25,6 +25,7 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.threads.interrupt import interrupted_by
 from gym_server.vector_envs.group import Group, Outcome
+from gym_server.vector_envs.group_calls import AnyGroup, call_all
 from gym_server.vector_envs.group_process import GroupProcess
 from gym_server.vector_envs.infos import final_only, gather
 from gym_server.vector_envs.local_group import LocalGroup
@@ -93,7 +94,7 @@ class SubEnvs:
         # The place of each group's first sub-environment, and how many there are in all.
         self._bounds = _bounds(num_envs, max(1, num_workers))
         groups = [range(first, end) for first, end in pairwise(self._bounds)]
-        self._groups: list[LocalGroup | GroupProcess] = []
+        self._groups: list[AnyGroup] = []
         if num_workers == 0:
             group = Group(sub_env, groups[0], autoreset_mode)
             self._groups.append(LocalGroup(group, renderer))
@@ -136,7 +137,7 @@ class SubEnvs:
                 # After it is where kill() looks: one of the two finds it.
                 if self._is_closed:
                     raise shutting_down()
-            self._wait_for(
+            call_all(
                 (group, "begin_make", (sub_env, numbers, self.autoreset_mode))
                 for group, numbers in zip(self._groups, groups, strict=True)
             )
@@ -276,7 +277,7 @@ class SubEnvs:
         """
         bounds = self._bounds if which is None else np.searchsorted(which, self._bounds).tolist()
 
-        def calls() -> Iterator[tuple[LocalGroup | GroupProcess, str, tuple]]:
+        def calls() -> Iterator[tuple[AnyGroup, str, tuple]]:
             for group, (first, last), start in zip(
                 self._groups, pairwise(bounds), self._bounds, strict=False
             ):
@@ -285,28 +286,7 @@ class SubEnvs:
                     own = None if which is None else (which[rows] - start).tolist()
                     yield group, "begin", (method, own, *arguments(rows))
 
-        return self._wait_for(calls())
-
-    def _wait_for(self, calls: Iterator[tuple[LocalGroup | GroupProcess, str, tuple]]) -> list:
-        """Begin all calls, wait for all results; then raise the first error."""
-        results = []
-        begun = []
-        failure: BaseException | None = None
-        try:
-            for group, begin, arguments in calls:
-                getattr(group, begin)(*arguments)
-                begun.append(group)
-        except BaseException as refusal:
-            failure = refusal
-        for group in begun:
-            # All must be taken: a result that is left would be taken for that of the next call.
-            try:
-                results.append(group.finish())
-            except BaseException as refusal:
-                failure = failure or refusal
-        if failure is not None:
-            raise failure
-        return results
+        return call_all(calls())
 
     def _ask_one(self, method: str, sub_env: int) -> Any:
         place = int(np.searchsorted(self._bounds, sub_env, side="right")) - 1
@@ -366,7 +346,7 @@ class SubEnvs:
         timer.daemon = True
         timer.start()
         try:
-            self._wait_for((group, "begin", ("close",)) for group in self._groups)
+            call_all((group, "begin", ("close",)) for group in self._groups)
         except BaseException:
             self._kill_processes()
             if not is_overdue.is_set():
