@@ -28,7 +28,7 @@ settings <- function(quick) {
          step_turns = 10L, turn_steps = 80)
   } else {
     list(turns = 7L, seconds = 0.7, num_envs = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
-         rounds = 50, fresh = 5L, steps = 1e6, rollout_turns = 5L,
+         rounds = 50, fresh = 5L, steps = 1e6, rollout_turns = 3L,
          step_turns = 40L, turn_steps = 160)
   }
 }
