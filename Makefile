@@ -13,7 +13,7 @@ endif
 help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
 	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
-	@echo '               some ten minutes, or a glance: make bench QUICK=1'
+	@echo '               half an hour, or a glance: make bench QUICK=1; PARTS="wire" runs that'
 	@echo 'make test      the tests of the main promises: of the server (pytest) and of the R package'
 	@echo '               (testthat); some five minutes'
 	@echo 'make test-all  every test of both'
@@ -33,7 +33,7 @@ demo:
 
 bench:
 	@tools/setup bench
-	@tools/in-env Rscript --no-init-file tools/bench.R $(if $(QUICK),quick)
+	@tools/in-env Rscript --no-init-file tools/bench.R $(if $(QUICK),quick) $(PARTS)
 
 test:
 	@tools/setup test

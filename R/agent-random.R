@@ -59,8 +59,8 @@
 #'     \item{target}{The target, a double, or `NULL`.}
 #'     \item{env_id}{The environment's id, a string.}
 #'     \item{env}{The environment when an object was given, otherwise `NULL`.}
-#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
-#'       where each episode has a seed of its own. [rollout()] says how to begin one again.}
+#'     \item{num_envs}{How many sub-environments played, an integer. Where they share the seed of
+#'       an episode, [rollout()] says how to begin one again.}
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same search.}

@@ -5,10 +5,13 @@
 #' that all of them can play.
 #'
 #' An environment that is named by its id is made, and closed by `$close()`. It gets 256
-#' sub-environments where Gymnasium has a vector implementation of it that plays the same game,
-#' otherwise 16; none where the server cannot make them or where a wrapper remembers something over
-#' episodes (`NormalizeObservation`, `NormalizeReward`). One that was made before is played as it
-#' is, and left open.
+#' sub-environments; where an observation is large fewer, so that those of all together take no
+#' more than a mebibyte, but at least 16; and none where a wrapper remembers something over episodes
+#' (`NormalizeObservation`, `NormalizeReward`). A server that cannot make so many makes a quarter of
+#' them, 16, or a single environment. Where Gymnasium has a vector implementation that plays the
+#' same game it is taken; elsewhere each sub-environment has a seed of its own, and the server
+#' divides them among processes where that pays. One that was made before is played as it is, and
+#' left open.
 #'
 #' @param x The environment: an id such as `"CartPole-v1"`, perhaps with wrappers (see
 #'   [gym_wrap()]), an environment made by [gym_make()] or [gym_env()], or any list or environment
@@ -16,6 +19,10 @@
 #'   `action_space` and `spec`.
 #' @param num_envs How many sub-environments to make, a whole number of at least 1. `NULL`, the
 #'   default, chooses; an environment that was made before has the number that it has.
+#' @param num_workers How many processes run the sub-environments, a whole number: 0 for none but
+#'   the server itself. `NULL`, the default, lets the server choose, and takes none for fewer than
+#'   32 episodes (`max_envs`). What is played does not depend on it. Only where the environment is
+#'   named by its id and has no vector implementation of its own.
 #' @param ... The environment's own arguments, by name, where it is named by its id.
 #' @param max_envs No more sub-environments than this are made where `num_envs` is `NULL` and each
 #'   has a seed of its own, a number; by default there is no limit.
@@ -32,13 +39,21 @@
 #'     \item{batch_size}{How many episodes make a batch, an integer.}
 #'     \item{one_seed}{`TRUE` where one random generator serves all sub-environments, which are
 #'       then reset together; `FALSE` where each has a seed of its own.}
+#'     \item{begins_next}{`TRUE` where a sub-environment that has ended begins its next episode by
+#'       itself, in the same step, as long as it has seeds. `FALSE` or `NULL` where it must be
+#'       reset.}
 #'     \item{reset(seeds, which)}{A function that starts episodes and returns the first
 #'       observations, a row for each: with `one_seed` in all sub-environments, `seeds` being one
 #'       whole number; otherwise in the sub-environments with the numbers `which`, in increasing
-#'       order, with a seed for each.}
+#'       order, with a seed for each. With `begins_next` `seeds` may also be a list with a vector of
+#'       seeds for each: the first for now, the others for the episodes that it begins by itself.}
 #'     \item{step(action, which)}{A function that steps the sub-environments with the numbers
 #'       `which`; `action` has a row for each of these, and so has what it returns, a list of
-#'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`.}
+#'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, which is what
+#'       the step led to. `observation` is the same, but where another episode began in this step:
+#'       there it is the first one of that episode.}
+#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, where that is
+#'       quicker; otherwise `NULL`.}
 #'     \item{frame()}{A function that returns the current frame as the bytes of a PNG file; `NULL`
 #'       where no frames are wanted.}
 #'     \item{remembers}{The names of wrappers that remember something over episodes, strings; then
@@ -57,20 +72,29 @@
 #' str(lakes$step(c(2L, 1L), which = c(1L, 3L)))
 #' lakes$close()
 as_vector_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
-                          client = gym_client()) {
+                          client = gym_client(), num_workers = NULL) {
   UseMethod("as_vector_env")
 }
 
 #' @export
 as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
-                                    client = gym_client()) {
+                                    client = gym_client(), num_workers = NULL) {
   check_environment(x)
+  check_count(num_workers, min = 0, allow_null = TRUE)
   if (is_registered(x)) {
+    check_for_r(x, list(num_workers = num_workers))
     return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
   }
   call <- rlang::caller_env()
-  env <- make_vector_env(x, num_envs, list(...), max_envs, frames, client, call)
-  vector_env <- vector_env_of(env, frames, batch_size = num_envs %||% sync_sub_envs)
+  make <- env_maker(x, list(...), client, call)
+  single <- frames || length(remembering(wrapper_names(noted_wrappers(x))))
+  made <- if (single) {
+    list(env = make(NULL))
+  } else {
+    make_sub_envs(make, num_envs, num_workers, max_envs, call)
+  }
+  env <- made$env
+  vector_env <- vector_env_of(env, frames, made$batch_size)
   vector_env$close <- function(wait = TRUE) {
     # A server that hangs must not be waited for again.
     if (wait) close_or_warn(env) else close_unused(env$client, env$instance_id)
@@ -83,9 +107,9 @@ as_vector_env.gym_wrapped <- as_vector_env.character
 
 #' @export
 as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
-                                  client = gym_client()) {
+                                  client = gym_client(), num_workers = NULL) {
   check_environment(x)
-  check_made_before(num_envs, list(...), x)
+  check_made_before(num_envs, c(list(...), num_workers = num_workers), x)
   vector_env_of(x, frames)
 }
 
@@ -114,93 +138,46 @@ close_or_warn <- function(env) {
   )
 }
 
-# Making one from its id -------------------------------------------------------------
-
-# How many sub-environments an environment gets that is made from its id, and so how many episodes
-# make a batch. These numbers must not depend on how many episodes are asked for: then the first
-# episodes are the same however many follow.
-entry_point_sub_envs <- 256L
-sync_sub_envs <- 16L
-
-make_vector_env <- function(env_id, num_envs, arguments, max_envs, frames, client, call) {
-  make <- function(num_envs, vectorization_mode = NULL, autoreset_mode = NULL) {
-    rlang::exec(
-      make_unseeded, env_id, !!!arguments, num_envs = num_envs,
-      vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, client = client,
-      call = call
-    )
-  }
-  if (frames || length(remembering(wrapper_names(noted_wrappers(env_id))))) {
-    return(make(NULL))
-  }
-  own <- if (has_vector_implementation(make)) {
-    if_supported(make(num_envs %||% entry_point_sub_envs, "vector_entry_point"))
-  }
-  if (!is.null(num_envs)) {
-    return(own %||% make(num_envs, "sync", "Disabled"))
-  }
-  own %||% if_supported(make(min(max_envs, sync_sub_envs), "sync", "Disabled")) %||% make(NULL)
-}
-
-# Does the server choose the environment's own vector implementation where it may choose? The
-# question is asked with one sub-environment, because making many takes long.
-has_vector_implementation <- function(make) {
-  sub_env <- if_supported(make(1L))
-  if (is.null(sub_env)) {
-    return(FALSE)
-  }
-  on.exit(close_quietly(sub_env))
-  identical(sub_env$vectorization_mode, "vector_entry_point")
-}
-
-# The codes of errors that an environment with fewer sub-environments, or with none, may not have.
-fewer_sub_envs_codes <- c(
-  "not_supported", "too_many_sub_envs", "too_much_memory", "unsupported_space"
-)
-
-# Evaluates code that makes an environment. NULL where the server cannot make such sub-environments,
-# or not that many.
-if_supported <- function(code) {
-  tryCatch(
-    code,
-    gym_error_http = function(cnd) {
-      if (!isTRUE(cnd$code %in% fewer_sub_envs_codes)) {
-        rlang::cnd_signal(cnd)
-      }
-    }
-  )
-}
-
 # Seeing one as a vector environment ---------------------------------------------------
 
 #' Describe an environment that was made as a vector environment
 #'
 #' @param batch_size How many episodes make a batch where each sub-environment has a seed of its
-#'   own; `NULL` for as many as there are sub-environments.
+#'   own; `NULL` for what follows from how many sub-environments there are.
 #' @return As [as_vector_env()].
 #' @noRd
 vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::caller_env()) {
   vector_env <- if (is.null(env$num_envs)) {
     single_env(env)
-  } else if (identical(env$vectorization_mode, "sync")) {
-    independent_sub_envs(env)
-  } else {
+  } else if (identical(env$vectorization_mode, "vector_entry_point")) {
     check_ended_can_step(env, call)
     joint_sub_envs(env)
+  } else {
+    independent_sub_envs(env)
   }
   vector_env$spec <- env$spec
   vector_env$client <- env$client
-  vector_env$batch_size <- as.integer(
-    if (vector_env$one_seed || is.null(env$num_envs)) vector_env$num_envs
-    else batch_size %||% vector_env$num_envs
-  )
+  vector_env$batch_size <- if (vector_env$one_seed || is.null(env$num_envs)) {
+    vector_env$num_envs
+  } else {
+    batch_size %||% episodes_of_batch(vector_env$num_envs)
+  }
   vector_env$remembers <- remembering(env$spec$wrappers)
   vector_env$close <- function(wait = TRUE) NULL
   if (frames) {
     check_draws(env, call)
     vector_env$frame <- function() png_frame(env$client, env$instance_id, call)
+    # The last frame of an episode is drawn before the next one begins.
+    vector_env$begins_next <- FALSE
   }
   structure(vector_env, class = "gym_vector_env")
+}
+
+# How many episodes make a batch in sub-environments with seeds of their own: with four of them
+# each, few sub-environments have nothing to play while the last episodes end. Where there is only
+# one, what is interrupted loses no episode that has ended.
+episodes_of_batch <- function(num_envs) {
+  as.integer(if (num_envs == 1L) 1L else 4L * num_envs)
 }
 
 # An environment without sub-environments plays one episode after the other.
@@ -209,7 +186,7 @@ single_env <- function(env) {
   actions <- env$action_space
   list(
     observation_space = observed, action_space = actions, num_envs = 1L, one_seed = FALSE,
-    reset = function(seeds, which = 1L) batch_of(observed, list(env$reset(seed = seeds))),
+    reset = function(seeds, which = 1L) batch_of(observed, list(begin_all(env, seeds))),
     step = function(action, which = 1L) {
       out <- take_step(env, 1L, batch_value(actions, action, 1L))
       out$observation <- batch_of(observed, list(out$observation))
@@ -219,49 +196,92 @@ single_env <- function(env) {
   )
 }
 
-# With "sync", each sub-environment is an environment of its own: it has a seed of its own, and only
-# those that are playing are stepped.
+# With "sync" and "async" each sub-environment is an environment of its own: it has a seed of its
+# own, and only those that are playing are stepped. Only a server's environments have `num_workers`;
+# what else has sub-environments need not know how to begin an episode by itself.
 independent_sub_envs <- function(env) {
   n <- env$num_envs
   space <- env$single_observation_space
+  # The first time all are reset, because the others have no episode yet.
   was_reset <- FALSE
-  # The first time all are reset, because the others have no episode yet; and so it is always with
-  # an environment of the user's, which need not know masks.
   reset <- function(seeds, which) {
-    some <- was_reset && length(which) < n && inherits(env, "gym_server_env")
+    some <- was_reset && length(which) < n
+    if (some && is_server_env(env)) {
+      return(reset_bare(env, seeds, which))
+    }
     seed <- rep(if (some) NA_real_ else seeds, length.out = n)
     seed[which] <- seeds
     observation <- if (some) {
       env$reset(seed = seed, mask = seq_len(n) %in% which)
     } else {
-      env$reset(seed = seed)
+      begin_all(env, seed)
     }
     was_reset <<- TRUE
     batch_rows(space, observation, which)
   }
+  step <- function(action, which) {
+    out <- take_step(env, length(which), action, if (length(which) < n) which)
+    out$next_observation <- out$next_observation %||% out$observation
+    out
+  }
+  begins_next <- !is.null(env$num_workers) && identical(env$autoreset_mode, "SameStep")
   list(
     observation_space = space, action_space = env$single_action_space, num_envs = n,
-    one_seed = FALSE, reset = reset,
-    step = function(action, which) {
-      out <- if (length(which) == n) {
-        take_step(env, n, action)
-      } else {
-        take_step(env, length(which), action, which = which)
-      }
-      out$next_observation <- out$next_observation %||% out$observation
-      out
-    }
+    one_seed = FALSE, reset = reset, begins_next = begins_next, step = step,
+    step_bare = if (begins_next && is_server_env(env)) bare_stepper(env)
   )
 }
 
-# With "vector_entry_point" and "async", all sub-environments are always stepped, also those whose
-# episode has ended; what these return is left out. With "vector_entry_point" one generator serves
-# all sub-environments, so there is one seed for all.
+# Makes the function `step_bare()` of sub-environments that rest after their last episode.
+bare_stepper <- function(env) {
+  choose <- step_chooser(env)
+  function(action, which) {
+    step <- choose(action, which)
+    out <- take_step(env, step$n, step$action, step$which, finals = FALSE)
+    if (is.null(step$row)) out else rows_of_step(env, out, step$row)
+  }
+}
+
+# Makes a function that decides which sub-environments are stepped for those that play. Others that
+# were stepped before are stepped along, whose results nobody uses: a request for other
+# sub-environments is another request, which has to be prepared. When fewer than half of them still
+# play, the others are left out.
+step_chooser <- function(env) {
+  n <- env$num_envs
+  actions <- env$single_action_space
+  stepped <- NULL
+  function(action, which) {
+    row <- match(which, stepped)
+    if (anyNA(row) || 2L * length(which) <= length(stepped)) {
+      stepped <<- which
+      row <- seq_along(which)
+    }
+    count <- length(stepped)
+    along <- length(which) < count
+    list(
+      action = if (along) actions_of_all(actions, action, row, count) else action,
+      which = if (count < n) stepped, n = count, row = if (along) row
+    )
+  }
+}
+
+rows_of_step <- function(env, out, row) {
+  space <- env$single_observation_space
+  same <- identical(out$observation, out$next_observation)
+  observation <- batch_rows(space, out$observation, row)
+  list(
+    observation = observation, reward = out$reward[row], terminated = out$terminated[row],
+    truncated = out$truncated[row],
+    next_observation = if (same) observation else batch_rows(space, out$next_observation, row)
+  )
+}
+
+# With "vector_entry_point" one generator serves all sub-environments, so there is one seed for all.
+# All are always stepped, also those whose episode has ended; what these return is left out.
 joint_sub_envs <- function(env) {
   n <- env$num_envs
   observed <- env$single_observation_space
   actions <- env$single_action_space
-  one_seed <- !identical(env$vectorization_mode, "async")
   rows <- function(out, which) {
     out <- out[c("observation", "reward", "terminated", "truncated", "next_observation")]
     if (length(which) == n) {
@@ -277,14 +297,9 @@ joint_sub_envs <- function(env) {
       next_observation = after
     )
   }
-  reset <- if (one_seed) {
-    function(seeds, which = NULL) env$reset(seed = seeds)
-  } else {
-    independent_sub_envs(env)$reset
-  }
   list(
-    observation_space = observed, action_space = actions, num_envs = n, one_seed = one_seed,
-    reset = reset,
+    observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,
+    reset = function(seeds, which = NULL) begin_all(env, seeds),
     step = function(action, which) {
       out <- take_step(env, n, actions_of_all(actions, action, which, n))
       out$next_observation <- out$next_observation %||% out$observation

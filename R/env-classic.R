@@ -33,10 +33,10 @@
 #'   with a pipe.
 #' @param vectorization_mode How the sub-environments are run: `"vector_entry_point"`, by the
 #'   environment's own implementation, by far the fastest where there is one, as in
-#'   CartPole; `"sync"`, one after the other; `"async"`, each in a process of its own,
-#'   for environments that take long for a step. `NULL`, the default, takes the
-#'   environment's own implementation where there is one that does what is asked for,
-#'   else `"sync"`. Only with `num_envs`.
+#'   CartPole; `"sync"`, one after the other in the server's own process; `"async"`, in groups, each
+#'   in a worker process, which pays where a step takes long. `"sync"` and `"async"` behave alike.
+#'   `NULL`, the default, takes the environment's own implementation where there is one that does
+#'   what is asked for, else lets `num_workers` decide. Only with `num_envs`.
 #' @param autoreset_mode What becomes of a sub-environment whose episode has ended:
 #'   `"NextStep"`, it is reset by the next step, whose action and reward do not
 #'   count; `"SameStep"`, it is reset within the step, and its last observation is in
@@ -45,13 +45,19 @@
 #' @param name What you call it, a string of at most 100 printable characters, by
 #'   which [env_list()] shows it to those who share the server; `NULL`, the default,
 #'   for no name.
+#' @param num_workers How many worker processes run the sub-environments, a whole number: 0 is
+#'   `"sync"`, more are `"async"`. What comes of it is the same for any number. `NULL`, the default,
+#'   lets the server choose: none where a step of all of them takes little time, else at most as
+#'   many as there are cores that it may use. Only with `num_envs`, at most as many as that, and not
+#'   with `"vector_entry_point"`.
 #' @return The instance's id, a string of 8 hexadecimal digits.
 #' @section Errors: `gym_error_http_400` for an id that the server does not
 #'   know, with the nearest ones as a hint, for arguments that the environment
 #'   does not take (code `invalid_kwargs`), for a wrapper that the server does not
 #'   allow (code `wrapper_not_allowed`; the hint lists those that it does), for a
-#'   `vectorization_mode` that cannot do what else is asked for (code `not_supported`;
-#'   the hint says what can), and when a part of the server is not installed (code
+#'   `vectorization_mode` that cannot do what else is asked for, or worker processes in which the
+#'   environment cannot be made (code `not_supported`; the hint says what can be done), and when a
+#'   part of the server is not installed (code
 #'   `missing_dependency`; the hint says how); `gym_error_http_429` for more sub-environments than
 #'   the server allows (code `too_many_sub_envs`), when it has as many environments or
 #'   processes as it allows (codes `too_many_instances`, `too_many_processes`), or where the
@@ -64,7 +70,8 @@
 #'   has used or watched for a day, unless it was started with other limits
 #'   (`max_call_seconds` and `idle_minutes` of [gym_server_start()]). Every later call
 #'   then says so: `gym_error_http_504` with code `call_too_long`, `gym_error_http_410`
-#'   with code `instance_idle_closed`.
+#'   with code `instance_idle_closed`. When a process in which an environment or some of its
+#'   sub-environments live has ended, it is `gym_error_http_500` with code `environment_died`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -79,13 +86,13 @@
 #' env_close(client, three)
 env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NULL,
                        kwargs = list(), wrappers = list(), vectorization_mode = NULL,
-                       autoreset_mode = NULL, name = NULL) {
+                       autoreset_mode = NULL, name = NULL, num_workers = NULL) {
   check_client(x)
   check_not_registered(env_id)
   check_named_list(kwargs)
   create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
-    name
+    name, num_workers
   )
 }
 
@@ -147,7 +154,7 @@ env_list_all <- function(x) {
 #'   unless there is other text beside them; an integer beyond 2^53 arrives as text.
 #' @section Errors: `gym_error_http_400` for an unknown instance, and with code
 #'   `not_supported` for a `mask` or a seed for each sub-environment where the environment's own
-#'   implementation cannot do that (`"sync"` can); `gym_error_http_500` for an error
+#'   implementation cannot do that (`"sync"` and `"async"` can); `gym_error_http_500` for an error
 #'   inside the environment; `gym_error_argument`, also for a `mask` or `seed` whose
 #'   length is not the number of sub-environments; `gym_error_connection`. Nothing has moved,
 #'   except perhaps after an error inside an environment.
@@ -186,7 +193,8 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   there each such step waits for real time. [env_render()] fetches a picture.
 #' @param which For a vector environment: the numbers of the sub-environments that are to step,
 #'   counted from 1 and in increasing order; `action` and what is returned then have rows for
-#'   these alone. `NULL`, the default, steps all. Needs `vectorization_mode = "sync"`.
+#'   these alone. `NULL`, the default, steps all. An environment's own vector implementation always
+#'   steps all: make it with `vectorization_mode = "sync"`.
 #' @return A list of
 #'   * `observation`, as from [env_reset()],
 #'   * `reward`, a number,

@@ -2,7 +2,7 @@
 
 create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
-                            call = rlang::caller_env()) {
+                            num_workers = NULL, call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
   if (inherits(env_id, "gym_wrapped")) {
     wrappers <- c(env_id$wrappers, wrappers)
@@ -13,10 +13,12 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_count(num_envs, allow_null = TRUE, call = call)
   check_vector_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
   check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
+  check_num_workers(num_workers, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
   fields <- c(
     env_id = json_string(env_id),
     num_envs = if (!is.null(num_envs)) whole_text(num_envs),
+    num_workers = if (!is.null(num_workers)) whole_text(num_workers),
     vectorization_mode = if (!is.null(vectorization_mode)) json_string(vectorization_mode),
     autoreset_mode = if (!is.null(autoreset_mode)) json_string(autoreset_mode),
     seed = encode_seed(seed, num_envs, call),
@@ -86,6 +88,7 @@ ask_instance <- function(client, instance_id, call) {
   instance$reset_route <- paste0(route, "reset/")
   instance$step_route <- paste0(route, "step/")
   instance$num_envs <- answer$num_envs
+  instance$num_workers <- answer$num_workers
   instance$vectorization_mode <- shown_line(answer$vectorization_mode)
   instance$autoreset_mode <- shown_line(answer$autoreset_mode)
   instance$single_action_space <- read_values(space_of(answer$action_space), "Its `action_space`")
@@ -101,6 +104,7 @@ ask_instance <- function(client, instance_id, call) {
   instance$actions <- sent_space(instance$single_action_space, answer$num_envs)
   instance$observations <- sent_space(instance$single_observation_space, answer$num_envs)
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
+  instance$read_observation <- if (is.null(answer$num_envs)) json_reader(instance$observations)
   instance$takes_tensors <- as_tensors(instance$single_observation_space)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
   instance$spec <- list(
@@ -114,6 +118,9 @@ ask_instance <- function(client, instance_id, call) {
   )
   instance$draws <- !is.null(answer$render_mode)
   instance$done <- FALSE
+  # One for each form of the call, made when it is first called so.
+  instance$reset_lines <- vector("list", 4L)
+  instance$step_lines <- vector("list", 16L)
   instance
 }
 
@@ -135,130 +142,14 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
   )
 }
 
-#' Start an episode
-#' @param named Whether observations are to carry their names: those of the classic calls do not.
-#' @noRd
-reset_instance <- function(client, instance, seed, options, return_info = FALSE, mask = NULL,
-                           named = FALSE, call = rlang::caller_env()) {
-  check_mask(mask, instance, call)
-  close_queued(client)
-  fields <- c(
-    seed = encode_seed(seed, instance$num_envs, call),
-    options = encode_options(options, call),
-    reset_mask = if (!is.null(mask)) to_json(I(mask))
-  )
-  if (instance$classic) {
-    check_classic_fields(client, fields, NULL, call)
-  }
-  answer <- post_once(
-    client, instance$reset_route, fields, take_tensors = instance$takes_tensors, call = call
-  )
-  instance$done <- FALSE
-  check_answer_info(answer)
-  observation <- decode_observation(instance$observations, answer)
-  if (named) observation <- with_names(instance, observation)
-  if (return_info) {
-    list(observation = observation, info = info_from(instance, answer))
-  } else {
-    observation
-  }
-}
-
-decode_observation <- function(space, answer, name = "observation") {
-  read_values(
-    if (is.null(answer$tensors)) {
-      decode_value(space, answer[[name]])
-    } else {
-      from_tensors(space, name, answer)
-    },
-    paste0("Its `", name, "`")
-  )
-}
-
-with_names <- function(instance, observation) {
-  name_observation <- instance$name_observation
-  if (is.null(name_observation)) observation else name_observation(observation)
-}
-
-info_from <- function(instance, answer) {
-  if (is.null(instance$num_envs)) {
-    info_from_json(answer$info %||% empty_object)
-  } else {
-    info_by_sub_env(answer$info, instance$num_envs)
-  }
-}
-
-step_instance <- function(client, instance, action, render, which = NULL, named = FALSE,
-                          call = rlang::caller_env()) {
-  fields <- c(render = if (render) "true" else "false")
-  if (!is.null(which) || !is.null(instance$num_envs)) {
-    return(step_vector_env(client, instance, action, fields, which, named, call))
-  }
-  space <- instance$actions
-  # A classic server's error does not say that an action was wrong, so bounds are checked here.
-  bounds <- instance$classic && inherits(space, "gym_space_discrete")
-  check_value(space, action, "", call, bounds)
-  answer <- send_action(client, instance, space, action, write_value(space, action), fields, call)
-  if (!is.null(answer$tensors)) {
-    answer[c("reward", "terminated", "truncated")] <-
-      answer$tensors[c("reward", "terminated", "truncated")]
-    check_answer_results(answer, 1L)
-    answer$done <- answer$terminated || answer$truncated
-  } else if (instance$classic) {
-    answer <- classic_flags(answer)
-  }
-  check_answer_flags(answer)
-  check_answer_info(answer)
-  if (isTRUE(instance$done)) {
-    warn_step_after_done(instance, call)
-  } else if (isFALSE(instance$done)) {
-    instance$done <- answer$done
-  }
-  observation <- decode_observation(instance$observations, answer)
-  list(
-    observation = if (named) with_names(instance, observation) else observation,
-    reward = number_from(answer$reward, "reward"),
-    done = answer$done,
-    info = info_from_json(answer$info),
-    terminated = answer$terminated,
-    truncated = answer$truncated
-  )
-}
-
-# `json` is the action as JSON, a promise that is evaluated only if the action is sent so.
-send_action <- function(client, instance, space, action, json, fields, call) {
-  route <- instance$step_route
-  if (!instance$sends_tensors) {
-    fields <- c(action = json, fields)
-    return(post_once(client, route, fields, take_tensors = instance$takes_tensors, call = call))
-  }
-  tensors <- to_tensors(space, action, "action", call)
-  texts <- vapply(tensors, is.character, NA)
-  if (any(texts)) {
-    fields <- c(fields, texts = to_json(tensors[texts]))
-    tensors <- tensors[!texts]
-  }
-  post_once(client, route, fields, tensors = tensors, take_tensors = TRUE, call = call)
-}
-
-warn_step_after_done <- function(instance, call) {
-  # NA: the episode is over, and the warning has been given.
-  instance$done <- NA
-  rlang::warn(
-    c(
-      paste0("Instance ", instance$id, " of ", instance$spec$id,
-             " took a step after the end of its episode."),
-      i = "What comes of it is undefined: reset the environment first."
-    ),
-    class = "gym_warning_step_after_done",
-    call = call
-  )
-}
-
-# One seed for all, or in a vector environment one for each sub-environment, NA for none.
+# One seed for all, or in a vector environment one for each sub-environment, NA for none; or a list
+# with several for a sub-environment, the later ones for the episodes that it begins by itself.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
+  }
+  if (inherits(seed, "gym_seed_lists")) {
+    return(encode_seed_lists(seed, num_envs, call))
   }
   if (is.null(num_envs) || length(seed) == 1L) {
     check_count(seed, min = 0, max = 2^53, call = call)
@@ -266,6 +157,17 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   }
   check_sub_env_seeds(seed, num_envs, call)
   json_array(ifelse(is.na(seed), "null", whole_text(seed)))
+}
+
+# A vector of seeds for each sub-environment, `NULL` for those that are not reset.
+encode_seed_lists <- function(seeds, num_envs, call) {
+  fits <- function(one) is.null(one) || length(one) && are_whole(one, 0, 2^53)
+  if (is.null(num_envs) || length(seeds) != num_envs || !all(vapply(seeds, fits, NA))) {
+    abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seeds", call)
+  }
+  json_array(vapply(seeds, function(one) {
+    if (is.null(one)) "null" else json_array(whole_text(one))
+  }, ""))
 }
 
 encode_options <- function(options, call) {

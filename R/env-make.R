@@ -58,8 +58,9 @@
 #'     [env_action_space_info()],
 #'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
 #'     single environment the same,
-#'   * `$num_envs`, `$vectorization_mode`, `$autoreset_mode`: how many sub-environments there are
-#'     and what was chosen for them, see [env_create()]; `NULL` in a single environment,
+#'   * `$num_envs`, `$vectorization_mode`, `$num_workers`, `$autoreset_mode`: how many
+#'     sub-environments there are and what was chosen for them, see [env_create()]; `NULL` in a
+#'     single environment, and `$num_workers` also with a vector implementation,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
 #'     the latter three `NULL` where the environment has none, and `wrappers` (their names),
@@ -95,25 +96,27 @@
 #' poles$close()
 gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                      wrappers = list(), client = gym_client(), vectorization_mode = NULL,
-                     autoreset_mode = NULL, name = NULL) {
+                     autoreset_mode = NULL, name = NULL, num_workers = NULL) {
   make_unseeded(
     env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode, num_envs = num_envs,
     wrappers = wrappers, client = client, vectorization_mode = vectorization_mode,
-    autoreset_mode = autoreset_mode, name = name, call = rlang::current_env()
+    autoreset_mode = autoreset_mode, name = name, num_workers = num_workers,
+    call = rlang::current_env()
   )
 }
 
 # As gym_make(), but without a seed it draws none.
 make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                           wrappers = list(), client = gym_client(), vectorization_mode = NULL,
-                          autoreset_mode = NULL, name = NULL, call = rlang::caller_env()) {
+                          autoreset_mode = NULL, name = NULL, num_workers = NULL,
+                          call = rlang::caller_env()) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1", call)
   if (is_registered(env_id)) {
     return(make_registered_env(
       env_id, kwargs, seed, num_envs, render_mode = render_mode, wrappers = wrappers,
       vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
-      call = call
+      num_workers = num_workers, call = call
     ))
   }
   check_client(client, call = call)
@@ -124,7 +127,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
-      autoreset_mode, name, call = call
+      autoreset_mode, name, num_workers, call = call
     ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
@@ -163,6 +166,7 @@ server_env <- R6Class(
     single_observation_space = NULL,
     num_envs = NULL,
     vectorization_mode = NULL,
+    num_workers = NULL,
     autoreset_mode = NULL,
     spec = NULL,
     initialize = function(client, instance_id, wrappers = list()) {
@@ -171,7 +175,7 @@ server_env <- R6Class(
       private$connected <- client
       self$instance_id <- instance_id
       for (name in c("single_action_space", "single_observation_space", "num_envs",
-                     "vectorization_mode", "autoreset_mode")) {
+                     "vectorization_mode", "num_workers", "autoreset_mode")) {
         self[[name]] <- private$instance[[name]]
       }
       self$spec <- private$instance$spec
@@ -185,7 +189,7 @@ server_env <- R6Class(
       )
     },
     step = function(action, which = NULL) {
-      private$check_open()
+      if (private$closed) private$check_open()
       step_instance(
         private$connected, private$instance, action, render = FALSE, which, named = TRUE
       )
@@ -206,7 +210,8 @@ server_env <- R6Class(
       invisible(self)
     },
     print = function(...) {
-      how <- paste0(self$vectorization_mode, ", ", self$autoreset_mode)
+      workers <- if (isTRUE(self$num_workers > 0)) count_of(self$num_workers, "worker")
+      how <- paste(c(self$vectorization_mode, workers, self$autoreset_mode), collapse = ", ")
       print_env(self, how, private$instance$observations, private$instance$actions)
     }
   ),

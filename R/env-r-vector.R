@@ -1,14 +1,13 @@
 # Environments written in R as vector environments, in which episodes are played.
 
-# How many episodes make a batch where nobody chose. These numbers must not depend on how many
-# episodes are asked for: then the first episodes are the same however many follow.
+# How many sub-environments there are where nobody chose.
 r_sub_envs <- 16L
 vectorized_sub_envs <- 256L
 
 #' @export
 as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
-                                    client = NULL) {
-  check_made_before(NULL, list(...), x)
+                                    client = NULL, num_workers = NULL) {
+  check_made_before(NULL, c(list(...), num_workers = num_workers), x)
   check_count(num_envs, allow_null = TRUE)
   if (isTRUE(num_envs > 1) && frames) {
     abort_argument(num_envs, "1 where frames are kept", "num_envs", rlang::current_env())
@@ -29,11 +28,10 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
     if (length(remembering(sub_env$task$spec$wrappers))) {
       num_envs <- 1L
     }
-    batch_size <- as.integer(num_envs %||% r_sub_envs)
-    copies <- lapply(seq_len(num_envs %||% min(batch_size, max_envs)), function(i) {
+    copies <- lapply(seq_len(num_envs %||% min(r_sub_envs, max_envs)), function(i) {
       definition_sub_env(definition)
     })
-    scalar_vector_env(copies, batch_size, frames)
+    scalar_vector_env(copies, episodes_of_batch(num_envs %||% r_sub_envs), frames)
   }
 }
 

@@ -209,17 +209,7 @@ refuse_argument <- function(strange, known, id, from, call) {
 # For gym_make(). `...` are the arguments that only a server's environment has.
 make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., call) {
   id <- with_wrappers(id, wrappers, call)
-  servers <- list(...)
-  given <- names(servers)[lengths(servers) > 0L]
-  if (length(given)) {
-    gym_abort(
-      c(paste0("`", given[[1L]], "` is for an environment on a server, and ", id,
-               " is written in R."),
-        i = "Leave it out."),
-      class = "gym_error_argument", argument = given[[1L]], value = servers[[given[[1L]]]],
-      call = call
-    )
-  }
+  check_for_r(id, list(...), call)
   check_count(seed, min = 0, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
   env <- make_registered(id, arguments, call)
@@ -232,6 +222,20 @@ make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., ca
     sub_env$generator <- new_generator(seed)
   }
   env
+}
+
+# Refuses arguments that only a server's environment has.
+check_for_r <- function(id, servers, call = rlang::caller_env()) {
+  given <- names(servers)[lengths(servers) > 0L]
+  if (length(given)) {
+    gym_abort(
+      c(paste0("`", given[[1L]], "` is for an environment on a server, and ", format(id),
+               " is written in R."),
+        i = "Leave it out."),
+      class = "gym_error_argument", argument = given[[1L]], value = servers[[given[[1L]]]],
+      call = call
+    )
+  }
 }
 
 with_num_envs <- function(env, num_envs, id, call) {
@@ -258,15 +262,16 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
   if (frames || length(remembering(env$spec$wrappers))) {
     num_envs <- 1L
   }
-  batch_size <- as.integer(num_envs %||% r_sub_envs)
-  more <- lapply(seq_len((num_envs %||% min(batch_size, max_envs)) - 1), function(i) {
+  more <- lapply(seq_len((num_envs %||% min(r_sub_envs, max_envs)) - 1), function(i) {
     make_registered(id, arguments, call)
   })
   envs <- c(list(env), more)
   if (frames) {
     check_renders(sub_env_of(env), call)
   }
-  vector_env <- scalar_vector_env(lapply(envs, sub_env_of), batch_size, frames)
+  vector_env <- scalar_vector_env(
+    lapply(envs, sub_env_of), episodes_of_batch(num_envs %||% r_sub_envs), frames
+  )
   vector_env$close <- function(wait = TRUE) for (env in envs) env$close()
   vector_env
 }

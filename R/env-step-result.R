@@ -3,13 +3,24 @@
 
 flags <- c("terminated", "truncated")
 
+is_server_env <- function(env) inherits(env, "gym_server_env")
+
+# Nobody wants the infos of what is played: they are not asked for where a server would send them.
+begin_all <- function(env, seeds) {
+  if (is_server_env(env)) reset_bare(env, seeds) else env$reset(seed = seeds)
+}
+
 #' Take a step, and check what it returns where a user has written the environment
 #' @param n How many sub-environments step.
-#' @param ... The arguments of `env$step()`.
+#' @param which The numbers of these, `NULL` for all.
+#' @param finals Whether `next_observation` is wanted.
 #' @noRd
-take_step <- function(env, n, ...) {
-  out <- env$step(...)
-  if (!inherits(env, c("gym_server_env", "gym_r_env"))) {
+take_step <- function(env, n, action, which = NULL, finals = TRUE) {
+  if (is_server_env(env)) {
+    return(step_bare(env, action, which, finals))
+  }
+  out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
+  if (!inherits(env, "gym_r_env")) {
     where <- "`step()` of this environment"
     check_step_parts(out, n, where, NULL, needed = c("observation", "reward", flags))
   }

@@ -21,46 +21,60 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-step_vector_env <- function(client, instance, action, fields, which, named, call) {
-  check_which(which, instance, call)
-  n <- instance$num_envs
-  actions <- instance$actions
-  observations <- instance$observations
-  if (length(which) && length(which) < n) {
-    mask <- seq_len(n) %in% which
-    fields <- c(fields, step_mask = to_json(I(mask)))
-    n <- length(which)
-    actions <- batch_space(instance$single_action_space, n)
-    observations <- batch_space(instance$single_observation_space, n)
-  }
+#' Prepare the steps of sub-environments
+#' @param n How many step, `which` the numbers of these.
+#' @noRd
+vector_step_line <- function(client, instance, fields, n, which, named, infos) {
   single <- instance$single_action_space
-  check_batch(single, actions, action, n, call, which)
-  answer <- send_action(
-    client, instance, actions, action, write_batch(single, action, n), fields, call
+  actions <- batch_space(single, n)
+  observed <- batch_space(instance$single_observation_space, n)
+  read_answer <- function(answer) read_vector_step(instance, answer, observed, n, named, infos)
+  line <- instance_line(
+    client, instance, instance$step_route, instance$sends_tensors, fields, named, read_answer,
+    read_quickly = read_answer,
+    finish = function(tensors) {
+      observation <- tensors_observation(instance, observed, tensors, named)
+      vector_step_result(observation, tensors, empty_object)
+    }
   )
+  if (instance$sends_tensors) {
+    line$write <- tensors_writer(single, n)
+    line$integers_table <- integers_table(n)
+  } else {
+    line$write <- function(action) NULL
+  }
+  line$check <- function(action, call) {
+    check_batch(single, actions, action, n, call, which)
+    if (instance$sends_tensors) {
+      to_tensors(actions, action, "action", call)
+    } else {
+      paste0('"action":', write_batch(single, action, n), ",")
+    }
+  }
+  line
+}
+
+vector_step_result <- function(observation, parts, info, next_observation = observation) {
+  c(
+    step_result(observation, parts$reward, parts$terminated, parts$truncated, info),
+    list(next_observation = next_observation)
+  )
+}
+
+read_vector_step <- function(instance, answer, observed, n, named, infos) {
   result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
   info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
-  observation <- decode_observation(observations, answer)
-  if (named) observation <- with_names(instance, observation)
-  next_observation <- observation
-  if (length(answer$final_sub_envs)) {
-    final <- final_observations(instance, answer, n, named)
-    info$final_obs <- final_by_sub_env(instance$single_observation_space, final, n)
-    next_observation <- replace_rows(
-      instance$single_observation_space, observation, n, final$sub_envs, final$values
-    )
+  observation <- read_observation(instance, observed, answer, named)
+  if (!length(answer$final_sub_envs)) {
+    return(vector_step_result(observation, result, info))
   }
-  list(
-    observation = observation,
-    reward = result$reward,
-    done = result$terminated | result$truncated,
-    info = info,
-    terminated = result$terminated,
-    truncated = result$truncated,
-    next_observation = next_observation
-  )
+  space <- instance$single_observation_space
+  final <- final_observations(instance, answer, n, named)
+  if (infos) info$final_obs <- final_by_sub_env(space, final, n)
+  next_observation <- replace_rows(space, observation, n, final$sub_envs, final$values)
+  vector_step_result(observation, result, info, next_observation)
 }
 
 results_by_sub_env <- function(answer) {
@@ -108,6 +122,17 @@ check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), 
     return(invisible())
   }
   check_choice(x, choices, arg, call)
+  check_has_sub_envs(num_envs, x, arg, call)
+}
+
+check_num_workers <- function(num_workers, num_envs, call) {
+  check_count(num_workers, min = 0, allow_null = TRUE, call = call)
+  if (!is.null(num_workers)) {
+    check_has_sub_envs(num_envs, num_workers, "num_workers", call)
+  }
+}
+
+check_has_sub_envs <- function(num_envs, x, arg, call) {
   if (is.null(num_envs)) {
     gym_abort(
       c(
@@ -130,10 +155,19 @@ check_sub_env_seeds <- function(seed, num_envs, call) {
   }
 }
 
-check_mask <- function(mask, instance, call) {
+# The mask as JSON. Rollouts send the same one many times.
+mask_json <- function(mask, instance, call) {
   if (is.null(mask)) {
-    return(invisible())
+    return(NULL)
   }
+  if (!identical(mask, instance$last_mask$mask)) {
+    check_mask(mask, instance, call)
+    instance$last_mask <- list(mask = mask, json = to_json(I(mask)))
+  }
+  instance$last_mask$json
+}
+
+check_mask <- function(mask, instance, call) {
   check_is_vector_env(instance, mask, "mask", call)
   n <- instance$num_envs
   if (!is.logical(mask) || length(mask) != n || anyNA(mask) || !any(mask)) {

@@ -102,6 +102,8 @@ check_instance_id <- function(id) {
 check_about <- function(about) {
   is_num_envs <- function(x) is_number(x) && are_whole(x, 1, 2^24)
   check_optional(about, "num_envs", is_num_envs, "a whole number")
+  is_num_workers <- function(x) is_number(x) && are_whole(x, 0, 2^24)
+  check_optional(about, "num_workers", is_num_workers, "a whole number")
   check_optional(about, "max_episode_steps", is_number, "a number")
   for (name in c("env_id", "vectorization_mode", "autoreset_mode", "render_mode")) {
     check_optional(about, name, rlang::is_string, "a string")

@@ -20,6 +20,8 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
 parsed_body <- function(response, layouts = NULL, key = NULL) {
   if (response$status_code == 204L) {
     NULL
+  } else if (identical(response$type, column_tensors_type)) {
+    tensors_answer(response$content, layouts, key, by_column = TRUE)
   } else if (identical(response$type, tensors_type)) {
     tensors_answer(response$content, layouts, key)
   } else if (identical(response$type, "image/png")) {
@@ -59,8 +61,8 @@ echo_in_header <- function(response) {
 
 # An answer with tensors has the fields of the JSON answer that it replaces, and beside them the
 # tensors and the texts by their names.
-tensors_answer <- function(bytes, layouts, key = NULL) {
-  file <- read_tensors(bytes, layouts, if (!is.null(key)) bare_metadata(key))
+tensors_answer <- function(bytes, layouts, key = NULL, by_column = FALSE) {
+  file <- read_tensors(bytes, layouts, if (!is.null(key)) bare_metadata(key), by_column)
   if (is.null(file$metadata)) {
     return(list(tensors = file$tensors, info = empty_object, request = key))
   }

@@ -93,15 +93,18 @@ random_key <- function() {
 
 json_type <- "application/json"
 tensors_type <- "application/x-safetensors"
+# With the tensors transposed, as R keeps arrays. A server that does not know it answers by rows.
+column_tensors_type <- "application/x-safetensors; order=column"
+accepted_tensors <- paste0(column_tensors_type, ", ", tensors_type, ";q=0.9")
 
 # What a request sends and what answer it accepts. Each kind has a handle of its own, on which the
 # headers and the source of the body are set once: setting them costs more than the request.
 handle_kinds <- list(
   get = list(post = FALSE, sends = json_type, accepts = json_type),
-  get_tensors = list(post = FALSE, sends = json_type, accepts = tensors_type),
+  get_tensors = list(post = FALSE, sends = json_type, accepts = accepted_tensors),
   post = list(post = TRUE, sends = json_type, accepts = json_type),
-  post_tensors = list(post = TRUE, sends = json_type, accepts = tensors_type),
-  send_tensors = list(post = TRUE, sends = tensors_type, accepts = tensors_type)
+  post_tensors = list(post = TRUE, sends = json_type, accepts = accepted_tensors),
+  send_tensors = list(post = TRUE, sends = tensors_type, accepts = accepted_tensors)
 )
 
 # A connection's handle of one kind: curl's handle, and the length of body that is set on it.

@@ -1,14 +1,16 @@
 # The attempts at a request, and when there is another one.
 
-fetch <- function(client, connection, handle, route, key, repeatable, call) {
+# `received` is what came of a first attempt that was made elsewhere: a response, or the
+# connection's error.
+fetch <- function(client, connection, handle, route, key, repeatable, call, received = NULL) {
   url <- paste0(client$remote_base, route)
-  started <- proc.time()[["elapsed"]]
+  started <- proc.time()[["elapsed"]] - time_taken(handle$curl, received)
   attempt <- 1L
   reached <- FALSE
   state <- client$state
-  state$too_large <- FALSE
   repeat {
-    response <- attempt_request(client, connection, handle$curl, url, key)
+    response <- attempt_request(client, connection, handle$curl, url, key, received)
+    received <- NULL
     if (!inherits(response, "error")) {
       state$may_prompt <- FALSE
       return(response)
@@ -34,6 +36,11 @@ fetch <- function(client, connection, handle, route, key, repeatable, call) {
     on.exit(curl::handle_setopt(handle$curl, timeout_ms = timeout_of(client) * 1000))
     attempt <- attempt + 1L
   }
+}
+
+# How many seconds a first attempt has taken.
+time_taken <- function(handle, received) {
+  if (is.null(received)) 0 else curl::handle_data(handle)$times[["total"]]
 }
 
 # Raises what ended an attempt from this side: the answer was too large, or the user interrupted.
@@ -62,17 +69,16 @@ timeout_of <- function(client) {
   if (is.null(configured)) client$timeout else configured / 1000
 }
 
-# Makes one attempt. Returns the response with its answer parsed, or the connection's error.
-attempt_request <- function(client, connection, handle, url, key) {
-  connection$sent <- 0L
+# Makes one attempt, if nothing was `received` yet. Returns the response with its answer parsed, or
+# the connection's error.
+attempt_request <- function(client, connection, handle, url, key, received = NULL) {
+  if (inherits(received, "error")) {
+    return(received)
+  }
   response <- NULL
   problem <- tryCatch(
     {
-      fetched <- withCallingHandlers(
-        connection$fetch(url, handle),
-        # Newer versions of curl signal an interrupt when an answer was stopped for its size.
-        interrupt = function(cnd) if (client$state$too_large) stop("Too large")
-      )
+      fetched <- received %||% fetch_once(client$state, connection, handle, url)
       if (ends_in_header(fetched)) {
         stop("Connection died within the header of the answer")
       }
@@ -90,6 +96,16 @@ attempt_request <- function(client, connection, handle, url, key) {
     rlang::cnd_signal(problem)
   }
   response
+}
+
+fetch_once <- function(state, connection, handle, url) {
+  connection$sent <- 0L
+  state$too_large <- FALSE
+  withCallingHandlers(
+    connection$fetch(url, handle),
+    # Newer versions of curl signal an interrupt when an answer was stopped for its size.
+    interrupt = function(cnd) if (state$too_large) stop("Too large")
+  )
 }
 
 # libcurl takes the end of the connection there for the end of an answer without content.

@@ -12,21 +12,25 @@ header_size <- function(bytes) {
 }
 
 known_layout <- function(header, layouts) {
-  for (known in layouts$seen) {
-    start <- if (known$metadata_last) header[seq_along(known$start)] else header
-    if (identical(start, known$start)) {
-      return(known)
-    }
+  if (is.null(layouts)) {
+    return(read_layout(header))
+  }
+  text <- rawToChar(header)
+  at <- regexpr(metadata_key, text, fixed = TRUE, useBytes = TRUE)
+  start <- if (at > 0L) rawToChar(header[seq_len(at - 1L)]) else text
+  known <- match(start, names(layouts$seen))
+  if (!is.na(known)) {
+    return(layouts$seen[[known]])
   }
   layout <- read_layout(header)
-  if (!is.null(layouts)) {
-    layouts$seen <- utils::head(c(list(layout), layouts$seen), max_layouts)
-  }
+  seen <- c(stats::setNames(list(layout), start), layouts$seen)
+  layouts$seen <- utils::head(seen, max_layouts)
   layout
 }
 
-# Enough for the kinds of answer of a few environments.
-max_layouts <- 8L
+# Enough for the kinds of answer of a few environments. With autoreset mode "SameStep" an answer has
+# the last observations of as many sub-environments as have ended.
+max_layouts <- 256L
 
 # Marks where the metadata begin: elsewhere, in names and texts, quotes are escaped.
 metadata_key <- ",\"__metadata__\":"

@@ -12,13 +12,15 @@
 #'   our server puts them, differ from answer to answer and are not compared.
 #' @param expected JSON text of the metadata of an answer that says nothing more than its
 #'   tensors: metadata that are equal to it are not parsed. `NULL` for none.
+#' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
+#'   are in R's order.
 #' @return A list of `tensors`, a named list of vectors and arrays, and
 #'   `metadata`, a named list of strings, `NULL` for the `expected` ones.
 #' @noRd
-read_tensors <- function(bytes, layouts = NULL, expected = NULL) {
+read_tensors <- function(bytes, layouts = NULL, expected = NULL, by_column = FALSE) {
   size <- header_size(bytes)
   data <- 8L + size
-  header <- bytes[8L + seq_len(size)]
+  header <- bytes[9L:data]
   if (any(header == as.raw(0L))) {
     abort_tensors("the header is no JSON")
   }
@@ -26,18 +28,19 @@ read_tensors <- function(bytes, layouts = NULL, expected = NULL) {
   if (layout$end > length(bytes) - data) {
     abort_tensors("an offset lies outside of the file")
   }
-  tensors <- read_entries(layout$entries, bytes, data)
+  place <- if (by_column) place_by_column else place_by_row
+  tensors <- read_entries(layout$entries, bytes, data, place)
   if (layout$metadata_last && ends_as(header, length(layout$start), expected)) {
     return(list(tensors = tensors))
   }
   list(tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata)
 }
 
-# Up to this size tensors are taken out by an index, which lists the places of all their bytes; from
-# a larger file by a connection of R's, which copies the file once.
-index_up_to <- 65536L
+# Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
+# which copies the file once, in much less time for each byte.
+index_up_to <- 8192L
 
-read_entries <- function(entries, bytes, data) {
+read_entries <- function(entries, bytes, data, place) {
   large <- length(bytes) > index_up_to
   if (large) {
     file <- rawConnection(bytes)
@@ -48,12 +51,36 @@ read_entries <- function(entries, bytes, data) {
     part <- if (large) {
       seek(file, data + entry$begin)
       readBin(file, "raw", entry$size)
+    } else if (entry$size) {
+      first <- data + entry$begin + 1L
+      bytes[first:(first + entry$size - 1L)]
     } else {
-      bytes[data + entry$begin + seq_len(entry$size)]
+      raw()
     }
-    entries[[name]] <- entry$read(part, entry$n, entry$shape)
+    entries[[name]] <- place(entry$read(part, entry$n), entry$shape)
   }
   entries
+}
+
+# Bytes become integers once they are in their places.
+place_by_row <- function(values, shape) {
+  if (!is.raw(values)) {
+    shape_values(values, shape)
+  } else if (length(shape) > 1L) {
+    array(as.integer(shape_values(values, shape)), shape)
+  } else {
+    as.integer(values)
+  }
+}
+
+place_by_column <- function(values, shape) {
+  if (is.raw(values)) {
+    values <- as.integer(values)
+  }
+  if (length(shape) > 1L) {
+    dim(values) <- rev(shape)
+  }
+  values
 }
 
 # Whether a header continues with a text from a place on, and has only blanks after it.
@@ -69,51 +96,41 @@ ends_as <- function(header, after, text) {
 
 # The types -----------------------------------------------------------------------
 
+# Each takes bytes and returns the numbers as they come.
+
 read_double <- function(size) {
-  function(bytes, n, shape) {
-    shape_values(readBin(bytes, "double", n, size = size, endian = "little"), shape)
-  }
+  function(bytes, n) readBin(bytes, "double", n, size = size, endian = "little")
 }
 
 read_integer <- function(size, signed = TRUE) {
-  function(bytes, n, shape) {
-    values <- readBin(bytes, "integer", n, size = size, signed = signed, endian = "little")
-    shape_values(values, shape)
+  function(bytes, n) {
+    readBin(bytes, "integer", n, size = size, signed = signed, endian = "little")
   }
 }
 
-# The array is transposed while it is still bytes, a fourth of the size of integers.
-read_byte <- function(bytes, n, shape) {
-  if (length(shape) > 1L) {
-    bytes <- shape_values(bytes, shape)
-    array(as.integer(bytes), shape)
-  } else {
-    as.integer(bytes)
-  }
-}
+# Bytes remain bytes until they are in their places: they are a fourth of the size of integers.
+read_byte <- function(bytes, n) bytes
 
 # The bits of the smallest int32 are R's NA.
-read_int32 <- function(bytes, n, shape) {
+read_int32 <- function(bytes, n) {
   values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
-  shape_values(if (anyNA(values)) signed_half(values) else values, shape)
+  if (anyNA(values)) signed_half(values) else values
 }
 
-read_uint32 <- function(bytes, n, shape) {
+read_uint32 <- function(bytes, n) {
   values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
   wide <- anyNA(values) || any(values < 0L)
-  shape_values(if (wide) unsigned_half(values) else values, shape)
+  if (wide) unsigned_half(values) else values
 }
 
-read_int64 <- function(signed) {
-  function(bytes, n, shape) shape_values(whole_from_halves(bytes, n, signed), shape)
-}
+read_int64 <- function(signed) function(bytes, n) whole_from_halves(bytes, n, signed)
 
-read_half <- function(bytes, n, shape) {
+read_half <- function(bytes, n) {
   bits <- readBin(bytes, "integer", n, size = 2L, signed = FALSE, endian = "little")
-  shape_values(double_from_half(bits), shape)
+  double_from_half(bits)
 }
 
-read_bool <- function(bytes, n, shape) shape_values(bytes != as.raw(0L), shape)
+read_bool <- function(bytes, n) as.logical(bytes)
 
 write_double <- function(size) {
   function(x) writeBin(as.double(x), raw(), size = size, endian = "little")
@@ -133,20 +150,22 @@ write_byte <- function(x) as.raw(as.integer(x) %% 256L)
 
 write_int64 <- function(x) bytes_of_whole(x)
 
+tensor_type <- function(size, read, write) list(size = size, read = read, write = write)
+
 # By the name in a header: how many bytes a number has, how it is read and written.
 tensor_types <- list(
-  F64 = list(size = 8L, read = read_double(8L), write = write_double(8L)),
-  F32 = list(size = 4L, read = read_double(4L), write = write_double(4L)),
-  F16 = list(size = 2L, read = read_half, write = write_half),
-  I8 = list(size = 1L, read = read_integer(1L), write = write_byte),
-  I16 = list(size = 2L, read = read_integer(2L), write = write_integer(2L)),
-  I32 = list(size = 4L, read = read_int32, write = write_int32),
-  I64 = list(size = 8L, read = read_int64(TRUE), write = write_int64),
-  U8 = list(size = 1L, read = read_byte, write = write_byte),
-  U16 = list(size = 2L, read = read_integer(2L, signed = FALSE), write = write_integer(2L)),
-  U32 = list(size = 4L, read = read_uint32, write = write_int32),
-  U64 = list(size = 8L, read = read_int64(FALSE), write = write_int64),
-  BOOL = list(size = 1L, read = read_bool, write = write_byte)
+  F64 = tensor_type(8L, read_double(8L), write_double(8L)),
+  F32 = tensor_type(4L, read_double(4L), write_double(4L)),
+  F16 = tensor_type(2L, read_half, write_half),
+  I8 = tensor_type(1L, read_integer(1L), write_byte),
+  I16 = tensor_type(2L, read_integer(2L), write_integer(2L)),
+  I32 = tensor_type(4L, read_int32, write_int32),
+  I64 = tensor_type(8L, read_int64(TRUE), write_int64),
+  U8 = tensor_type(1L, read_byte, write_byte),
+  U16 = tensor_type(2L, read_integer(2L, signed = FALSE), write_integer(2L)),
+  U32 = tensor_type(4L, read_uint32, write_int32),
+  U64 = tensor_type(8L, read_int64(FALSE), write_int64),
+  BOOL = tensor_type(1L, read_bool, write_byte)
 )
 
 # Halves: 1 bit of sign, 5 of exponent, 10 of fraction.
@@ -183,14 +202,20 @@ half_from_double <- function(x) {
 #'   one layout have one length as a rule.
 #' @noRd
 write_tensors <- function(tensors, metadata) {
+  do.call(c, c(
+    list(tensors_header(metadata, tensors_table(tensors))), lapply(unname(tensors), `[[`, "bytes")
+  ))
+}
+
+tensors_header <- function(metadata, table) {
   # In a JSON text no other characters need escaping.
   quoted <- gsub("\\", "\\\\", enc2utf8(metadata), fixed = TRUE)
   quoted <- gsub("\"", "\\\"", quoted, fixed = TRUE)
   about <- paste0("\"", names(metadata), "\":\"", quoted, "\"", collapse = ",")
-  header <- charToRaw(paste0("{\"__metadata__\":{", about, "}", tensors_table(tensors), "}"))
+  header <- charToRaw(paste0("{\"__metadata__\":{", about, "}", table, "}"))
   header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
   length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
-  do.call(c, c(list(length_bytes, header), lapply(unname(tensors), `[[`, "bytes")))
+  c(length_bytes, header)
 }
 
 # The header's table of tensors that was written last: from step to step it is the same.
@@ -198,11 +223,10 @@ written <- new.env(parent = emptyenv())
 
 tensors_table <- function(tensors) {
   forms <- lapply(tensors, function(tensor) tensor[c("dtype", "shape")])
-  if (!identical(forms, written$forms)) {
-    written$table <- write_table(tensors)
-    written$forms <- forms
+  if (!identical(forms, written$last$forms)) {
+    written$last <- list(forms = forms, table = write_table(tensors))
   }
-  written$table
+  written$last$table
 }
 
 write_table <- function(tensors) {

@@ -2,9 +2,10 @@
 # environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
 # played again, and it does not matter in which order batches are played, and by whom.
 #
-# Each sub-environment plays one episode at a time, and one whose episode has ended waits for the
-# others. If it began another episode at once, and playing stopped at the number of episodes asked
-# for, short episodes would be favoured.
+# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. Which of them
+# plays an episode is written down before the first step. If the next one were given to whichever
+# ends first, and playing stopped at the number of episodes asked for, short episodes would be
+# favoured.
 
 #' Play a batch of episodes
 #'
@@ -28,26 +29,27 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
                        each = 1L, keep_steps = FALSE, keep_next = FALSE,
                        report = function(ended) NULL) {
   n <- length(episodes$episode)
-  sub_env <- (seq_len(n) - 1L) %% vector_env$num_envs + 1L
+  at_once <- vector_env$num_envs
   batch <- rlang::env(
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
-    sub_env = sub_env, return = numeric(n), length = integer(n), terminated = logical(n),
-    truncated = logical(n), ended = logical(n), needed = rep(TRUE, n), steps = list(),
-    frames = list(), target = target, each = each, report = report
+    sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
+    terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
+    steps = list(), frames = list(), target = target, each = each, report = report
   )
+  # Where all sub-environments must be reset together, they wait for each other after each episode.
+  together <- if (vector_env$one_seed) at_once else n
   play <- function() {
-    for (first in which(sub_env == 1L)) {
-      numbers <- seq(first, min(n, first + vector_env$num_envs - 1L))
-      numbers <- numbers[batch$needed[numbers]]
-      if (length(numbers)) {
-        play_side_by_side(vector_env, batch, numbers, policy, max_steps, keep_steps, keep_next)
+    for (first in seq(1L, n, by = together)) {
+      if (first <= batch$needed) {
+        last <- min(n, first + together - 1L)
+        play_episodes(vector_env, batch, first, last, policy, max_steps, keep_steps, keep_next)
       }
     }
   }
   with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
-  c(lapply(mget(columns, batch), `[`, batch$needed), mget(c("steps", "frames"), batch))
+  c(lapply(mget(columns, batch), utils::head, batch$needed), mget(c("steps", "frames"), batch))
 }
 
 # An error of the environment names the user's call, not the step that was taken for it.
@@ -55,7 +57,7 @@ naming_call <- function(code, vector_env) {
   withCallingHandlers(
     code,
     gym_error = function(cnd) {
-      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(vector_env$step))) {
+      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(step))) {
         cnd["call"] <- list(rlang::error_call(vector_env$call))
         rlang::cnd_signal(cnd)
       }
@@ -63,59 +65,146 @@ naming_call <- function(code, vector_env) {
   )
 }
 
-# Plays some episodes of a batch, one in each sub-environment. They begin together, so that all that
-# are still playing have taken the same number of steps, which is `taken`.
-play_side_by_side <- function(vector_env, batch, playing, policy, max_steps, keep_steps,
-                              keep_next) {
-  space <- vector_env$observation_space
-  observation <- begin_episodes(vector_env, batch, playing)
-  keep_frame(batch, vector_env, playing)
-  if (batch$episode[[playing[[1L]]]] == 1L) {
-    ask_beforehand(policy, batch$candidate[playing], observation, vector_env)
+# Plays the episodes from `first` to `last` of a batch. `game` is what stays the same, `player` what
+# changes: `rows` has an element for each sub-environment that plays (which episode of the batch,
+# its number, the return so far, and how many steps had been taken when the episode began), and
+# `observation` a row.
+play_episodes <- function(vector_env, batch, first, last, policy, max_steps, keep_steps,
+                          keep_next) {
+  game <- list(
+    vector_env = vector_env, batch = batch, last = last, policy = policy, max_steps = max_steps,
+    keep_steps = keep_steps, keep_next = keep_next
+  )
+  episode <- seq.int(first, min(last, batch$needed, first + vector_env$num_envs - 1L))
+  observation <- begin_episodes(vector_env, batch, episode, last)
+  ask_beforehand(policy, batch, episode, observation, vector_env)
+  rows <- list(episode = episode, sub_env = batch$sub_env[episode],
+               return = numeric(length(episode)), began = integer(length(episode)))
+  player <- new_player(game, rows, observation)
+  step <- if (keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
+  while (length(player$rows$episode)) {
+    n <- length(player$rows$episode)
+    player$action <- act_batch(player$acting, player$observation, n, vector_env)
+    out <- step(player$action, player$rows$sub_env)
+    end_step(game, player, out)
   }
-  which <- batch$sub_env[playing]
-  acting <- policy_rows(policy, batch$candidate[playing])
-  returns <- numeric(length(playing))
-  taken <- 0L
-  repeat {
-    action <- act_batch(acting, observation, length(playing), vector_env)
-    out <- vector_env$step(action, which)
-    taken <- taken + 1L
-    keep_frame(batch, vector_env, playing)
-    returns <- returns + out$reward
-    if (keep_steps) {
-      batch$steps[[length(batch$steps) + 1L]] <- list(
-        at = playing, observation = observation, action = action, reward = out$reward,
-        terminated = out$terminated, truncated = out$truncated,
-        next_observation = if (keep_next) out$next_observation
-      )
-    }
-    observation <- out$observation
-    ended <- out$terminated | out$truncated | taken >= max_steps
-    if (any(ended)) {
-      end_episodes(batch, playing[ended], returns[ended], taken, lapply(out[flags], `[`, ended))
-      going <- which(!ended & batch$needed[playing])
-      if (!length(going)) {
-        return(invisible())
-      }
-      playing <- playing[going]
-      which <- which[going]
-      returns <- returns[going]
-      observation <- batch_rows(space, observation, going)
-      acting <- policy_rows(policy, batch$candidate[playing])
-    }
+}
+
+new_player <- function(game, rows, observation) {
+  candidate <- game$batch$candidate[rows$episode]
+  rlang::env(
+    rows = rows, observation = observation, taken = 0L, action = NULL,
+    candidate = candidate, acting = policy_rows(game$policy, candidate)
+  )
+}
+
+#' Note what came of a step, and begin the next episodes where some have ended
+#' @param out As a step of [as_vector_env()] returns it.
+#' @noRd
+end_step <- function(game, player, out) {
+  batch <- game$batch
+  rows <- player$rows
+  player$taken <- player$taken + 1L
+  keep_frame(batch, game$vector_env, rows$episode)
+  player$rows$return <- rows$return + out$reward
+  if (game$keep_steps) {
+    batch$steps[[length(batch$steps) + 1L]] <- list(
+      at = rows$episode, observation = player$observation, action = player$action,
+      reward = out$reward, terminated = out$terminated, truncated = out$truncated,
+      next_observation = if (game$keep_next) out$next_observation
+    )
+  }
+  player$observation <- out$observation
+  ended <- out$terminated | out$truncated
+  # Where an episode is cut short the environment begins no other by itself.
+  waiting <- if (isTRUE(game$vector_env$begins_next)) !ended else TRUE
+  if (game$max_steps < Inf) {
+    ended <- ended | player$taken - rows$began >= game$max_steps
+  }
+  if (any(ended)) {
+    length <- (player$taken - rows$began)[ended]
+    end_episodes(batch, rows$episode[ended], player$rows$return[ended], length,
+                 lapply(out[flags], `[`, ended))
+    begin_next_episodes(game, player, ended, ended & waiting)
+  }
+}
+
+# `waiting` are those that have `ended` and that the environment does not begin by itself.
+begin_next_episodes <- function(game, player, ended, waiting) {
+  vector_env <- game$vector_env
+  batch <- game$batch
+  rows <- player$rows
+  rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
+  rows$return[ended] <- 0
+  rows$began[ended] <- player$taken
+  going <- which(rows$episode <= min(game$last, batch$needed))
+  if (length(going) < length(ended)) {
+    rows <- lapply(rows, `[`, going)
+    waiting <- waiting[going]
+    player$observation <- batch_rows(vector_env$observation_space, player$observation, going)
+  }
+  player$rows <- rows
+  if (!length(going)) {
+    return(invisible())
+  }
+  if (any(waiting)) {
+    player$observation <- begin_waiting(game, rows, player$observation, which(waiting))
+  }
+  begun <- which(rows$began == player$taken)
+  ask_beforehand(game$policy, batch, rows$episode, player$observation, vector_env, begun)
+  candidate <- batch$candidate[rows$episode]
+  if (!identical(candidate, player$candidate)) {
+    player$candidate <- candidate
+    player$acting <- policy_rows(game$policy, candidate)
+  }
+}
+
+# Puts the first observations of the episodes that the environment does not begin by itself in the
+# place of the last observations of those before.
+begin_waiting <- function(game, rows, observation, waiting) {
+  begun <- begin_episodes(game$vector_env, game$batch, rows$episode[waiting], game$last)
+  n <- length(rows$episode)
+  if (length(waiting) == n) {
+    begun
+  } else {
+    replace_rows(game$vector_env$observation_space, observation, n, waiting, begun)
   }
 }
 
 # Resets the sub-environments of the episodes that begin. Where all must be reset together, those
-# that play none are left out of what it returns.
-begin_episodes <- function(vector_env, batch, playing) {
-  seeds <- batch$seed[playing]
-  sub_envs <- batch$sub_env[playing]
-  if (vector_env$one_seed) {
-    batch_rows(vector_env$observation_space, vector_env$reset(seeds[[1L]]), sub_envs)
-  } else {
+# that play none are left out of what it returns. One that begins its next episodes by itself gets
+# the seeds of all of them, up to the episode `last`.
+begin_episodes <- function(vector_env, batch, episode, last) {
+  sub_envs <- batch$sub_env[episode]
+  observation <- if (vector_env$one_seed) {
+    of_all <- vector_env$reset(batch$seed[[episode[[1L]]]])
+    batch_rows(vector_env$observation_space, of_all, sub_envs)
+  } else if (isTRUE(vector_env$begins_next)) {
+    last <- min(last, batch$needed)
+    seeds <- lapply(episode, function(first) {
+      batch$seed[seq.int(first, last, by = vector_env$num_envs)]
+    })
     vector_env$reset(seeds, sub_envs)
+  } else {
+    vector_env$reset(batch$seed[episode], sub_envs)
+  }
+  keep_frame(batch, vector_env, episode)
+  observation
+}
+
+# A function is asked about a single episode before it plays several of them side by side.
+ask_beforehand <- function(policy, batch, episode, observation, vector_env,
+                           begun = seq_along(episode)) {
+  if (vector_env$num_envs == 1L || !(is.function(policy) || inherits(policy, "gym_policy_list"))) {
+    return(invisible())
+  }
+  for (row in begun[batch$episode[episode[begun]] == 1L]) {
+    candidate <- batch$candidate[[episode[[row]]]]
+    asked <- policy_subset(policy, candidate)
+    if (is.function(asked) && sum(batch$candidate == candidate) > 1L) {
+      one <- batch_rows(vector_env$observation_space, observation, row)
+      ask_about_one(asked, one, vector_env)
+    }
   }
 }
 
@@ -142,13 +231,14 @@ end_episodes <- function(batch, at, returns, length, out) {
 }
 
 # A candidate whose mean return reaches the target makes all later ones needless, which are not
-# played on. Candidates before it are, because one of them may reach the target, too.
+# played on: of the batch's episodes the first `needed` are. Candidates before it are played on,
+# because one of them may reach the target, too.
 drop_needless_candidates <- function(batch, candidates) {
   for (candidate in candidates) {
     own <- batch$candidate == candidate
     if (sum(own) == batch$each && all(batch$ended[own]) &&
           isTRUE(mean(batch$return[own]) >= batch$target)) {
-      batch$needed <- batch$needed & batch$candidate <= candidate
+      batch$needed <- min(batch$needed, sum(batch$candidate <= candidate))
     }
   }
 }

@@ -2,10 +2,9 @@
 #
 # The rule: episodes are taken candidate after candidate. A batch has as many whole candidates as
 # there is room for, and at least one; a candidate with more episodes than that is cut into batches
-# of its own. How much room there is (`batch_size`) depends on the environment: 256 episodes where
-# Gymnasium or a vectorised environment in R plays all at once, 16 elsewhere, and for an environment
-# that was given as an object as many as it has sub-environments. An environment that remembers
-# something over episodes plays all of them in one batch.
+# of its own. How much room there is (`batch_size`) depends on the environment: as many episodes as
+# there are sub-environments where these wait for each other, four times as many where each plays on
+# by itself. An environment that remembers something over episodes plays all of them in one batch.
 #
 # So how many cores there are, who plays a batch and how long it takes never decide what is played.
 

@@ -39,13 +39,13 @@
 #' coef(best) <- weights[which.max(evaluation$mean_return), ]
 evaluate_policy <- function(env, policy, episodes = 100, seed = NULL, ..., max_steps = NULL,
                             num_envs = NULL, level = 0.95, progress = rlang::is_interactive(),
-                            client = gym_client()) {
+                            client = gym_client(), num_workers = NULL) {
   if (!is_number(level) || level <= 0 || level >= 1) {
     abort_argument(level, "a number between 0 and 1", "level", rlang::current_env())
   }
   played <- rollout(
     env, policy, episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,
-    progress = progress, client = client
+    progress = progress, client = client, num_workers = num_workers
   )
   structure(
     evaluate_episodes(played$episodes, played$policy, level), level = level,

@@ -12,9 +12,9 @@
 #' call, whose weights are the caller's to draw.
 #'
 #' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
-#' side by side, each in a sub-environment of its own; with `frames = TRUE` one after the other. The
-#' policy is asked about the episodes that still run, so that a function gets fewer rows as they
-#' end. `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
+#' side by side in sub-environments; with `frames = TRUE` one after the other. The policy is asked
+#' about the episodes that still run, so that a function gets fewer rows as the last of them end.
+#' `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
 #' again.
 #'
 #' # Steps as arrays
@@ -63,6 +63,10 @@
 #'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where
 #'   steps are kept. It is the true one also where the step ended the episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param num_workers How many processes of the server run the sub-environments, a whole number; 0
+#'   for none but the server itself. What is played does not depend on it. `NULL`, the default,
+#'   lets the server choose, see [as_vector_env()]. Only where the environment is named by its id
+#'   and has no vector implementation of its own, such as CartPole has.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
@@ -139,7 +143,8 @@
 #' env$close()
 rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, steps = FALSE,
                     client = gym_client(), frames = FALSE, ..., num_envs = NULL,
-                    next_observation = FALSE, progress = rlang::is_interactive()) {
+                    next_observation = FALSE, progress = rlang::is_interactive(),
+                    num_workers = NULL) {
   check_environment(env)
   policy <- check_policies(policy)
   check_count(episodes)
@@ -148,6 +153,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_steps_wanted(steps, next_observation)
   check_flag(frames)
   check_count(num_envs, allow_null = TRUE)
+  check_count(num_workers, min = 0, allow_null = TRUE)
   check_flag(progress)
   check_dots_named(list(...), "is_slippery = FALSE")
   candidates <- count_candidates(policy) %||% 1L
@@ -160,7 +166,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   }
   with_vector_env(
     env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
-    client = client
+    client = client, num_workers = num_workers
   )
 }
 

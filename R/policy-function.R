@@ -17,21 +17,9 @@ check_takes_observations <- function(policy, arg, call) {
 #' Ask a function about one observation before the first step
 #'
 #' A function that cannot answer about a single observation would otherwise fail only when a single
-#' episode is left and most has been played. Where a single episode is played, the first step asks
-#' about a single observation anyway.
-#' @param candidate Which of several policies is asked about each of the observations.
-#' @param observation The first observations.
+#' episode is left and most has been played.
+#' @param one A batch of one observation.
 #' @noRd
-ask_beforehand <- function(policy, candidate, observation, vector_env) {
-  for (i in which(!duplicated(candidate))) {
-    asked <- policy_subset(policy, candidate[[i]])
-    if (is.function(asked) && sum(candidate == candidate[[i]]) > 1L) {
-      one <- batch_rows(vector_env$observation_space, observation, i)
-      ask_about_one(asked, one, vector_env)
-    }
-  }
-}
-
 ask_about_one <- function(policy, one, vector_env) {
   tryCatch(
     keep_random_state(act_batch(policy, one, 1L, vector_env)),

@@ -166,6 +166,25 @@ act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
 
+# The numbers of an observation with several dimensions are taken in the order in which R has them,
+# column after column, and the weights of the inputs are put into this order once.
+#' @exportS3Method
+policy_rows.gym_policy_network <- function(policy, candidate) {
+  shape <- policy$observation_space$shape
+  if (length(shape) > 1L && prod(shape) == policy$sizes[[1L]]) {
+    by_row <- aperm(array(seq_len(prod(shape)), rev(shape)))
+    policy$weights[[1L]] <- policy$weights[[1L]][, by_row, drop = FALSE]
+    class(policy) <- c("gym_policy_by_column", class(policy))
+  }
+  policy
+}
+
+#' @exportS3Method
+act_batch.gym_policy_by_column <- function(policy, observation, n, vector_env) {
+  dim(observation) <- c(n, length(observation) / n)
+  network_action(policy$action_space, network_outputs(policy, observation), policy, one = FALSE)
+}
+
 #' Compute the outputs for rows of observations
 #' @return A matrix with one row for each observation, one column for each output.
 #' @noRd

@@ -113,9 +113,26 @@ bind_batches <- function(space, each) {
 #' @param i The numbers of those to replace, `values` the batch of what takes their place.
 #' @noRd
 replace_rows <- function(space, batch, n, i, values) {
+  if (is_stackable(space) && !is.object(batch) && !is.object(values)) {
+    return(put_rows(batch, i, values))
+  }
   place <- seq_len(n)
   place[i] <- n + seq_along(i)
   batch_rows(space, bind_batches(space, list(batch, values)), place)
+}
+
+put_rows <- function(batch, i, values) {
+  shape <- dim(batch)
+  if (is.null(shape)) {
+    batch[i] <- values
+  } else if (length(shape) == 2L) {
+    batch[i, ] <- values
+  } else {
+    dim(batch) <- c(shape[[1L]], prod(shape[-1L]))
+    batch[i, ] <- values
+    dim(batch) <- shape
+  }
+  batch
 }
 
 #' Draw a batch of values

@@ -46,7 +46,8 @@ environment_traits <- function(env) {
   } else {
     list(
       env_id = env$spec$id, num_envs = env$num_envs,
-      vectorization_mode = env$vectorization_mode, autoreset_mode = env$autoreset_mode
+      own_implementation = identical(env$vectorization_mode, "vector_entry_point"),
+      autoreset_mode = env$autoreset_mode
     )
   }
 }
@@ -59,7 +60,7 @@ check_same_search <- function(path, there, here, call) {
     lines <- vapply(differ, function(name) {
       texts <- c(argument_text(name, there[[name]]), argument_text(name, here[[name]]))
       if (texts[[1L]] == texts[[2L]]) {
-        paste0("`", name, "` is another there.")
+        paste0("`", name, "` is another there, or was written down by an earlier version.")
       } else {
         paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
       }
@@ -90,8 +91,8 @@ check_same_server <- function(path, there, now, call) {
     lines <- vapply(differ, function(name) {
       what <- switch(
         name, target = "the environment's reward threshold", env_id = "the environment",
-        batch_size = "how many episodes are played at once",
-        num_envs = "how many sub-environments share a seed"
+        batch_size = "how many episodes make a batch",
+        num_envs = "how many sub-environments there are"
       )
       paste0("There ", what, " is ", describe_value(there[[name]]), ", and ",
              describe_value(now[[name]]), " on this server.")

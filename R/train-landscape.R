@@ -144,19 +144,16 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-# With so many sub-environments playing takes seconds. More of them gain little, because the server
-# steps one after the other.
+# With so many sub-environments playing takes seconds.
 landscape_sub_envs <- 128L
 
 # Each sub-environment has a seed of its own, so that all networks can play the same episodes.
 make_seeded_sub_envs <- function(env_id, episodes, client) {
   n <- as.integer(min(episodes, landscape_sub_envs))
-  if_supported(
-    make_unseeded(
-      env_id, num_envs = n, vectorization_mode = "sync", autoreset_mode = "Disabled",
-      client = client
-    )
-  ) %||% make_unseeded(env_id, client = client)
+  make <- env_maker(env_id, list(), client, rlang::caller_env())
+  traits <- sub_env_traits(make)
+  seeded <- if (!is.null(traits)) if_supported(make_seeded(make, n, traits))
+  seeded %||% make(NULL)
 }
 
 #' Play the episodes of all points, side by side

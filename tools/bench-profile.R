@@ -13,9 +13,9 @@ steps <- 8L # With alternating actions no episode ends earlier.
 
 clock <- function() as.numeric(Sys.time()) * 1e6
 
-# Functions of the package whose share of a step is measured, none of which calls another.
-watched <- c("check_value", "write_value", "json_object", "load_body", "parsed_body",
-             "decode_observation", "info_from_json")
+# Functions of the package whose share of a step is measured, none of which calls another: they
+# check the action, write the request, parse the answer, look whose it is, and read it.
+watched <- c("is_plain_whole", "line_json", "from_json", "is_echo", "read_quick_step")
 
 # Sends steps through the worker's proxy, which keeps the last one as it went over the wire; the
 # environment must not be closed over it.

@@ -1,17 +1,20 @@
 # The benchmark: steps a second of single and vector environments through gym, reticulate,
-# the classic pattern and Python itself, seconds of searches, memory. All in one run, turn by
-# turn, on CartPole with alternating actions.
+# the classic pattern and Python itself, seconds of searches, memory, all with CartPole and
+# alternating actions; whole episodes of ten environments by rollout(); what R's own calls add to a
+# step. All in one run, turn by turn.
 #
-#   make bench              some ten minutes; writes vignettes/bench.csv, vignettes/bench.md
-#                           and man/figures/bench.png
+#   make bench              half an hour; writes vignettes/bench.csv, vignettes/bench.md,
+#                           man/figures/bench.png, man/figures/bench-environments.png and
+#                           the figures in README.md
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
-# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [memory] runs
-# parts.
+# tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
+#   [wire] [memory] runs parts.
 
 library(gym)
-for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "results", "table",
-               "figure")) {
+for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "tasks", "rollouts",
+               "wire", "results", "goals", "table", "figure",
+               "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
 
@@ -21,10 +24,12 @@ progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 settings <- function(quick) {
   if (quick) {
     list(turns = 3L, seconds = 0.3, num_envs = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,
-         fresh = 1L, steps = 1e5)
+         fresh = 1L, steps = 1e5, rollout_turns = 2L,
+         step_turns = 10L, turn_steps = 80)
   } else {
     list(turns = 7L, seconds = 0.7, num_envs = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
-         rounds = 50, fresh = 5L, steps = 1e6)
+         rounds = 50, fresh = 5L, steps = 1e6, rollout_turns = 3L,
+         step_turns = 40L, turn_steps = 160)
   }
 }
 
@@ -45,6 +50,8 @@ bench <- function(parts, quick) {
     if ("r_env" %in% parts) compare_r_envs(scale$turns),
     if ("search" %in% parts) compare_searches(setup, scale$searches, scale$rounds),
     if ("search" %in% parts) fresh_searches(scale$fresh),
+    if ("env_rollouts" %in% parts) compare_rollouts(python, scale$rollout_turns, quick),
+    if ("wire" %in% parts) compare_steps(python, scale$step_turns, scale$turn_steps),
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
   list(rows = rows, run = c(describe_run(setup), took = paste(round(now() - started), "s")))
@@ -94,19 +101,22 @@ describe_run <- function(setup) {
   )
 }
 
-report <- function(result, csv, text, figure) {
+report <- function(result, csv, text, figure, environments) {
   write_results(result$rows, result$run, csv)
-  lines <- c(table_lines(result$rows), "", goal_lines(result$rows), "", run_lines(result$run))
+  lines <- c(all_tables(result$rows), goal_lines(result$rows), "", run_lines(result$run))
   writeLines(lines, text)
   cat(lines, sep = "\n")
   if (all(c("single", "vector") %in% result$rows$part)) {
     draw_figure(result$rows, result$run, figure)
   }
+  if (all(c("env_rollouts", "wire") %in% result$rows$part)) {
+    draw_environments(result$rows, result$run, environments)
+  }
 }
 
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
-all_parts <- c("single", "vector", "r_env", "search", "memory")
+all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "wire", "memory")
 parts <- intersect(all_parts, arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts
@@ -116,5 +126,8 @@ report(
   result,
   csv = if (whole) "vignettes/bench.csv" else "pictures/bench.csv",
   text = if (whole) "vignettes/bench.md" else "pictures/bench.md",
-  figure = if (whole) "man/figures/bench.png" else "pictures/bench.png"
+  figure = if (whole) "man/figures/bench.png" else "pictures/bench.png",
+  environments = if (whole) "man/figures/bench-environments.png"
+  else "pictures/bench-environments.png"
 )
+if (whole) write_readme(result$rows, result$run)

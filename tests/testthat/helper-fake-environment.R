@@ -62,10 +62,12 @@ fake_observation <- function(space, seed, at) {
   if (length(space$shape) > 1L) array(values, space$shape) else values
 }
 
-# The same as a vector environment. It is as strict as the server: only with "sync" may `which` be
-# given, and a seed for each sub-environment; where an episode has ended, a sub-environment takes no
-# step in mode "Disabled", and begins again otherwise. With "vector_entry_point" the seed of a
-# sub-environment follows from the one seed and its number.
+# The same as a vector environment. It is as strict as the server: with "vector_entry_point" all are
+# reset and stepped together, and the seed of a sub-environment follows from the one seed and its
+# number; otherwise each has a seed of its own, `mask` and `which` pick some, and in mode "SameStep"
+# a list with several seeds for a sub-environment has it begin its next episodes by itself. Where an
+# episode has ended and no other began, no step is taken in mode "Disabled", nor in "SameStep".
+# `messages` counts resets and steps.
 fake_vector_env <- function(num_envs, mode = "sync",
                             autoreset = if (mode == "sync") "Disabled" else "NextStep",
                             reward = function(seed, step, action) 1,
@@ -74,44 +76,67 @@ fake_vector_env <- function(num_envs, mode = "sync",
                             action_space = discrete_space(2L),
                             reward_threshold = NULL, id = "Fake-v0") {
   observation_space <- named_space(observation_space, id)
+  together <- mode == "vector_entry_point"
+  all <- seq_len(num_envs)
   env <- new.env()
   env$spec <- list(id = id, reward_threshold = reward_threshold, max_episode_steps = NULL)
   env$num_envs <- as.integer(num_envs)
   env$vectorization_mode <- mode
+  env$num_workers <- switch(mode, sync = 0L, async = 2L)
   env$autoreset_mode <- autoreset
   env$single_observation_space <- observation_space
   env$single_action_space <- action_space
   env$resets <- list()
   env$sub_env_steps <- 0L
+  env$messages <- 0L
   env$closed <- 0L
+  env$seed <- rep(NA_integer_, num_envs)
+  env$at <- integer(num_envs)
+  env$done <- logical(num_envs)
+  env$later <- vector("list", num_envs)
   observe <- function(sub_envs) {
     batch_of(observation_space, lapply(sub_envs, function(i) {
       fake_observation(observation_space, env$seed[[i]], env$at[[i]])
     }))
   }
-  env$reset <- function(seed = NULL, options = NULL) {
-    stopifnot(length(seed) == if (mode == "vector_entry_point") 1L else num_envs)
+  env$reset <- function(seed = NULL, options = NULL, mask = NULL) {
+    stopifnot(length(seed) == if (together) 1L else num_envs, is.null(mask) || !together)
+    stopifnot(!is.list(seed) || autoreset == "SameStep")
+    env$messages <- env$messages + 1L
     env$resets <- c(env$resets, list(seed))
-    env$seed <- if (length(seed) == num_envs) seed else seed %% 1e8 + 17L * seq_len(num_envs)
-    env$at <- integer(num_envs)
-    env$done <- logical(num_envs)
-    observe(seq_len(num_envs))
+    some <- if (is.null(mask)) all else which(mask)
+    if (together) seed <- seed %% 1e8 + 17L * all
+    env$seed[some] <- vapply(seed[some], function(each) as.numeric(each[[1L]]), 0)
+    env$later[some] <- lapply(seed[some], function(each) each[-1L])
+    env$at[some] <- 0L
+    env$done[some] <- FALSE
+    observe(all)
   }
   env$step <- function(action, which = NULL) {
-    stopifnot(is.null(which) || mode == "sync")
-    sub_envs <- which %||% seq_len(num_envs)
-    stopifnot(autoreset != "Disabled" || !any(env$done[sub_envs]))
+    stopifnot(is.null(which) || !together)
+    sub_envs <- which %||% all
+    stopifnot(autoreset == "NextStep" || !any(env$done[sub_envs]))
     stopifnot(batch_length(action_space, action) == length(sub_envs))
+    env$messages <- env$messages + 1L
     env$sub_env_steps <- env$sub_env_steps + length(sub_envs)
     again <- env$done[sub_envs]
     env$at[sub_envs] <- ifelse(again, 0L, env$at[sub_envs] + 1L)
     actions <- lapply(seq_along(sub_envs), batch_value, space = action_space, batch = action)
     each <- function(f) mapply(f, env$seed[sub_envs], env$at[sub_envs], actions)
+    reward <- ifelse(again, 0, each(reward))
     ended <- each(ends) & !again
     env$done[sub_envs] <- ended
+    next_observation <- observe(sub_envs)
+    for (i in sub_envs[ended & lengths(env$later[sub_envs]) > 0L]) {
+      env$seed[[i]] <- env$later[[i]][[1L]]
+      env$later[[i]] <- env$later[[i]][-1L]
+      env$at[[i]] <- 0L
+      env$done[[i]] <- FALSE
+    }
     list(
-      observation = observe(sub_envs), reward = ifelse(again, 0, each(reward)), done = ended,
-      info = list(), terminated = ended, truncated = logical(length(sub_envs))
+      observation = observe(sub_envs), reward = reward, done = ended, info = list(),
+      terminated = ended, truncated = logical(length(sub_envs)),
+      next_observation = next_observation
     )
   }
   env$close <- function() {
@@ -134,14 +159,15 @@ scripted_environment <- function(returns, ...) {
   )
 }
 
-# A vector environment whose episodes have these returns and lengths, in the order in which they
-# begin, batch after batch. The return comes with the last step.
+# A vector environment whose episodes have these returns and lengths, in the order of their numbers,
+# batch after batch: as many to a batch as it has room for. The return comes with the last step.
 scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) {
   batch <- -1L
-  at <- function(seed) batch * num_envs + match(seed, current)
-  current <- NULL
+  room <- num_envs * if (mode == "vector_entry_point") 1L else 4L
+  seeds <- NULL
+  at <- function(seed) batch * room + match(seed, seeds)
   env <- fake_vector_env(
-    num_envs, mode,
+    num_envs, mode, if (mode == "vector_entry_point") "NextStep" else "SameStep",
     reward = function(seed, step, action) {
       if (step == lengths[[at(seed)]]) returns[[at(seed)]] else 0
     },
@@ -149,10 +175,12 @@ scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) 
     ...
   )
   reset <- env$reset
-  env$reset <- function(seed = NULL, options = NULL) {
-    observation <- reset(seed, options)
+  env$reset <- function(seed = NULL, options = NULL, mask = NULL) {
+    observation <- reset(seed, options, mask)
     batch <<- batch + 1L
-    current <<- env$seed
+    # Sub-environment i plays the episodes i, i + num_envs and so on.
+    own <- function(seeds) as.numeric(seeds)[1:4]
+    seeds <<- if (is.list(seed)) c(t(vapply(seed, own, numeric(4L)))) else env$seed
     observation
   }
   # Sub-environments beyond the last episode play along in some modes.

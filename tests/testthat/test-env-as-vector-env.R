@@ -13,7 +13,7 @@ test_that("an id is made as a vector environment, and closed by it", {
   expect_length(env_list_all(client), 0)
   lakes <- as_vector_env("FrozenLake-v1", max_envs = 3, is_slippery = FALSE, client = client)
   expect_identical(lakes$num_envs, 3L)
-  expect_identical(lakes$batch_size, 16L)
+  expect_identical(lakes$batch_size, 1024L)
   expect_false(lakes$one_seed)
   expect_identical(lakes$reset(1:3, 1:3), c(0L, 0L, 0L))
   # 2 is to the right, 1 is down; the ice is not slippery.

@@ -76,12 +76,12 @@ test_that("an environment of functions is played in copies, and does not move it
   vector_env <- as_vector_env(env)
   expect_s3_class(vector_env, "gym_vector_env")
   expect_identical(vector_env[c("num_envs", "batch_size", "one_seed", "remembers", "client")],
-                   list(num_envs = 16L, batch_size = 16L, one_seed = FALSE,
+                   list(num_envs = 16L, batch_size = 64L, one_seed = FALSE,
                         remembers = character(), client = NULL))
   expect_identical(as_vector_env(env, max_envs = 3)[c("num_envs", "batch_size")],
-                   list(num_envs = 3L, batch_size = 16L))
+                   list(num_envs = 3L, batch_size = 64L))
   expect_identical(as_vector_env(env, num_envs = 5)[c("num_envs", "batch_size")],
-                   list(num_envs = 5L, batch_size = 5L))
+                   list(num_envs = 5L, batch_size = 20L))
   rollout(env, policy_random(), 3, seed = 1)
   again <- r_cartpole()
   again$reset(seed = 1)

@@ -6,7 +6,8 @@ by_action <- function(seed, step, action) seed %% 3 + 10 * action
 every_kind <- function(num_envs, ...) {
   list(
     fake_vector_env(num_envs, "sync", ...), fake_vector_env(num_envs, "sync", "NextStep", ...),
-    fake_vector_env(num_envs, "async", ...), fake_vector_env(num_envs, "vector_entry_point", ...)
+    fake_vector_env(num_envs, "async", "SameStep", ...),
+    fake_vector_env(num_envs, "vector_entry_point", ...)
   )
 }
 
@@ -30,11 +31,10 @@ one_by_one <- function(seeds, policy, ...) {
   )
 }
 
-test_that("each sub-environment plays one episode of a batch, from its reset to its end", {
+test_that("sub-environment i of n plays the episodes i, i + n and so on, each to its end", {
   for (env in every_kind(4, ends = of_some_length)) {
     episodes <- rollout(env, policy_random(), episodes = 10, seed = 1)$episodes
     expect_identical(episodes$sub_env, c(1:4, 1:4, 1:2))
-    expect_length(env$resets, 3)
     expect_true(all(episodes$terminated))
     seeds <- if (env$vectorization_mode == "vector_entry_point") {
       episodes$seed %% 1e8 + 17L * episodes$sub_env
@@ -64,6 +64,53 @@ test_that("vector environments of every mode play the same episodes from the sam
   expect_identical(play("sync", "NextStep"), wanted)
   expect_identical(play("async", "NextStep"), wanted)
   expect_identical(play("async", "SameStep"), wanted)
+  expect_identical(play("sync", "SameStep"), wanted)
+})
+
+test_that("episodes that the environment begins by itself are those that are reset one by one", {
+  sampling <- function(observation) {
+    as.integer(stats::runif(nrow(observation)) < stats::plogis(observation[, 1L]))
+  }
+  networks <- policy_candidates(policy_network(c(4, 1)), rbind(1:4, c(1, -1, 1, -1), 4:1))
+  policies <- list(policy_random(), sampling, networks, list(sampling, policy_random()))
+  for (policy in policies) {
+    for (max_steps in list(NULL, 3)) {
+      play <- function(autoreset, steps = TRUE) {
+        env <- fake_vector_env(5, "sync", autoreset, ends = of_some_length, reward = by_action)
+        rollout(env, policy, episodes = 33, seed = 2, steps = steps, max_steps = max_steps,
+                next_observation = TRUE)
+      }
+      expect_identical(play("SameStep"), play("Disabled"))
+      expect_identical(play("SameStep", "arrays"), play("Disabled", "arrays"))
+    }
+  }
+})
+
+test_that("the seeds of all episodes go along with the reset, and no message more is sent", {
+  env <- fake_vector_env(3, "async", "SameStep", ends = of_some_length)
+  played <- rollout(env, policy_random(), episodes = 11, seed = 1)$episodes
+  expect_length(env$resets, 1)
+  expect_identical(lapply(env$resets[[1]], as.integer),
+                   unname(split(played$seed, played$sub_env)))
+  busiest <- max(tapply(played$length, played$sub_env, sum))
+  expect_identical(env$messages, 1L + busiest)
+  # Nobody steps who has nothing to play.
+  expect_identical(env$sub_env_steps, sum(played$length))
+})
+
+test_that("an episode that `max_steps` cuts short is followed by a reset with the other seeds", {
+  env <- fake_vector_env(2, "sync", "SameStep", ends = of_some_length)
+  played <- rollout(env, policy_random(), episodes = 8, seed = 1, max_steps = 3)$episodes
+  cut <- played[played$truncated, ]
+  followed <- cut[cut$episode <= 6, ]
+  reset <- unlist(lapply(env$resets[-1L], function(seeds) Filter(Negate(anyNA), seeds)),
+                  recursive = FALSE)
+  wanted <- lapply(followed$episode, function(episode) {
+    as.numeric(played$seed[seq(episode + 2L, 8L, by = 2L)])
+  })
+  by_first <- function(seeds) seeds[order(vapply(seeds, `[[`, 0, 1L))]
+  expect_gt(nrow(followed), 1L)
+  expect_identical(by_first(lapply(reset, as.numeric)), by_first(wanted))
 })
 
 test_that("a sub-environment that has ended takes no further step where it need not", {
@@ -157,7 +204,7 @@ test_that("observations and actions of every shape have a row for each episode t
 })
 
 test_that("sub-environments that must step together, but cannot once they ended, are refused", {
-  env <- fake_vector_env(2, "async", "Disabled")
+  env <- fake_vector_env(2, "vector_entry_point", "Disabled")
   expect_error(rollout(env, policy_random()), "\"Disabled\".*NextStep",
                class = "gym_error_argument")
   expect_length(env$resets, 0)

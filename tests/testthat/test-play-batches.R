@@ -39,10 +39,11 @@ play_in_order <- function(make, policy, order) {
   vector_env <- as_vector_env(env)
   vector_env$call <- rlang::current_env()
   policy <- policy_bind(policy, vector_env)
-  cut <- cut_batches(vector_env$batch_size, 1L, 20L)
+  episodes <- 5L * vector_env$batch_size
+  cut <- cut_batches(vector_env$batch_size, 1L, episodes)
   streams <- new_streams(1)
   tasks <- list()
-  history <- new_history(1L, 20L, streams)
+  history <- new_history(1L, episodes, streams)
   while (!is.null(episodes <- cut(length(tasks) + 1))) {
     episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
     tasks[[length(tasks) + 1L]] <- list(episodes = episodes, stream = take_stream(streams))
@@ -64,7 +65,7 @@ test_that("a batch is the same in any order of batches, and when it is played ag
   ends <- function(seed, step, action) step == 1L + seed %% 7L
   reward <- function(seed, step, action) seed %% 3 + 10 * action
   for (mode in c("sync", "async", "vector_entry_point")) {
-    make <- function() fake_vector_env(4, mode, ends = ends, reward = reward)
+    make <- function() fake_vector_env(2, mode, ends = ends, reward = reward)
     wanted <- play_in_order(make, drawing, 1:5)
     expect_identical(play_in_order(make, drawing, 5:1), wanted)
     expect_identical(play_in_order(make, drawing, c(2, 2, 4, 1, 3, 4, 5, 1)), wanted)

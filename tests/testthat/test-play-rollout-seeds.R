@@ -68,20 +68,21 @@ test_that("a seed means one rollout under every RNGkind(), which stays as it is"
 test_that("an interrupt leaves the batches that were finished, and the generator as it was", {
   set.seed(1)
   state <- .Random.seed
-  env <- fake_vector_env(3, ends = of_some_length)
+  env <- fake_vector_env(2, "sync", "SameStep", ends = of_some_length)
   interrupting <- function(observation) {
     if (length(env$resets) == 3L) rlang::interrupt()
     rep(0L, nrow(observation))
   }
   expect_message(
-    played <- rollout(env, interrupting, 10, seed = 2, steps = TRUE),
-    "after 6 of 10 episodes", class = "gym_message_interrupted"
+    played <- rollout(env, interrupting, 20, seed = 2, steps = TRUE),
+    "after 16 of 20 episodes", class = "gym_message_interrupted"
   )
   expect_identical(.Random.seed, state)
   expect_true(played$interrupted)
-  whole <- rollout(env, function(observation) rep(0L, nrow(observation)), 6, seed = 2, steps = TRUE)
+  still <- function(observation) rep(0L, nrow(observation))
+  whole <- rollout(env, still, 16, seed = 2, steps = TRUE)
   expect_identical(played[c("episodes", "steps")], whole[c("episodes", "steps")])
-  expect_output(print(played), "6 episodes")
+  expect_output(print(played), "16 episodes")
 })
 
 test_that("an interrupt in the first batch leaves an empty rollout that prints", {
@@ -95,15 +96,15 @@ test_that("an interrupt in the first batch leaves an empty rollout that prints",
 })
 
 test_that("an error in the middle carries the batches before it, with its own classes", {
-  env <- fake_vector_env(3)
+  env <- fake_vector_env(3, "sync", "SameStep")
   failing <- function(observation) {
     if (length(env$resets) == 2L) gym_abort("lost", class = "gym_error_connection", url = "there")
     rep(0L, nrow(observation))
   }
-  cnd <- expect_error(rollout(env, failing, 9), "after 3 episodes", class = "gym_error_rollout")
+  cnd <- expect_error(rollout(env, failing, 20), "after 12 episodes", class = "gym_error_rollout")
   expect_s3_class(cnd, "gym_error_connection")
   expect_identical(cnd$url, "there")
-  expect_identical(nrow(cnd$result$episodes), 3L)
+  expect_identical(nrow(cnd$result$episodes), 12L)
 })
 
 test_that("several policies are candidates, each with its own episodes from the same seeds", {
@@ -197,7 +198,7 @@ test_that("where each sub-environment has a seed, a single environment plays an 
   policy <- policy_network(c(8, 4, 4))
   played <- rollout("LunarLander-v3", policy, 20, seed = 1, client = client)
   expect_null(played$num_envs)
-  expect_identical(played$episodes$sub_env, c(1:16, 1:4))
+  expect_identical(played$episodes$sub_env, 1:20)
   env <- local_env("LunarLander-v3")
   alone <- rollout(env, policy, 20, seed = 1)
   expect_identical(alone$episodes$seed, played$episodes$seed)

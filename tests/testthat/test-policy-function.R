@@ -140,7 +140,7 @@ test_that("asking a function beforehand moves no generator and is done once a ro
     sample(0:1, nrow(observation), replace = TRUE)
   }
   asked <- 0L
-  played <- rollout(fake_vector_env(2), draws, 6, seed = 1, steps = TRUE)
+  played <- rollout(fake_vector_env(2, "vector_entry_point"), draws, 6, seed = 1, steps = TRUE)
   expect_identical(asked, 3L * 3L + 1L)
   # Each batch draws from a stream of its own.
   streams <- new_streams(1)

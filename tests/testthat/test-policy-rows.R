@@ -167,3 +167,14 @@ test_that("candidates in a list of policies are refused before anything is playe
                "`policy[[2]]` must be one policy, not 4 candidates of network 4-1", fixed = TRUE,
                class = "gym_error_argument")
 })
+
+test_that("a network acts for a batch of pictures as for each of them", {
+  set.seed(3)
+  pictures <- box_space(0, 255, shape = c(2L, 3L, 4L), dtype = "uint8")
+  env <- fake_spaces(pictures, discrete_space(5L))
+  policy <- policy_bind(policy_network(c(24, 5)), env)
+  seen <- array(sample(0:255, 6 * 24, replace = TRUE), c(6L, 2L, 3L, 4L))
+  alone <- apply(seen, 1L, function(values) act(policy, array(values, c(2L, 3L, 4L))))
+  expect_gt(length(unique(alone)), 1L)
+  expect_identical(act_of_rows(policy, seen, rep(1L, 6L), env), alone)
+})

@@ -32,8 +32,8 @@ test_that("an earlier round that fails after a later one has reached the target 
 test_that("once the search is decided nothing more is played", {
   env <- scripted_vector_env(6, returns = c(1, 1, 50, 50, 90, 90), lengths = c(1, 1, 2, 2, 40, 40))
   search_random(env, rounds = 30, episodes = 2, target = 20)
-  # Two steps of all that play, and no second batch.
-  expect_identical(env$sub_env_steps, 6L + 4L)
+  # The first round's sub-environments have begun the fourth round in between; no second batch.
+  expect_identical(env$sub_env_steps, 6L + 6L)
   expect_length(env$resets, 1)
 })
 
@@ -45,21 +45,24 @@ test_that("rounds after one that has reached the target are not waited for", {
 })
 
 test_that("a round may begin in one batch and end in another", {
+  # Each batch takes as many of these as it has room for, and plays the first of them.
+  room <- list(vector_entry_point = 4, sync = 16)
   for (mode in modes) {
-    # Each batch takes as many of these as there are sub-environments, and plays the first of them.
-    returns <- c(1, 2, 3, 4, 5, 0, 0, 0, 21, 20, 20, 19, 20, 0, 0, 0, 90)
-    env <- scripted_vector_env(4, returns, lengths = rep(c(3L, 1L), length.out = 17), mode)
-    search <- search_random(env, rounds = 4, episodes = 5, target = 20)
-    expect_identical(search$rounds$mean_return, c(3, 20))
-    expect_identical(search$episodes$return, returns[c(1:5, 9:13)])
-    expect_identical(search$episodes$sub_env, rep(c(1:4, 1L), 2))
+    end <- room[[mode]] + 1
+    unused <- numeric(room[[mode]] - 1)
+    returns <- c(1:end, unused, 21, rep(20, end - 3), 19, 20, unused, 90)
+    lengths <- rep(c(3L, 1L), length.out = length(returns))
+    env <- scripted_vector_env(4, returns, lengths, mode)
+    search <- search_random(env, rounds = 4, episodes = end, target = 20)
+    expect_identical(search$rounds$mean_return, c(mean(1:end), 20))
+    expect_identical(search$episodes$return, returns[c(1:end, 2 * room[[mode]] + 1:end)])
+    expect_identical(search$episodes$sub_env, rep(c(rep(1:4, length.out = end - 1), 1L), 2))
     expect_identical(search$round, 2L)
   }
 })
 
 test_that("without a target all rounds are played", {
-  returns <- c(1:3, 0, 4:6, 0, 7:9, 0)
-  env <- scripted_vector_env(4, returns, lengths = rep(1:4, 3))
+  env <- scripted_vector_env(4, returns = 1:9, lengths = c(1:4, 1:4, 1L))
   search <- search_random(env, rounds = 3, episodes = 3)
   expect_identical(search$rounds$mean_return, c(2, 5, 8))
   expect_false(search$solved)
@@ -95,7 +98,8 @@ test_that("the policy returned is the one that was played in its round", {
 
 test_that("an interrupt keeps the rounds of the batches that were finished", {
   play <- function(at) {
-    env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
+    env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1),
+                               "vector_entry_point")
     step <- env$step
     env$step <- function(...) {
       at <<- at - 1L
@@ -116,7 +120,8 @@ test_that("an interrupt keeps the rounds of the batches that were finished", {
 })
 
 test_that("an error in the middle carries the rounds that were finished", {
-  env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1))
+  env <- scripted_vector_env(4, returns = 1:8, lengths = c(1, 2, 2, 1, 9, 1, 1, 1),
+                             "vector_entry_point")
   step <- env$step
   env$step <- function(...) {
     if (env$sub_env_steps > 8L) gym_abort("lost", class = "gym_error_connection")
@@ -129,7 +134,8 @@ test_that("an error in the middle carries the rounds that were finished", {
 })
 
 test_that("the progress bar counts the rounds of a batch in their order, with the best so far", {
-  env <- scripted_vector_env(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1))
+  env <- scripted_vector_env(4, returns = 1:8, lengths = c(3, 1, 2, 1, 1, 1, 1, 1),
+                             "vector_entry_point")
   shown <- list()
   local_functions(
     progress_bar = function(...) {

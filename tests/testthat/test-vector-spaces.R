@@ -12,6 +12,8 @@ local_mirror_sub_envs <- function(frame = parent.frame()) {
 # Sends back what the sub-environments show. Returns that, and what a mirror found different.
 play_sub_envs <- function(env, values, tensors) {
   instance <- known_instance(env$client, env$instance_id)
+  # Calls were prepared for the other way.
+  instance$reset_lines[] <- instance$step_lines[] <- list(NULL)
   instance$takes_tensors <- instance$takes_tensors && tensors
   instance$sends_tensors <- instance$sends_tensors && tensors
   n <- env$num_envs

@@ -5,6 +5,9 @@ Reads one line a turn and answers with one, env steps a second (or what was aske
     versions                       as JSON
     single SECONDS
     vector SECONDS NUM_ENVS MODE   MODE is Gymnasium's vectorization_mode
+    episodes ENV_ID KIND FILE OUTPUTS POLICIES EPISODES
+                                   EPISODES with each of the POLICIES whose numbers are in FILE;
+                                   see tasks.R
 """
 
 import json
@@ -18,6 +21,7 @@ from importlib import metadata
 
 import gymnasium
 import numpy as np
+from episodes import count_steps, make_policies
 
 
 def single(seconds: str) -> float:
@@ -52,6 +56,14 @@ def vector(seconds: str, number: str, mode: str) -> float:
             return steps / elapsed
 
 
+def episodes(env_id: str, kind: str, file: str, outputs: str, policies: str, number: str) -> float:
+    """Play whole episodes in one environment, one after the other."""
+    played = make_policies(env_id, kind, file, int(outputs), int(policies))
+    started = time.perf_counter()
+    steps = count_steps(env_id, played, int(number))
+    return steps / (time.perf_counter() - started)
+
+
 @cache
 def _single_env() -> gymnasium.Env:
     env = gymnasium.make("CartPole-v1")
@@ -83,7 +95,8 @@ def versions() -> dict:
     }
 
 
+commands = {"versions": versions, "single": single, "vector": vector, "episodes": episodes}
 for line in sys.stdin:
     command, *arguments = line.split()
-    answer = {"versions": versions, "single": single, "vector": vector}[command](*arguments)
+    answer = commands[command](*arguments)
     print(json.dumps(answer), flush=True)

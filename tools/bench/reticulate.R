@@ -5,8 +5,10 @@
 #   forms KIND                          the ways to call it, KIND is single or vector
 #   single FORM SECONDS                 FORM counts the ways from 1
 #   vector FORM SECONDS NUM_ENVS MODE   MODE is Gymnasium's vectorization_mode
+#   episodes ENV_ID SECONDS NUM_ENVS    a task of tasks.R, in a SyncVectorEnv
 
 source("tools/bench/turns.R")
+source("tools/bench/tasks.R")
 suppressMessages(library(reticulate))
 gymnasium <- import("gymnasium")
 numpy <- import("numpy", convert = FALSE)
@@ -26,8 +28,10 @@ by_list <- function(x) {
 by_bytes <- function(x) {
   size <- x$itemsize
   bytes <- builtins$bytearray(x$tobytes("F"))
-  values <- if (size == 1L) as.logical(bytes) else readBin(bytes, "double", x$size, size)
-  if (x$ndim == 2L) matrix(values, ncol = x$shape[[2L]]) else values
+  values <- switch(x$dtype$kind,
+    b = as.logical(bytes), u = as.integer(bytes), readBin(bytes, "double", x$size, size)
+  )
+  if (x$ndim >= 2L) array(values, unlist(x$shape)) else values
 }
 
 # A single sub-environment has a row, too.
@@ -98,6 +102,71 @@ play_vector_form <- function(form, seconds, num_envs, mode) {
   )
 }
 
+# Steps a second of sub-environments that are stepped together, the policy in R. A step that only
+# begins the next episode of a sub-environment is none of its own.
+play_episodes <- function(env_id, seconds, num_envs) {
+  task <- tasks[[env_id]]
+  env <- environment_of(env_id, function() make_task(task, as.integer(num_envs)))
+  policy <- policy_of(task, env)
+  # Of few numbers a Python list is the faster way.
+  read <- if (converts) identity else function(x) if (x$size > 1024L) by_bytes(x) else by_list(x)
+  step <- env$step
+  observation <- read(env$reset()[[1L]])
+  ended <- logical(as.integer(num_envs))
+  steps <- 0
+  started <- now()
+  repeat {
+    out <- lapply(step(numpy_batch(policy(observation)))[1:4], read)
+    observation <- out[[1L]]
+    steps <- steps + sum(!ended)
+    ended <- as.logical(out[[3L]] | out[[4L]])
+    elapsed <- now() - started
+    if (elapsed >= as.numeric(seconds)) {
+      return(steps / elapsed)
+    }
+  }
+}
+
+# Of a matrix as its numbers, because reticulate 1.28 makes no arrays of NumPy 2.
+numpy_batch <- function(actions) {
+  if (is.integer(actions)) {
+    return(numpy$array(actions, dtype = "int64"))
+  }
+  numpy$array(as.vector(t(actions)), dtype = "float32")$reshape(dim(actions))
+}
+
+make_task <- function(task, num_envs) {
+  if (!task$stack) {
+    return(gymnasium$make_vec(task$env_id, num_envs = num_envs, vectorization_mode = "sync"))
+  }
+  gymnasium$register_envs(import("ale_py"))
+  wrappers <- list(
+    gymnasium$wrappers$AtariPreprocessing,
+    import("functools")$partial(gymnasium$wrappers$FrameStackObservation, stack_size = 4L)
+  )
+  gymnasium$make_vec(
+    task$env_id, num_envs = num_envs, vectorization_mode = "sync", wrappers = wrappers,
+    frameskip = 1L
+  )
+}
+
+policy_of <- function(task, env) {
+  numbers <- task_numbers(task)
+  if (task$stack) {
+    # Columns in the order in which R has the numbers of an observation.
+    places <- aperm(array(seq_len(task$inputs), c(84L, 84L, 4L)))
+    numbers <- numbers[, as.vector(places)]
+  }
+  if (task$kind != "box") {
+    return(task_function(task, numbers))
+  }
+  bounds <- function(which) {
+    values <- env$single_action_space[[which]]
+    as.vector(if (converts) values else unlist(values$tolist()))
+  }
+  task_function(task, numbers, bounds("low"), bounds("high"))
+}
+
 versions <- function() {
   list(
     reticulate = format(packageVersion("reticulate")),
@@ -112,7 +181,8 @@ answer <- function(command, ...) {
     versions = jsonlite::toJSON(versions(), auto_unbox = TRUE),
     forms = jsonlite::toJSON(names(switch(..1, single = single_forms, vector = vector_forms))),
     single = format(single(...), digits = 15),
-    vector = format(play_vector_form(...), digits = 15)
+    vector = format(play_vector_form(...), digits = 15),
+    episodes = format(play_episodes(...), digits = 15)
   )
 }
 

@@ -6,12 +6,30 @@ number <- function(x) {
 
 what_text <- function(summary) {
   plural <- ifelse(summary$num_envs == 1, "", "s")
-  ifelse(
-    summary$part %in% c("vector", "r_env"),
-    sprintf("%.0f sub-environment%s", summary$num_envs, plural),
-    c(single = "single", search = "random search", fresh = "search in a fresh R",
-      memory = "memory")[summary$part]
+  words <- c(
+    single = "single", wire = "single", search = "random search", fresh = "search in a fresh R",
+    memory = "memory", candidates = "candidates of a search", workers = "worker processes"
   )
+  text <- ifelse(
+    summary$num_envs > 0, sprintf("%.0f sub-environment%s", summary$num_envs, plural),
+    words[summary$part]
+  )
+  ifelse(summary$part == "env_rollouts", summary$env_id, text)
+}
+
+# The parts of a run, each group a table of its own.
+table_groups <- list(
+  CartPole = c("single", "vector", "r_env", "search", "fresh", "memory"),
+  environments = c("env_rollouts", "candidates", "workers"),
+  step = "wire"
+)
+
+# A table for each group that was measured, with an empty line after it.
+all_tables <- function(rows) {
+  unlist(lapply(table_groups, function(parts) {
+    measured <- rows[rows$part %in% parts, ]
+    if (nrow(measured)) c(table_lines(measured), "")
+  }), use.names = FALSE)
 }
 
 table_lines <- function(rows) {
@@ -26,6 +44,9 @@ table_lines <- function(rows) {
 
 goal_lines <- function(rows) {
   goals <- check_goals(rows)
+  if (is.null(goals)) {
+    return("No goals are held against these parts.")
+  }
   markdown(list(
     goal = calls_as_code(goals$goal), measured = number(goals$measured),
     reached = ifelse(goals$reached, "reached", "NOT reached")

@@ -97,7 +97,7 @@ def loops(port: int, granted: list[str]) -> None:
 def processes(port: int, granted: list[str]) -> None:
     """Ask for many processes, and keep them."""
     client = Client(port)
-    fields = {"num_envs": 64, "vectorization_mode": "async"}
+    fields = {"num_envs": 64, "num_workers": 64}
     ask(client, granted, "/v1/envs/", env_id="CartPole-v1", **fields)
     client.close()
 

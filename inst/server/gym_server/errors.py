@@ -161,10 +161,10 @@ def reset_needed(call: str) -> GymServerError:
     )
 
 
-def environment_error(error: BaseException) -> GymServerError:
+def environment_error(error: BaseException, who: str = "The environment") -> GymServerError:
     """Wrap what an environment's own code raised."""
     last_line = traceback.format_exception_only(type(error), error)[-1].strip()
-    return GymServerError("environment_error", f"The environment raised {last_line}")
+    return GymServerError("environment_error", f"{who} raised {last_line}")
 
 
 def environment_died(how: str, doing: str, hint: str | None = None) -> GymServerError:

@@ -9,10 +9,10 @@ from pathlib import Path
 def is_running(pid):
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+        # A process that has ended and that nobody has waited for is still listed.
+        return _state(Path(f"/proc/{pid}")) != "Z"
+    except (ProcessLookupError, FileNotFoundError):
         return False
-    # A process that has ended and that nobody has waited for is still listed.
-    return _state(Path(f"/proc/{pid}")) != "Z"
 
 
 def is_stopped(pid):

@@ -28,10 +28,13 @@ def row(info, index):
     }
 
 
+@pytest.mark.parametrize("num_workers", [0, 3])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Text", "Sequence"])
-def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(client, sub_envs, kind, mode):
-    url = sub_envs(kind, num_envs=4, autoreset_mode=mode, vectorization_mode="sync")
+def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(
+    client, sub_envs, kind, mode, num_workers
+):
+    url = sub_envs(kind, num_envs=4, autoreset_mode=mode, num_workers=num_workers)
     alone = [twin(kind, num_envs=1, autoreset_mode=mode) for _ in range(4)]
     post(client, url, "reset", seed=20)
     for sub_env, env in enumerate(alone):
@@ -150,18 +153,19 @@ def test_what_is_no_mask_for_these_sub_envs_is_refused(client, sub_envs, route, 
     check_that_no_sub_env_moved(client, url, "Discrete", seed=1)
 
 
-def test_what_an_implementation_has_not_is_refused(client, create, sub_envs):
-    own, processes = create(num_envs=3), sub_envs("Discrete", vectorization_mode="async")
-    for url in (own, processes):
-        post(client, url, "reset", seed=1)
+def test_what_an_implementation_has_not_is_refused(client, create):
+    own = create(num_envs=3)
+    before = post(client, own, "reset", seed=1)
     refused = client.post(f"{own}/reset/", json={"reset_mask": [True] * 3}).json
     assert refused["code"] == "not_supported"
     assert refused["hint"] == "create the environment with vectorization_mode 'sync'"
     assert refusal(client, own, "reset", seed=[1, 2, 3])[0] == "not_supported"
-    for url in (own, processes):
-        code, _ = refusal(client, url, "step", action=[0] * 3, step_mask=[True] * 3)
-        assert code == "not_supported"
-    check_that_no_sub_env_moved(client, processes, "Discrete", seed=1)
+    assert refusal(client, own, "reset", seed=[[1, 2], 2, 3])[0] == "not_supported"
+    code, _ = refusal(client, own, "step", action=[0] * 3, step_mask=[True] * 3)
+    assert code == "not_supported"
+    again = create(num_envs=3)
+    assert post(client, again, "reset", seed=1) == before
+    assert post(client, own, "step", action=[0] * 3) == post(client, again, "step", action=[0] * 3)
 
 
 def test_a_mask_in_the_options_is_refused(client, sub_envs):
@@ -186,3 +190,36 @@ def test_a_list_of_seeds_for_a_single_environment_is_refused(client, create):
     code, message = refusal(client, create(), "reset", seed=[5])
     assert code == "invalid_parameter"
     assert message == "The parameter 'seed' must be an integer, 0 or greater, not [5]"
+
+
+@pytest.mark.parametrize("num_workers", [0, 2])
+def test_sub_envs_rest_when_their_seeds_are_used_up(client, sub_envs, num_workers):
+    url = sub_envs(autoreset_mode="SameStep", num_workers=num_workers)
+    post(client, url, "reset", seed=[[1, 2], [3], [4]])
+    action = np.zeros((3, 2, 3)).tolist()
+    steps, ended = 0, np.zeros(3, dtype=int)
+    while ended.tolist() != [2, 1, 1]:
+        steps += int((ended < [2, 1, 1]).sum())
+        answer = post(client, url, "step", action=action, final_obs=False)
+        assert "final_obs" not in answer
+        ended += answer["done"]
+    after = post(client, url, "step", action=action)
+    assert (after["observation"], after["reward"]) == (answer["observation"], [0.0] * 3)
+    assert after["done"] == [False] * 3
+    about = client.get(url).json
+    assert (about["steps"], about["needs_reset"]) == (steps, True)
+    post(client, url, "reset", seed=9, reset_mask=[False, True, False])
+    assert post(client, url, "step", action=action)["reward"][1] != 0
+
+
+def test_seeds_for_later_need_episodes_that_begin_by_themselves(client, sub_envs):
+    code, message = refusal(
+        client, sub_envs(autoreset_mode="Disabled"), "reset", seed=[[1, 2], 3, 4]
+    )
+    assert code == "invalid_parameter"
+    assert "autoreset_mode 'Disabled'" in message
+    url = sub_envs(autoreset_mode="SameStep")
+    for seed in ([[], 1, 2], [[-1], 1, 2], [["1"], 1, 2]):
+        code, message = refusal(client, url, "reset", seed=seed)
+        assert code == "invalid_parameter"
+        assert "'seed' must be an integer, 0 or greater, or a list of one, null, or" in message

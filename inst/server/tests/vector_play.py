@@ -147,7 +147,7 @@ def reset_those_that_ended(client, url, env, ended):
 
 
 def action_file(env, batch, **metadata):
-    parts = spaces.encode_batch_tensors(env.single_action_space, "action", batch)
+    parts = spaces.batch_tensor_writer(env.single_action_space, "action")(batch)
     if parts.texts:
         metadata["texts"] = parts.texts
     metadata = {name: json.dumps(value) for name, value in metadata.items()}

@@ -12,6 +12,7 @@ from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Watchers
 from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.protocol.answers import JSON_FORM, AnswerForm
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Call(NamedTuple):
         path: the variable parts of the URL.
         body: the request's JSON object, or the query of a GET.
         fields: the values of the fields that the route declares; None for absent ones.
-        tensors: whether the client wants tensors where the route has them.
+        form: how the client wants tensors, where the route has them.
         url: the path as it was asked for.
         accept: what the client says it takes.
     """
@@ -52,7 +53,7 @@ class Call(NamedTuple):
     path: dict[str, str]
     body: dict
     fields: dict
-    tensors: bool = False
+    form: AnswerForm = JSON_FORM
     url: str = ""
     accept: str = ""
 
@@ -60,3 +61,13 @@ class Call(NamedTuple):
     def instance(self) -> Instance:
         """The instance that the URL names."""
         return self.services.instances.get(self.path["instance_id"])
+
+    @property
+    def wanted_form(self) -> AnswerForm:
+        """What the client wants of the answer, on a route that has the field ``info``."""
+        form = self.form
+        infos = self.fields["info"] is not False
+        finals = self.fields.get("final_obs") is not False
+        if infos and finals:
+            return form
+        return AnswerForm(form.tensors, form.by_column, infos, finals)

@@ -15,9 +15,9 @@ from gym_server.api.exactly_once import ExactlyOnce, Outcome
 from gym_server.api.routing import Match, Route
 from gym_server.errors import GymServerError, answer_to, body_too_large
 from gym_server.protocol import answers, bodies
-from gym_server.protocol.answers import Answer
+from gym_server.protocol.answers import JSON, JSON_FORM, Answer, AnswerForm
 from gym_server.protocol.fields import REQUEST, RequestId, read
-from gym_server.protocol.safetensors import TENSORS
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 # A longer body is kept as a digest, which takes 40 us for one of this size.
 _KEPT_BYTES = 2**16
@@ -67,7 +67,7 @@ class Endpoint:
             body = _query(environ)
         else:
             body = bodies.loads_tensors(raw) if sends_tensors else bodies.loads(raw)
-        wants_tensors = route.tensors and _prefers_tensors(accept, route.content_type)
+        form = _wanted_form(accept, route.content_type) if route.tensors else JSON_FORM
         request_id = read(body, (REQUEST,))["request"] if route.once else None
         instance_id = match.variables.get("instance_id")
 
@@ -79,7 +79,7 @@ class Endpoint:
                     match.variables,
                     body,
                     fields,
-                    wants_tensors,
+                    form,
                     match.path,
                     accept,
                 )
@@ -98,7 +98,7 @@ class Endpoint:
         # A request that ends an instance is kept with those that create one, so that it is never
         # refused because the instance has seen too many keys.
         used_id = None if route.ends_instance else instance_id
-        content = (match.path, _fingerprint(raw), sends_tensors, wants_tensors)
+        content = (match.path, _fingerprint(raw), sends_tensors, form)
         try:
             return self._exactly_once.answer(request_id, used_id, content, perform)
         except Exception as error:
@@ -145,10 +145,25 @@ def _created(result: object) -> str | None:
     return result.get("instance_id") if isinstance(result, dict) else None
 
 
-def _prefers_tensors(accept: str, content_type: str) -> bool:
-    # Parsing the header takes time in each step, and most clients send just a name.
+_ROWS = AnswerForm(tensors=True)
+_COLUMNS = AnswerForm(tensors=True, by_column=True)
+
+# Most clients send one of these, the R client the last one. To parse the header takes as long as
+# many a step.
+_FORMS = {
+    JSON: JSON_FORM,
+    TENSORS: _ROWS,
+    COLUMN_TENSORS: _COLUMNS,
+    f"{COLUMN_TENSORS}, {TENSORS};q=0.9": _COLUMNS,
+}
+
+
+def _wanted_form(accept: str, content_type: str) -> AnswerForm:
+    form = _FORMS.get(accept)
+    if form is not None:
+        return form
     if TENSORS not in accept:
-        return False
-    if accept == TENSORS:
-        return True
-    return parse_accept_header(accept, MIMEAccept).best_match([TENSORS, content_type]) == TENSORS
+        return JSON_FORM
+    accepted = parse_accept_header(accept, MIMEAccept)
+    best = accepted.best_match([TENSORS, COLUMN_TENSORS, content_type])
+    return _FORMS.get(best or "", JSON_FORM)

@@ -11,7 +11,16 @@ from gymnasium.vector import AutoresetMode
 
 from gym_server.envs.config import Wrapper
 from gym_server.errors import invalid_parameter
-from gym_server.protocol.fields import TRUE_OR_FALSE, Kind, boolean, integer, json_object, text
+from gym_server.protocol.fields import (
+    BOOLEAN,
+    TRUE_OR_FALSE,
+    Field,
+    Kind,
+    boolean,
+    integer,
+    json_object,
+    text,
+)
 
 # Whatever can be seen on a line of its own, and does not turn the direction of the others.
 _NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
@@ -60,6 +69,29 @@ def _seed(value: object) -> int | tuple[int | None, ...]:
     except ValueError:
         wanted = "an integer, 0 or greater, or a list of one, or null, for each sub-environment"
         raise invalid_parameter("seed", value, wanted) from None
+
+
+def _reset_seed(value: object) -> int | tuple[int | tuple[int, ...] | None, ...]:
+    if not isinstance(value, list) or not any(isinstance(item, list) for item in value):
+        return _seed(value)
+    try:
+        return tuple(_later_seeds(item) if isinstance(item, list) else _own(item) for item in value)
+    except ValueError:
+        wanted = (
+            "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
+            "sub-environment"
+        )
+        raise invalid_parameter("seed", value, wanted) from None
+
+
+def _own(value: object) -> int | None:
+    return None if value is None else _one_seed(value)
+
+
+def _later_seeds(values: list) -> tuple[int, ...]:
+    if not values:
+        raise ValueError
+    return tuple(map(_one_seed, values))
 
 
 def _one_seed(value: object) -> int:
@@ -146,6 +178,30 @@ SEED = Kind(
     "an integer, 0 or greater",
     _seed,
 )
+RESET_SEED = Kind(
+    {
+        "oneOf": [
+            {"type": ["integer", "boolean"], "minimum": 0},
+            {
+                "type": "array",
+                "items": {
+                    "oneOf": [
+                        {"type": ["integer", "boolean", "null"], "minimum": 0},
+                        {
+                            "type": "array",
+                            "items": {"type": ["integer", "boolean"], "minimum": 0},
+                            "minItems": 1,
+                        },
+                    ]
+                },
+                "minItems": 1,
+            },
+        ]
+    },
+    "an integer, 0 or greater",
+    _reset_seed,
+)
+NUM_WORKERS = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
 MASK = Kind(
     {"type": "array", "items": {"type": "boolean"}, "minItems": 1},
     "a list of true or false for each sub-environment",
@@ -155,3 +211,12 @@ MASK = Kind(
 QUERY_INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _query_integer)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
+FINAL_OBS = Field(
+    "final_obs",
+    BOOLEAN,
+    "Whether the last observations of episodes after which another one began are sent (the "
+    "default).",
+)
+INFO = Field(
+    "info", BOOLEAN, "Whether infos are made and sent (the default); with false they are empty."
+)

@@ -9,7 +9,7 @@ from gym_server import __version__
 from gym_server.api.routing import Route
 from gym_server.protocol.answers import HTML, JSON
 from gym_server.protocol.fields import REQUEST, Field
-from gym_server.protocol.safetensors import TENSORS
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 _ERROR = {
     "type": "object",
@@ -109,8 +109,16 @@ def _answer(route: Route) -> dict:
         content[HTML] = {}
     if route.tensors:
         # Raw bytes have no schema.
-        content[TENSORS] = {}
+        content[TENSORS] = content[COLUMN_TENSORS] = {}
+        return {"description": f"{route.answer}. {_LAYOUTS}", "content": content}
     return {"description": route.answer, "content": content}
+
+
+_LAYOUTS = (
+    "As tensors: one safetensors file, the other values as JSON in its metadata. By column "
+    "(order=column), tensors with two or more dimensions are transposed, with their shape "
+    "reversed: the bytes are in the order of R and Fortran."
+)
 
 
 def _query(field: Field) -> dict:

@@ -16,11 +16,9 @@ from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
-from gym_server.protocol.answers import HTML, Content, Ready
+from gym_server.protocol.answers import HTML, Content, Ready, frame_tensor
 from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
-from gym_server.protocol.safetensors import TENSORS, Tensor
-from gym_server.protocol.safetensors import write as write_tensors
 from gym_server.rendering.png import png
 
 ROUTES = Table()
@@ -51,6 +49,12 @@ ROUTES = Table()
         "vectorization_mode",
         fields.VECTORIZATION_MODE,
         "What runs the sub-environments; absent for the fastest that can do what is asked.",
+    ),
+    Field(
+        "num_workers",
+        fields.NUM_WORKERS,
+        "How many processes run the sub-environments; 0 for the server's own, absent to let the "
+        "server choose.",
     ),
     Field(
         "autoreset_mode",
@@ -112,12 +116,15 @@ def env_about(call: Call) -> dict:
     INSTANCE + "reset/",
     Field(
         "seed",
-        fields.SEED,
+        fields.RESET_SEED,
         "Seeds the environment and its action space; with sub-environments also a list of one for "
-        "each.",
+        "each. One of these may be a list: the first for now, the others for the episodes that the "
+        "sub-environment begins by itself. After the last one it rests: in a step it returns its "
+        "last observation and the reward 0.",
     ),
     Field("options", OBJECT, "The environment's own."),
     Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
+    fields.INFO,
     answer="observation, info; with sub-environments one row for each",
     once=True,
     tensors=True,
@@ -129,7 +136,7 @@ def env_reset(call: Call) -> dict | Ready:
     """Start an episode."""
     fields = call.fields
     return call.instance.reset(
-        fields["seed"], fields["options"], call.tensors, fields["reset_mask"]
+        fields["seed"], fields["options"], call.wanted_form, fields["reset_mask"]
     )
 
 
@@ -150,6 +157,8 @@ def env_reset(call: Call) -> dict | Ready:
         "has come so far.",
     ),
     Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
+    fields.INFO,
+    fields.FINAL_OBS,
     answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
     "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
     "reset at once",
@@ -172,7 +181,7 @@ def env_step(call: Call) -> dict | Ready:
     """Take one step."""
     fields = call.fields
     return call.instance.step(
-        fields["action"], call.tensors, fields["step_mask"], fields["render"] or False
+        fields["action"], call.wanted_form, fields["step_mask"], fields["render"] or False
     )
 
 
@@ -259,8 +268,8 @@ def env_observation_space_contains(call: Call) -> dict:
 def env_render(call: Call) -> Content:
     """Draw the current state."""
     frame = call.instance.render(call.fields["sub_env"] or 0)
-    if call.tensors:
-        return Content(write_tensors({"frame": Tensor.of(frame)}, {}), TENSORS)
+    if call.form.tensors:
+        return frame_tensor(frame, call.form)
     return Content(png(frame), "image/png")
 
 

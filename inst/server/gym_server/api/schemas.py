@@ -49,6 +49,7 @@ ABOUT_INSTANCE = {
     "max_episode_steps": or_null(COUNT),
     "render_fps": ANYTHING,
     "vectorization_mode": or_null(TEXT),
+    "num_workers": or_null(COUNT),
     "autoreset_mode": or_null(TEXT),
     "render_mode": or_null(TEXT),
     "kwargs": {"type": "object"},

@@ -87,7 +87,7 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "--max-processes",
         type=_number(1, 100_000),
         default=Limits.max_processes,
-        help="processes of all environments together: those of 'async' sub-environments, and of "
+        help="processes of all environments together: those that run sub-environments, and of "
         "environments that have one of their own (%(default)s)",
     )
     limits.add_argument(

@@ -28,6 +28,8 @@ class EnvConfig:
         wrappers: the first one is innermost.
         num_envs: how many sub-environments; None for a single environment.
         vectorization_mode: what runs the sub-environments; None for the fastest that fits.
+        num_workers: how many processes run the sub-environments; None to choose.
+        max_workers: the most that may be chosen.
         autoreset_mode: when a sub-environment whose episode ended is reset; None for NEXT_STEP.
         name: the client's own name for the environment.
     """
@@ -39,5 +41,12 @@ class EnvConfig:
     wrappers: tuple[Wrapper, ...] = ()
     num_envs: int | None = None
     vectorization_mode: str | None = None
+    num_workers: int | None = None
+    max_workers: int = 0
     autoreset_mode: AutoresetMode | None = None
     name: str | None = None
+
+    @property
+    def wants_workers(self) -> bool:
+        """Whether the client asked for processes of sub-environments."""
+        return bool(self.num_workers) or self.vectorization_mode == "async"

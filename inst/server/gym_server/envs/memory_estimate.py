@@ -20,7 +20,8 @@ from gym_server.envs.registry import module_of
 
 _KB, _MB = 2**10, 2**20
 
-# By the beginning of the module's name, the longest first; environments of all others are small.
+# By the beginning of the module's name, the more particular one before the more general one;
+# environments of all others are small.
 _ENVIRONMENT_BYTES = {
     "gymnasium.envs.toy_text.taxi": 1 * _MB,
     "gymnasium.envs.toy_text": 128 * _KB,

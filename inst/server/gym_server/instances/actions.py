@@ -28,8 +28,9 @@ class ActionReader:
             num_envs: how many sub-environments there are.
         """
         self._space = space
-        self._taken = spaces.with_wide_boxes(space)
         self._num_envs = num_envs
+        self._all = f"the {num_envs} sub-environments"
+        self._taken = _Reader(spaces.with_wide_boxes(space))
 
     def read(self, action: object, rows: int | None = None) -> object:
         """Return the action, or with sub-environments the batch of actions, that was sent.
@@ -53,21 +54,30 @@ class ActionReader:
         if failure.code != "environment_error":
             return
         try:
-            self._decode(self._space, action, rows)
+            self._decode(_Reader(self._space), action, rows)
         except spaces.NotInSpace:
             failure.hint = _CLIP
 
-    def _decode(self, space: Space, action: object, rows: int | None) -> object:
+    def _decode(self, reader: _Reader, action: object, rows: int | None) -> object:
         if rows is None:
             if isinstance(action, spaces.Parts):
-                return spaces.decode_tensors(space, "action", action)
-            return spaces.decode(space, action)
-        whose = f"the {rows} sub-environments"
-        if rows != self._num_envs:
-            whose += " that step"
+                return reader.of_tensors(action)
+            return reader.of_json(action)
+        is_all = rows == self._num_envs
+        whose = self._all if is_all else f"the {rows} sub-environments that step"
         if isinstance(action, spaces.Parts):
-            return spaces.decode_sub_envs_tensors(space, "action", action, rows, whose)
-        return spaces.decode_sub_envs(space, action, rows, whose)
+            return reader.of_batch_tensors(action, rows, whose)
+        return spaces.decode_sub_envs(reader.space, action, rows, whose)
+
+
+class _Reader:
+    """What reads the actions of a space, made once for it."""
+
+    def __init__(self, space: Space) -> None:
+        self.space = space
+        self.of_json = spaces.json_reader(space)
+        self.of_tensors = spaces.tensor_reader(space, "action")
+        self.of_batch_tensors = spaces.sub_envs_tensor_reader(space, "action")
 
 
 def _possible_actions(space: Space) -> str | None:

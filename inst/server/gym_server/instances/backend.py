@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Protocol
 
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol.answers import Ready
+from gym_server.protocol.answers import AnswerForm, Ready
 from gym_server.viewing.watchable import Moves
 
 if TYPE_CHECKING:
     import numpy as np
 
-Seed = int | tuple[int | None, ...] | None
+Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
 
 class Backend(Protocol):
@@ -40,11 +40,11 @@ class Backend(Protocol):
     # Called by the thread that has the lock ------------------------------------------------
 
     def reset(
-        self, seed: Seed, options: dict | None, tensors: bool, mask: np.ndarray | None
+        self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
     ) -> dict | Ready:
         """Start an episode; see ``Instance.reset()``."""
 
-    def step(self, action: object, tensors: bool, mask: np.ndarray | None) -> dict | Ready:
+    def step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict | Ready:
         """Take one step; see ``Instance.step()``."""
 
     def sample_action(self) -> object:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-import gymnasium
 from gymnasium.spaces import Space
-from gymnasium.vector import VectorEnv
 
 from gym_server.envs.config import EnvConfig
+from gym_server.errors import GymServerError
 from gym_server.instances.episode_statistics import Statistics
+from gym_server.protocol.answers import AnswerForm
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +28,8 @@ class Environment(Protocol):
         single_observation_space: of an observation of one sub-environment.
         statistics: of its episodes.
         vectorization_mode: what runs the sub-environments; None for a single environment.
+        num_workers: how many processes run them; None for a single environment, and for an
+            implementation of the environment's own.
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
@@ -41,6 +44,7 @@ class Environment(Protocol):
     single_observation_space: Space
     statistics: Statistics
     vectorization_mode: str | None
+    num_workers: int | None
     autoreset_mode: str | None
     draws_when_stepped: bool
     draws_on_render_thread: bool
@@ -53,8 +57,8 @@ class Environment(Protocol):
     ) -> None:
         """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
-        """Reset the environment, or the sub-environments of a mask."""
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
+        """Reset the environment, or the sub-environments of a mask; see ``step()`` for infos."""
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
         """Remember that episodes have begun, in the sub-environments of a mask."""
@@ -73,13 +77,22 @@ class Environment(Protocol):
     def check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Step some sub-environments."""
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step the environment, or the sub-environments that ``select()`` returned.
+
+        Args:
+            which: the sub-environments.
+            action: one, or one for each.
+            infos: whether somebody wants the infos; where it saves work, none are made then.
+        """
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
     ) -> tuple[Any, Any, Any, Any]:
         """Return reward, terminated, truncated and done in their types; remember the last."""
+
+    def count(self, which: np.ndarray | None, reward: Any, done: Any) -> int:
+        """Count a step in the statistics, and return how many sub-environments took part in it."""
 
     def answer(
         self,
@@ -89,13 +102,13 @@ class Environment(Protocol):
         truncated: Any,
         done: Any,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step, as JSON values or with ``Parts``."""
 
     # Values --------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, tensors: bool) -> object:
+    def encode(self, observation: Any, form: AnswerForm) -> object:
         """Return an observation as a JSON value or as ``Parts``."""
 
     def encode_action(self, action: Any) -> object:
@@ -127,11 +140,14 @@ class Environment(Protocol):
     def close(self) -> None:
         """Close it."""
 
-    def kill(self) -> None:
-        """Kill the processes that it runs in, if it has any."""
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when a process that it runs in ends by itself, or if it has."""
+
+    def kill(self, why: GymServerError) -> None:
+        """Kill the processes that it runs in, if it has any; the reason is for calls that wait."""
 
 
-def env_id_of(config: EnvConfig, gym_env: gymnasium.Env | VectorEnv) -> str:
+def env_id_of(config: EnvConfig, gym_env: Any) -> str:
     """Return what an environment can be created by again: its module, and the version found."""
     module, colon, name = str(config.env_id).rpartition(":")
     return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Collection
+from functools import partial
 
-from gym_server.envs import make, vectorization, wrappers
+from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
@@ -15,6 +16,7 @@ from gym_server.instances.local import LocalBackend
 from gym_server.instances.single import SingleEnvironment
 from gym_server.instances.vector import VectorEnvironment
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.vector_envs.make import make_vector_env
 
 
 def make_instance(
@@ -48,27 +50,25 @@ def make_instance(
             config.wrappers,
             reservation,
         )
-        undo.push(_closing_quietly(renderer, env.close))
+        undo.push(_closing_quietly(partial(renderer.run, env.close)))
         wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
         return _instance(SingleEnvironment(wrapped, config, renderer), config, renderer)
-    sub_envs, mode = vectorization.make_vector_env(
-        config, allowed_modules, max_num_envs, renderer, reservation
-    )
-    undo.push(_closing_quietly(renderer, sub_envs.close))
-    return _instance(VectorEnvironment(sub_envs, mode, config, renderer), config, renderer)
+    sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer, reservation)
+    undo.push(_closing_quietly(sub_envs.close))
+    return _instance(VectorEnvironment(sub_envs, mode, config), config, renderer)
 
 
 def _instance(env: Environment, config: EnvConfig, renderer: RenderThread) -> Instance:
     return Instance(LocalBackend(env, config, renderer), config, renderer)
 
 
-def _closing_quietly(renderer: RenderThread, close: Callable[[], None]) -> Callable[..., None]:
+def _closing_quietly(close: Callable[[], object]) -> Callable[..., None]:
     def close_it(kind: type | None, error: BaseException | None, *_: object) -> None:
         # Where the render thread hangs in the environment, it must be left alone.
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
         # The error for the client is the one that was raised, not one of closing.
         with contextlib.suppress(BaseException):
-            renderer.run(close)
+            close()
 
     return close_it

@@ -12,7 +12,7 @@ from gym_server.errors import GymServerError, invalid_parameter, unknown_instanc
 from gym_server.instances.backend import Backend, Seed
 from gym_server.instances.lock import InstanceLock
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol.answers import Ready
+from gym_server.protocol.answers import JSON_FORM, AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.viewing.viewer import Viewer
 from gym_server.viewing.watchable import Moves
@@ -60,7 +60,7 @@ class Instance:
         self,
         seed: Seed,
         options: dict | None,
-        tensors: bool = False,
+        form: AnswerForm = JSON_FORM,
         mask: np.ndarray | None = None,
     ) -> dict | Ready:
         """Start an episode; in every sub-environment, or in those of a mask.
@@ -70,7 +70,7 @@ class Instance:
                 takes the seed given at creation the first time. For sub-environments one for all,
                 each of which makes its own of it, or one for each.
             options: the environment's own.
-            tensors: whether the observation is wanted as tensors.
+            form: what is wanted of the answer.
             mask: a boolean for each sub-environment; None for all of them.
 
         Returns:
@@ -89,12 +89,12 @@ class Instance:
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
-            return self._backend.reset(seed, options, tensors, mask)
+            return self._backend.reset(seed, options, form, mask)
 
     def step(
         self,
         action: object,
-        tensors: bool = False,
+        form: AnswerForm = JSON_FORM,
         mask: np.ndarray | None = None,
         in_real_time: bool = False,
     ) -> dict | Ready:
@@ -104,7 +104,7 @@ class Instance:
             action: the JSON value of an action, or the action as ``Parts``; the bounds of a
                 Box are the environment's affair. With sub-environments a list of one JSON value
                 for each that steps, or a batch as ``Parts``.
-            tensors: whether the answer is wanted as tensors.
+            form: what is wanted of the answer.
             mask: a boolean for each sub-environment; None for all of them.
             in_real_time: whether people want to see it: not faster than in real time, then, while
                 somebody watches.
@@ -126,7 +126,7 @@ class Instance:
         if in_real_time or self._in_real_time:
             self.viewer.pace()
         with self.lock:
-            return self._backend.step(action, tensors, mask)
+            return self._backend.step(action, form, mask)
 
     def sample_action(self) -> object:
         """Draw an action, for each sub-environment, from the action space's own generator."""

@@ -21,6 +21,7 @@ from gym_server.instances.episode_statistics import facts_of
 from gym_server.json_values import plain
 from gym_server.monitoring.monitor import Monitor
 from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.png import picture
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.viewing.observation_summary import entries
@@ -52,38 +53,37 @@ class LocalBackend:
         self._single_action_space_info = spaces.describe(env.single_action_space)
         self._single_observation_space_info = spaces.describe(env.single_observation_space)
         self._actions = ActionReader(env.single_action_space, config.num_envs or 1)
-        self._observes_tensors = spaces.travels_as_tensors(env.single_observation_space)
         self.fps: object = (env.gym_env.metadata or {}).get("render_fps")
         self.moves = Moves()
         self.steps = 0
         self.draws_when_stepped = env.draws_when_stepped
         self.draws_on_render_thread = env.draws_on_render_thread
         self._monitor: Monitor | None = None
-        self._seed_for_reset = config.seed
+        self._seed_for_reset: Seed = config.seed
         self._was_reset = False
         self._observation: object = None
         self._max_episode_steps = time_limit(env.gym_env)
         if config.seed is not None:
             self._seed_actions(config.seed)
 
-    def _seed_actions(self, seed: int | tuple[int | None, ...]) -> None:
+    def _seed_actions(self, seed: Seed) -> None:
         # One generator serves all sub-environments.
         seeds = seed if isinstance(seed, tuple) else (seed,)
         first = next((one for one in seeds if one is not None), None)
         if first is not None:
-            self.env.action_space.seed(first)
+            self.env.action_space.seed(first[0] if isinstance(first, tuple) else first)
 
     # Moves ----------------------------------------------------------------------------------
 
     def reset(
-        self, seed: Seed, options: dict | None, tensors: bool, mask: np.ndarray | None
+        self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
     ) -> dict:
         """Start an episode; see ``Instance.reset()``."""
         env = self.env
         env.check_reset(seed, options, mask, self._was_reset)
         seed_to_use = self._seed_for_reset if seed is None else seed
         self._was_reset = False
-        observation, info = ask(self._move, self._reset_env, seed_to_use, options, mask)
+        observation, info = ask(self._move, self._reset_env, seed_to_use, options, mask, form.infos)
         if seed is None:
             self._seed_for_reset = None
         elif mask is None:
@@ -93,16 +93,18 @@ class LocalBackend:
         env.statistics.begin(mask)
         self._observation = observation
         return {
-            "observation": ask(env.encode, observation, tensors and self._observes_tensors),
-            "info": ask(plain, info) if info else {},
+            "observation": ask(env.encode, observation, form),
+            "info": ask(plain, info) if info and form.infos else {},
         }
 
-    def _reset_env(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def _reset_env(
+        self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool
+    ) -> tuple:
         if self._monitor is not None:
             return self._monitor.reset(seed=seed, options=options)
-        return self.env.reset(seed, options, mask)
+        return self.env.reset(seed, options, mask, infos)
 
-    def step(self, action: object, tensors: bool, mask: np.ndarray | None) -> dict:
+    def step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
         """Take one step; see ``Instance.step()``."""
         if not self._was_reset:
             raise reset_needed("step()")
@@ -110,29 +112,24 @@ class LocalBackend:
         decoded = self._actions.read(action, rows)
         self.env.check_running(which)
         try:
-            return ask(self._step, decoded, which, rows, tensors and self._observes_tensors)
+            return ask(self._step, decoded, which, form)
         except GymServerError as failure:
             if self.env.fails_as_a_whole:
                 self._was_reset = False
             self._actions.explain(failure, action, rows)
             raise
 
-    def _step(
-        self, action: object, which: np.ndarray | None, rows: int | None, tensors: bool
-    ) -> dict:
+    def _step(self, action: object, which: np.ndarray | None, form: AnswerForm) -> dict:
         env = self.env
-        if which is not None:
-            outcome = self._move(env.step_some, which, action)
-        elif self._monitor is not None:
+        if self._monitor is not None:
             outcome = self._move(self._monitor.step, action)
         else:
-            outcome = self._move(env.gym_env.step, action)
+            outcome = self._move(env.step, which, action, form.infos)
         observation, reward, terminated, truncated, info = outcome
         reward, terminated, truncated, done = env.read_outcome(which, reward, terminated, truncated)
-        self.steps += rows or 1
-        env.statistics.step(reward, done, which)
+        self.steps += env.count(which, reward, done)
         self._observation = observation
-        return env.answer(observation, reward, terminated, truncated, done, info, tensors)
+        return env.answer(observation, reward, terminated, truncated, done, info, form)
 
     def _move(self, move: Callable[..., tuple], *args: object) -> tuple:
         self.moves.begin()
@@ -223,6 +220,7 @@ class LocalBackend:
             "max_episode_steps": self._max_episode_steps,
             "render_fps": plain((gym_env.metadata or {}).get("render_fps")),
             "vectorization_mode": self.env.vectorization_mode,
+            "num_workers": self.env.num_workers,
             "autoreset_mode": self.env.autoreset_mode,
             "render_mode": config.render_mode or gym_env.render_mode,
             "kwargs": config.kwargs or {},
@@ -235,7 +233,8 @@ class LocalBackend:
         }
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Do nothing: this process does not end by itself."""
+        """From now on report when a process of sub-environments ends by itself."""
+        self.env.report_end(on_end)
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -283,7 +282,7 @@ class LocalBackend:
 
     def kill(self, why: GymServerError) -> None:
         """Kill the processes of sub-environments, which ends what hangs in them."""
-        self.env.kill()
+        self.env.kill(why)
 
     def close_abandoned(self) -> None:
         """Close what was abandoned, once the call that took too long has come back."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -11,9 +13,11 @@ from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
 if TYPE_CHECKING:
@@ -24,6 +28,7 @@ class SingleEnvironment:
     """A single environment; see ``Environment`` for the methods."""
 
     vectorization_mode: str | None = None
+    num_workers: int | None = None
     autoreset_mode: str | None = None
     fails_as_a_whole = False
 
@@ -45,7 +50,7 @@ class SingleEnvironment:
         """Refuse options that make a loop."""
         argument_limits.check_reset_options(self.gym_env, options)
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
         """Reset the environment."""
         start: tuple = self.gym_env.reset(seed=seed, options=options)
         return start
@@ -61,9 +66,10 @@ class SingleEnvironment:
     def check_running(self, which: np.ndarray | None) -> None:
         """Leave it to the environment what comes after an episode's end."""
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Refuse: there are no sub-environments to select."""
-        raise NotImplementedError
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step the environment, which makes its info in any case."""
+        outcome: tuple = self.gym_env.step(action)
+        return outcome
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
@@ -73,6 +79,11 @@ class SingleEnvironment:
         self.has_ended = done = terminated or truncated
         return float(reward), terminated, truncated, done
 
+    def count(self, which: np.ndarray | None, reward: float, done: bool) -> int:
+        """Count a step, and return 1."""
+        self.statistics.step(reward, done, None)
+        return 1
+
     def answer(
         self,
         observation: object,
@@ -81,24 +92,35 @@ class SingleEnvironment:
         truncated: bool,
         done: bool,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step."""
         return {
-            "observation": self.encode(observation, tensors),
+            "observation": self.encode(observation, form),
             "reward": reward,
             "done": done,
             "terminated": terminated,
             "truncated": truncated,
             # Converted while the environment cannot change it.
-            "info": plain(info) if info else {},
+            "info": plain(info) if info and form.infos else {},
         }
 
-    def encode(self, observation: Any, tensors: bool) -> object:
+    def encode(self, observation: Any, form: AnswerForm) -> object:
         """Return an observation as a JSON value or as ``Parts``."""
-        if tensors:
-            return spaces.encode_tensors(self.observation_space, "observation", observation)
-        return spaces.encode(self.observation_space, observation)
+        if form.tensors and self._write_tensors is not None:
+            return self._write_tensors(observation, form.by_column)
+        return self._write_json(observation)
+
+    # Made once, and only for a space that LocalBackend has found to be supported.
+    @cached_property
+    def _write_json(self) -> Callable[[Any], object]:
+        return spaces.json_writer(self.observation_space)
+
+    @cached_property
+    def _write_tensors(self) -> Callable[[Any, bool], spaces.Parts] | None:
+        space = self.observation_space
+        travels = spaces.travels_as_tensors(space)
+        return spaces.tensor_writer(space, "observation") if travels else None
 
     def encode_action(self, action: Any) -> object:
         """Return an action as a JSON value."""
@@ -120,5 +142,8 @@ class SingleEnvironment:
         """Close the environment on the render thread."""
         self._renderer.run(self.gym_env.close)
 
-    def kill(self) -> None:
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Do nothing: this process does not end by itself."""
+
+    def kill(self, why: GymServerError) -> None:
         """Do nothing: it runs in this process."""

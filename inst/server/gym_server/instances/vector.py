@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
-from gym_server.errors import GymServerError, wrong_length
+from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
-from gym_server.instances.vector_modes import MODES, Mode
 from gym_server.json_values import plain
-from gym_server.rendering.render_thread import RenderThread
+from gym_server.protocol.answers import AnswerForm
+from gym_server.vector_envs.entry_point import EntryPointEnv
+from gym_server.vector_envs.sub_envs import SubEnvs
 
 
 class VectorEnvironment:
@@ -25,16 +28,13 @@ class VectorEnvironment:
     # Some sub-environments may have moved then, and others not.
     fails_as_a_whole = True
 
-    def __init__(
-        self, env: VectorEnv, mode: str, config: EnvConfig, renderer: RenderThread
-    ) -> None:
+    def __init__(self, env: EntryPointEnv | SubEnvs, mode: str, config: EnvConfig) -> None:
         """Take over a vector environment.
 
         Args:
             env: the environment.
             mode: its vectorization_mode.
             config: what the client wanted.
-            renderer: the process's render thread.
 
         Raises:
             GymServerError: ``unsupported_space``.
@@ -54,14 +54,11 @@ class VectorEnvironment:
                 "an empty Tuple or Dict is the reason; create the environment without num_envs",
             )
         self.vectorization_mode: str | None = mode
-        self._mode: Mode = MODES[mode](env, self.env_id, renderer)
-        self._autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
-        self.autoreset_mode: str | None = self._autoreset_mode.value
-        self.draws_when_stepped = self._mode.draws_when_stepped
-        self.draws_on_render_thread = env.render_mode == "rgb_array" and self._mode.draws_in_process
-        self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, self._autoreset_mode)
-        # The sub-environments that ended, where they do not reset themselves.
-        self._ended = np.zeros(env.num_envs, dtype=bool)
+        self.num_workers = env.num_workers
+        self.autoreset_mode: str | None = env.autoreset_mode.value
+        self.draws_when_stepped = env.draws_when_stepped
+        self.draws_on_render_thread = env.render_mode == "rgb_array" and env.draws_in_process
+        self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
 
     # Reset ----------------------------------------------------------------------------------
 
@@ -85,12 +82,21 @@ class VectorEnvironment:
             return
         if len(seed) != self._num_envs:
             raise wrong_length("seed", len(seed), self._num_envs, "integer or null")
-        if not self._mode.resets_each:
+        if not self.gym_env.runs_each:
             raise self._not_supported("seed for each sub-environment")
+        if self.gym_env.autoreset_mode is AutoresetMode.DISABLED:
+            for one in seed:
+                if isinstance(one, tuple):
+                    raise invalid_parameter(
+                        "seed",
+                        list(one),
+                        "an integer, 0 or greater, or null, for each sub-environment, as with "
+                        "autoreset_mode 'Disabled' none begins an episode by itself",
+                    )
 
     def _check_reset_mask(self, mask: np.ndarray, was_reset: bool) -> None:
         self._check_mask("reset_mask", mask)
-        if not self._mode.resets_each:
+        if not self.gym_env.runs_each:
             raise self._not_supported("reset_mask")
         if not was_reset:
             raise GymServerError(
@@ -115,18 +121,13 @@ class VectorEnvironment:
             "create the environment with vectorization_mode 'sync'",
         )
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> tuple:
+    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
         """Reset all sub-environments, or those of a mask."""
-        if isinstance(seed, tuple):
-            seed = list(seed)
-        if mask is not None:
-            options = {**(options or {}), "reset_mask": mask}
-        start: tuple = self.gym_env.reset(seed=seed, options=options)
+        start: tuple = self.gym_env.reset(seed, options, mask, infos)
         return start
 
     def begin_episodes(self, mask: np.ndarray | None) -> None:
-        """Remember that episodes have begun, in the sub-environments of a mask."""
-        self._ended[slice(None) if mask is None else mask] = False
+        """Leave it to the environment, which knows what has begun."""
 
     # Step -----------------------------------------------------------------------------------
 
@@ -135,17 +136,17 @@ class VectorEnvironment:
         if mask is None:
             return None, self._num_envs
         self._check_mask("step_mask", mask)
-        if not self._mode.steps_some:
+        if not self.gym_env.runs_each:
             raise self._not_supported("step_mask")
         which = np.flatnonzero(mask)
         return which, len(which)
 
     def check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
-        if self._autoreset_mode is not AutoresetMode.DISABLED:
+        if self.gym_env.autoreset_mode is not AutoresetMode.DISABLED:
             return
-        stepping = np.arange(self._num_envs) if which is None else which
-        ended = stepping[self._ended[stepping]]
+        waiting = self.gym_env.ended
+        ended = np.flatnonzero(waiting) if which is None else which[waiting[which]]
         if len(ended):
             raise GymServerError(
                 "reset_needed",
@@ -154,20 +155,27 @@ class VectorEnvironment:
                 "reset with a reset_mask, or step the others with a step_mask",
             )
 
-    def step_some(self, which: np.ndarray, actions: Any) -> tuple:
-        """Step some sub-environments."""
-        return self._mode.step_some(which, actions)
+    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
+        """Step all sub-environments, or some."""
+        outcome: tuple = self.gym_env.step(which, action, infos)
+        return outcome
 
     def read_outcome(
         self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return rewards, terminated, truncated and done as arrays; remember the last."""
+        """Return rewards, terminated, truncated and done as arrays."""
         terminated = np.asarray(terminated, dtype=bool)
         truncated = np.asarray(truncated, dtype=bool)
-        done = terminated | truncated
-        if self._autoreset_mode is AutoresetMode.DISABLED:
-            self._ended[slice(None) if which is None else which] = done
-        return _reward(reward), terminated, truncated, done
+        return _reward(reward), terminated, truncated, terminated | truncated
+
+    def count(self, which: np.ndarray | None, reward: np.ndarray, done: np.ndarray) -> int:
+        """Count a step of those that took part in it; return how many they are."""
+        moved = self.gym_env.moved
+        if moved is not None:
+            which = np.flatnonzero(moved) if which is None else which[moved]
+            reward, done = reward[moved], done[moved]
+        self.statistics.step(reward, done, which)
+        return len(reward)
 
     def answer(
         self,
@@ -177,19 +185,19 @@ class VectorEnvironment:
         truncated: np.ndarray,
         done: np.ndarray,
         info: dict,
-        tensors: bool,
+        form: AnswerForm,
     ) -> dict:
         """Return the answer to a step: arrays where ``Parts`` are wanted, else lists."""
-        final = self._take_final(info, tensors) if info else {}
+        final = self._take_final(info, form) if info else {}
         answer = {
-            "observation": self.encode(observation, tensors),
+            "observation": self.encode(observation, form),
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
-            "info": plain(info) if info else {},
+            "info": plain(info) if info and form.infos else {},
             **final,
         }
-        if tensors:
+        if isinstance(answer["observation"], spaces.Parts):
             return answer
         answer["done"] = done
         return {
@@ -197,25 +205,38 @@ class VectorEnvironment:
             for name, value in answer.items()
         }
 
-    def _take_final(self, info: dict, tensors: bool) -> dict:
+    def _take_final(self, info: dict, form: AnswerForm) -> dict:
         """Take the last observations of the sub-environments that were reset out of an info."""
-        if self._autoreset_mode is not AutoresetMode.SAME_STEP or "final_obs" not in info:
+        if "final_obs" not in info:
             return {}
         final, which = info.pop("final_obs"), info.pop("_final_obs")
+        if not form.finals:
+            return {}
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {
-            "final_obs": self.encode(batch, tensors, "final_obs"),
+            "final_obs": self.encode(batch, form, "final_obs"),
             "final_sub_envs": rows.tolist(),
         }
 
     # Values ---------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, tensors: bool, name: str = "observation") -> object:
+    def encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
         """Return a batch of observations as JSON values or as ``Parts``."""
-        if tensors:
-            return spaces.encode_batch_tensors(self.single_observation_space, name, observation)
-        return spaces.encode_batch(self.single_observation_space, observation)
+        if form.tensors and self._write_tensors:
+            return self._write_tensors[name](observation, form.by_column)
+        return self._write_json(observation)
+
+    # Made once, and only for a space that LocalBackend has found to be supported.
+    @cached_property
+    def _write_json(self) -> Callable[[Any], object]:
+        return spaces.batch_json_writer(self.single_observation_space)
+
+    @cached_property
+    def _write_tensors(self) -> dict[str, Callable[[Any, bool], spaces.Parts]]:
+        space = self.single_observation_space
+        names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
+        return {name: spaces.batch_tensor_writer(space, name) for name in names}
 
     def encode_action(self, action: Any) -> object:
         """Return one action for each sub-environment as JSON values."""
@@ -228,25 +249,29 @@ class VectorEnvironment:
     @property
     def has_ended(self) -> bool:
         """Whether an episode ended that only a reset of the client's follows."""
-        return bool(self._ended.any())
+        return bool(self.gym_env.ended.any())
 
     def observed(self, sub_env: int, observation: Any) -> object:
         """Return the last observation of a sub-environment."""
-        return self._mode.observed(self.single_observation_space, sub_env, observation)
+        return self.gym_env.observed(sub_env, observation)
 
     def draw(self, sub_env: int) -> object:
         """Draw a sub-environment."""
-        return self._mode.draw(sub_env)
+        return self.gym_env.draw(sub_env)
 
     # The end --------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Close all sub-environments."""
-        self._mode.close()
+        self.gym_env.close()
 
-    def kill(self) -> None:
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when a process that they run in ends by itself, or if it has."""
+        self.gym_env.report_end(on_end)
+
+    def kill(self, why: GymServerError) -> None:
         """Kill the processes that they run in, if they have any."""
-        self._mode.kill()
+        self.gym_env.kill(why)
 
 
 def _has_empty_part(space: Space) -> bool:

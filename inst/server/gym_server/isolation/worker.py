@@ -7,13 +7,10 @@ its own; the server has an ``Instance`` with a ``WorkerBackend``, which asks thi
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import importlib
 import logging
 import math
 import os
-import signal
-import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +26,7 @@ from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import answer_to
+from gym_server.instances.backend import Seed
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.monitoring.monitor_directory import claim
@@ -36,7 +34,9 @@ from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
 from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
+from gym_server.processes.set_up import set_up_process
 from gym_server.protocol import answers
+from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
 # Its imports take longer than the start of a process.
@@ -79,7 +79,7 @@ def serve_instance(
         config: what the client wants.
         settings: what is to be known of the server.
     """
-    _set_up_process(settings)
+    set_up_process(settings.log_level, settings.max_mb)
     methods = _Methods(config, settings)
     pipe = Pipe(calls)
     _answer(pipe, 0, methods.create)
@@ -92,38 +92,8 @@ def list_registry(
     answers: Connection, _: Connection, search: str | None, settings: WorkerSettings
 ) -> None:
     """Answer what can be created with the allowed modules."""
-    _set_up_process(settings)
+    set_up_process(settings.log_level, settings.max_mb)
     _answer(Pipe(answers), 0, partial(registry.search, search, settings.allowed_modules))
-
-
-def _set_up_process(settings: WorkerSettings) -> None:
-    """Become a process that ends with the server, logs as it does, and has a memory limit."""
-    if hasattr(os, "setsid"):
-        # The processes that the environment starts can be killed with it, and Ctrl-C reaches the
-        # server only.
-        os.setsid()
-    for name in ("SIGINT", "SIGBREAK"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    start.exit_with_parent(group=True)
-    logging.basicConfig(
-        level=settings.log_level,
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s (process %(process)d): %(message)s",
-    )
-    logging.captureWarnings(True)
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        # A crash in C prints where it happened.
-        faulthandler.enable()
-    if settings.max_mb:
-        _limit_memory(settings.max_mb * 2**20)
-
-
-def _limit_memory(size: int) -> None:
-    # Not RLIMIT_AS: threads and libraries reserve addresses that they never use.
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_DATA, (size, size))
 
 
 def _serve(pipe: Pipe, methods: _Methods) -> None:
@@ -195,11 +165,12 @@ class _Methods:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, *args: Any) -> answers.Answer:
-        return answers.answer(self._instance.reset(*args), None)
+    def reset(self, seed: Seed, options: dict | None, form: tuple, mask: Any) -> answers.Answer:
+        start = self._instance.reset(seed, options, AnswerForm(*form), mask)
+        return answers.answer(start, None)
 
-    def step(self, *args: Any) -> answers.Answer:
-        return answers.answer(self._instance.step(*args), None)
+    def step(self, action: object, form: tuple, mask: Any) -> answers.Answer:
+        return answers.answer(self._instance.step(action, AnswerForm(*form), mask), None)
 
     def sample_action(self) -> object:
         return self._instance.sample_action()

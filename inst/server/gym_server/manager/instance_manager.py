@@ -8,11 +8,10 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 from gym_server.budget import Budget
-from gym_server.envs import registry, vectorization, wrappers
+from gym_server.envs import registry, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
@@ -25,12 +24,16 @@ from gym_server.manager.limits import Limits, Room
 from gym_server.manager.tombstones import Tombstones
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt
+from gym_server.threads.interrupt import interrupt, interrupted_by
+from gym_server.vector_envs import make as vector_make
+from gym_server.vector_envs.num_workers import most_workers
+from gym_server.vector_envs.warm_processes import warm_processes
 
 log = logging.getLogger(__name__)
 
 
-class _Share(NamedTuple):
+@dataclass
+class _Share:
     """What an environment takes of the server's limits, until it is gone."""
 
     room: Room
@@ -111,11 +114,13 @@ class InstanceManager:
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
         if config.num_envs is None:
-            vectorization.check_single(config)
+            vector_make.check_single(config)
         isolated = self._isolation.wants(config.env_id, self._allowed_modules)
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
-            instance = make_it(config, creation, undo)
+            instance = make_it(creation.config, creation, undo)
+            if not isolated:
+                self._note_processes(instance, creation.share)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -139,11 +144,16 @@ class InstanceManager:
     @contextlib.contextmanager
     def _room_for(self, config: EnvConfig, isolated: bool) -> Iterator[_Creation]:
         """Keep room for an environment while it is created."""
-        room = Room(config.num_envs or 1, _processes_of(config, isolated))
-        share = _Share(room, MemoryReservation(self._budget, room.sub_envs))
-        creation = _Creation(config, share)
+        # An isolated environment has a process already.
+        workers = most_workers(config) if config.wants_workers or not isolated else 0
+        reservation = MemoryReservation(self._budget, config.num_envs or 1)
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
+            if not config.wants_workers:
+                workers = min(workers, max(0, self._limits.max_processes - taken.processes))
+            room = Room(config.num_envs or 1, isolated + workers)
+            share = _Share(room, reservation)
+            creation = _Creation(replace(config, max_workers=workers), share)
             instances = len(self._instances) + len(self._creating)
             self._limits.check_room(instances, taken, room)
             self._creating.begin(creation, threading.get_ident())
@@ -157,6 +167,15 @@ class InstanceManager:
             raise
         finally:
             self._release(creation)
+
+    def _note_processes(self, instance: Instance, share: _Share) -> None:
+        """Give back the room for processes that were not needed.
+
+        Not for an isolated environment: its process, which nobody trusts, would tell how many.
+        """
+        processes = instance.about()["num_workers"] or 0
+        with self._lock:
+            share.room = replace(share.room, processes=processes)
 
     def _release(self, whose: _Creation | str) -> None:
         """Free the share of an environment that is gone, or was not created after all."""
@@ -181,9 +200,11 @@ class InstanceManager:
         settings = self._isolation.settings(
             config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        backend = WorkerBackend(config, settings)
-        undo.callback(backend.kill, shutting_down())
-        creation.kill = backend.kill
+        # An interrupt must wait until the process has started; see ``SubEnvs``.
+        with interrupted_by(lambda: None):
+            backend = WorkerBackend(config, settings)
+            undo.callback(backend.kill, shutting_down())
+            creation.kill = backend.kill
         backend.create(creation.share.reservation)
         return Instance(backend, config, self._renderer)
 
@@ -295,10 +316,7 @@ class InstanceManager:
             creation.kill(why)
         elif not self._renderer.abandon(thread, why):
             answer_for(thread, why)
-            # Where the thread starts processes it must go on: an interrupt while it talks to the
-            # fork server would break that, and with it the processes of all others.
-            if not creation.share.room.processes:
-                interrupt(thread)
+            interrupt(thread)
         self._creating.answered(creation)
 
     def _evict(
@@ -356,7 +374,7 @@ class InstanceManager:
             instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
-        """Close every instance and take no more."""
+        """Close every instance and take no more; end the processes that wait for another one."""
         with self._lock:
             self._stopping = True
             instances = list(self._instances.values())
@@ -370,15 +388,11 @@ class InstanceManager:
             thread.start()
         for thread in threads:
             thread.join()
+        # After them: closing them leaves processes there.
+        warm_processes.end()
 
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
             if instance_id not in self._instances and instance_id not in self._tombstones:
                 return instance_id
-
-
-def _processes_of(config: EnvConfig, isolated: bool) -> int:
-    """Return how many processes of its own run an environment."""
-    sub_envs = config.num_envs or 1
-    return isolated + (sub_envs if config.vectorization_mode == "async" else 0)

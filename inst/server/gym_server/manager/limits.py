@@ -38,8 +38,8 @@ class Limits:
             sub-environments counts as one; None for four times as many as one may have.
         max_processes: how many processes all of them may have together. However many processors
             there are, each takes 7 MB of its own when it is created and 20 MB in use, two threads
-            and 15 files, whether it is used or not; this is two environments of as many as one
-            may have, or a class in which everybody has some isolated ones.
+            and 15 files, whether it is used or not; this is a class in which everybody has some
+            isolated ones, or sub-environments in processes.
         max_memory_mb: how much memory all of them may be estimated to take together at their most,
             in MiB; see ``memory_estimate``. Half of what a small machine has.
         max_watchers: how many pages may be shown something at a time.
@@ -93,8 +93,8 @@ class Limits:
                 "too_many_processes",
                 f"All environments together may have {self.max_processes} processes, and "
                 f"{max(0, left)} are left, not {more.processes}",
-                "close some, GET /v1/instances/ lists them, or leave vectorization_mode 'async' "
-                "out; the server's option --max-processes sets the limit",
+                "close some, GET /v1/instances/ lists them, or let fewer processes run sub-"
+                "environments (num_workers); the server's option --max-processes sets the limit",
             )
 
 

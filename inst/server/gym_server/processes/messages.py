@@ -1,8 +1,9 @@
-"""Method calls from the server to the process of an isolated environment, and their results.
+"""Method calls from the server to a process that it has started, and their results.
 
 The server sends calls as pickles: the process can trust the server.  The server cannot trust the
-process, which an environment may have taken over.  So results are numbers, JSON and bytes, each
-checked before it is used, and nothing in them names code.
+process of an isolated environment, which the environment may have taken over.  So its results are
+numbers, JSON and bytes, each checked before it is used, and nothing in them names code.  Only a
+process that runs what would otherwise run in the server's own process may return Python's objects.
 """
 
 from __future__ import annotations
@@ -21,14 +22,15 @@ import numpy as np
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import MalformedMessageError, Pipe
 from gym_server.protocol.answers import JSON, Answer, Ready, dumps
-from gym_server.protocol.safetensors import TENSORS
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 # The number of the call, the kind of the result, and the length of its text.
 _HEAD = struct.Struct("<QBI")
 
-_REFUSAL, _VALUE, _JSON, _TENSORS = range(4)
+_REFUSAL, _VALUE, _JSON, _TENSORS, _OBJECT, _COLUMN_TENSORS = range(6)
 
-_CONTENT_TYPES = {_JSON: JSON, _TENSORS: TENSORS}
+_CONTENT_TYPES = {_JSON: JSON, _TENSORS: TENSORS, _COLUMN_TENSORS: COLUMN_TENSORS}
+_KINDS = {content_type: kind for kind, content_type in _CONTENT_TYPES.items()}
 
 _LONGEST_TEXT = 100_000
 
@@ -51,8 +53,7 @@ def read_call(raw: bytes) -> tuple[int, str, tuple]:
 
 def answer_message(number: int, answer: Answer) -> bytes:
     """Return the message that carries the answer to a reset or a step."""
-    kind = _TENSORS if answer.content_type == TENSORS else _JSON
-    return _HEAD.pack(number, kind, 0) + answer.body
+    return _HEAD.pack(number, _KINDS[answer.content_type], 0) + answer.body
 
 
 def value_message(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
@@ -60,6 +61,11 @@ def value_message(number: int, value: object, frame: np.ndarray | None = None) -
     text = dumps([value, None if frame is None else frame.shape])
     pixels = b"" if frame is None else frame.tobytes()
     return _HEAD.pack(number, _VALUE, len(text)) + text + pixels
+
+
+def object_message(number: int, value: object) -> bytes:
+    """Return the message that carries any object of Python's from a process that is trusted."""
+    return _HEAD.pack(number, _OBJECT, 0) + pickle.dumps(value, 5)
 
 
 def refusal_message(number: int, refusal: dict[str, str]) -> bytes:
@@ -79,9 +85,15 @@ class CallPipe:
             while there is none.
     """
 
-    def __init__(self, connection: Connection) -> None:
-        """Take over the server's end of a pipe."""
+    def __init__(self, connection: Connection, trusted: bool = False) -> None:
+        """Take over the server's end of a pipe.
+
+        Args:
+            connection: the end.
+            trusted: whether the process may return any object of Python's.
+        """
         self._pipe = Pipe(connection)
+        self._trusted = trusted
         self._lock = threading.Lock()
         self._number = 0
         self.busy_since: float | None = None
@@ -103,16 +115,40 @@ class CallPipe:
             TimeoutError: it took too long; its result will be ignored.
             MalformedMessageError: what it sent is no result.
         """
+        self.begin(method, *args, timeout=timeout)
+        return self.finish(timeout)
+
+    def begin(self, method: str, *args: object, timeout: float | None = None) -> None:
+        """Send a call; ``finish()`` must follow unless this raises an error.
+
+        Args:
+            method: its name.
+            *args: its arguments; they are pickled.
+            timeout: how many seconds to wait for an earlier call.
+
+        Raises:
+            GymServerError, EOFError, OSError, TimeoutError: as for ``call()``.
+        """
         if not self._lock.acquire(timeout=-1 if timeout is None else timeout):
             raise TimeoutError
         self.busy_since = time.monotonic()
         try:
             self._number += 1
             self._pipe.send(_pickled(self._number, method, args))
+        except BaseException:
+            self._end()
+            raise
+
+    def finish(self, timeout: float | None = None) -> Ready | Result:
+        """Wait for the result of the call that has begun; see ``call()``."""
+        try:
             return self._receive(timeout)
         finally:
-            self.busy_since = None
-            self._lock.release()
+            self._end()
+
+    def _end(self) -> None:
+        self.busy_since = None
+        self._lock.release()
 
     def first_result(self) -> Ready | Result:
         """Wait for the result that the process sends without a call; see ``call()``."""
@@ -126,7 +162,7 @@ class CallPipe:
             raw = self._pipe.receive()
             number = _HEAD.unpack_from(raw)[0] if len(raw) >= _HEAD.size else -1
             if number == self._number:
-                return _read_result(raw)
+                return _read_result(raw, self._trusted)
             # A smaller number is that of a call that was not waited for any more.
             if not 0 < number < self._number:
                 raise MalformedMessageError("an answer that nobody asked for")
@@ -152,8 +188,10 @@ def _pickled(number: int, method: str, args: tuple) -> bytes:
         ) from None
 
 
-def _read_result(raw: bytes) -> Ready | Result:
+def _read_result(raw: bytes, trusted: bool) -> Ready | Result:
     _, kind, length = _HEAD.unpack_from(raw)
+    if kind == _OBJECT and trusted:
+        return Result(pickle.loads(memoryview(raw)[_HEAD.size :]), None)
     if kind in _CONTENT_TYPES:
         return Ready(raw[_HEAD.size :], _CONTENT_TYPES[kind])
     end = _HEAD.size + length

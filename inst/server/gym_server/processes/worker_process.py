@@ -38,7 +38,12 @@ class WorkerProcess:
     """
 
     def __init__(
-        self, target: Callable, *args: object, on_end: Callable[[GymServerError], None], hint: str
+        self,
+        target: Callable,
+        *args: object,
+        on_end: Callable[[GymServerError], None],
+        hint: str,
+        trusted: bool = False,
     ) -> None:
         """Start it.
 
@@ -48,6 +53,7 @@ class WorkerProcess:
             on_end: called with the reason, in a thread of its own, once the process has ended
                 without having been asked to; see ``report_end()``.
             hint: what to do about such an end, or "".
+            trusted: whether its results may be any objects of Python's; see ``messages``.
         """
         self._on_end = on_end
         self._hint = hint or None
@@ -63,7 +69,7 @@ class WorkerProcess:
         self.why: GymServerError | None = None
         context = start.context()
         pipes = [context.Pipe() for _ in range(2)]
-        self._calls, self._queries = (CallPipe(ours) for ours, _ in pipes)
+        self._calls, self._queries = (CallPipe(ours, trusted) for ours, _ in pipes)
         # Not a daemon: a daemon may start no processes, and sub-environments can be processes.
         self._process = context.Process(
             target=target, args=(*(theirs for _, theirs in pipes), *args), daemon=False
@@ -122,10 +128,22 @@ class WorkerProcess:
         Raises:
             GymServerError: what it refused with, or why it has ended.
         """
+        self.begin(method, *args)
+        return self.finish()
+
+    def begin(self, method: str, *args: object) -> None:
+        """Begin a ``call()``; unless this raises an error, ``finish()`` must follow."""
         if self.why is not None:
             raise self.why.again()
         try:
-            return self._calls.call(method, *args)
+            self._calls.begin(method, *args)
+        except _FAULTS as fault:
+            raise self._end_after(fault) from None
+
+    def finish(self) -> Any:
+        """Return the result of the call that has begun; see ``call()``."""
+        try:
+            return self._calls.finish()
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import json
 import struct
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gym_server.json_values import plain
-from gym_server.protocol.fields import REQUEST, RequestId
-from gym_server.protocol.safetensors import TENSORS, Parts, Tensor, add_metadata
-from gym_server.protocol.safetensors import write as write_tensors
+from gym_server.protocol.fields import RequestId
+from gym_server.protocol.safetensors import (
+    COLUMN_TENSORS,
+    TENSORS,
+    Parts,
+    Tensor,
+    add_metadata,
+    quoted,
+)
+from gym_server.protocol.safetensors import join as join_tensors
 
 JSON = "application/json"
 HTML = "text/html"
@@ -27,6 +35,25 @@ def dumps(value: object) -> bytes:
         # Only now walk through all of it: an ordinary step has nothing to convert.
         text = _encode(plain(value))
     return text.encode("ascii")
+
+
+class AnswerForm(NamedTuple):
+    """What the answer to a reset or a step holds, and how.
+
+    Attributes:
+        tensors: whether observations are tensors, where their space can travel so.
+        by_column: whether these are transposed, see ``COLUMN_TENSORS``.
+        infos: whether there are infos; without them an answer has an empty one.
+        finals: whether there are the last observations of episodes after which another one began.
+    """
+
+    tensors: bool = False
+    by_column: bool = False
+    infos: bool = True
+    finals: bool = True
+
+
+JSON_FORM = AnswerForm()
 
 
 class Answer(NamedTuple):
@@ -54,6 +81,12 @@ class Ready(NamedTuple):
     content_type: str
 
 
+def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Content:
+    """Return a frame as a file of one tensor."""
+    file = join_tensors({"frame": Tensor.of(frame, form.by_column)}, b"")
+    return Content(file, COLUMN_TENSORS if form.by_column else TENSORS)
+
+
 def answer(
     result: dict | Content | Ready | None, request_id: RequestId | None, status: int = 200
 ) -> Answer:
@@ -73,23 +106,25 @@ def answer(
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default type here.
         return Answer(204, b"", "text/html; charset=utf-8", headers)
+    if isinstance(observation := result.get("observation"), Parts):
+        content_type = COLUMN_TENSORS if observation.by_column else TENSORS
+        return Answer(status, _dumps_tensors(request_id, **result), content_type)
     if request_id is not None:
         result = {**result, "request": request_id._asdict()}
-    if isinstance(result.get("observation"), Parts):
-        return Answer(status, _dumps_tensors(**result), TENSORS)
     return Answer(status, dumps(result))
 
 
 def _with_request(ready: Ready, request_id: RequestId | None) -> bytes:
     if request_id is None:
         return ready.body
-    request = dumps(request_id._asdict())
-    if ready.content_type == TENSORS:
-        return add_metadata(ready.body, REQUEST.name, request.decode("ascii"))
-    return b'%b,"request":%b}' % (ready.body[:-1], request)
+    if ready.content_type != JSON:
+        return add_metadata(ready.body, _request_metadata(request_id))
+    return b'%b,"request":%b}' % (ready.body[:-1], dumps(request_id._asdict()))
 
 
-def _dumps_tensors(observation: Parts, final_obs: Parts | None = None, **others: Any) -> bytes:
+def _dumps_tensors(
+    request_id: RequestId | None, observation: Parts, final_obs: Parts | None = None, **others: Any
+) -> bytes:
     """Return a reset's or a step's result as a safetensors file."""
     tensors, texts = dict(observation.tensors), dict(observation.texts)
     if final_obs is not None:
@@ -100,12 +135,32 @@ def _dumps_tensors(observation: Parts, final_obs: Parts | None = None, **others:
         if value is not None:
             is_array = isinstance(value, np.ndarray)
             tensors[name] = Tensor.of(value) if is_array else of_scalar(value)
-    metadata = {name: others[name] for name in _METADATA if name in others}
+    metadata = [_metadata("info", others["info"])]
+    if request_id is not None:
+        metadata.append(_request_metadata(request_id))
+    if "final_sub_envs" in others:
+        metadata.append(_metadata("final_sub_envs", others["final_sub_envs"]))
     if texts:
-        metadata["texts"] = texts
-    return write_tensors(
-        tensors, {name: dumps(value).decode("ascii") for name, value in metadata.items()}
-    )
+        metadata.append(_metadata("texts", texts))
+    return join_tensors(tensors, b",".join(metadata))
+
+
+def _metadata(name: str, value: object) -> bytes:
+    """Return a value as it stands in the metadata of a file, which are texts: JSON in JSON."""
+    if value == {}:
+        return b'"%b":"{}"' % name.encode("ascii")
+    return quoted({name: dumps(value).decode("ascii")})
+
+
+def _request_metadata(request_id: RequestId) -> bytes:
+    return b'%b%d}"' % (_request_beginning(request_id.key), request_id.number)
+
+
+# A client has one key, and numbers its requests.
+@lru_cache(maxsize=256)
+def _request_beginning(key: str) -> bytes:
+    """Return the metadata that echo a key, up to the number."""
+    return _metadata("request", {"key": key, "number": 0})[: -len(b'0}"')]
 
 
 def _flag(value: bool) -> Tensor:
@@ -119,5 +174,3 @@ _SCALARS = {
     "terminated": _flag,
     "truncated": _flag,
 }
-
-_METADATA = ("info", "request", "final_sub_envs")

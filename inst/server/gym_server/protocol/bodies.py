@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from gym_server.errors import GymServerError
+from gym_server.protocol import known_headers
 from gym_server.protocol.safetensors import Parts, malformed_tensors
 from gym_server.protocol.safetensors import read as read_tensors
 
@@ -56,6 +57,10 @@ def loads_tensors(raw: bytes) -> dict:
     Raises:
         GymServerError: ``malformed_tensors``.
     """
+    return known_headers.read(raw, _parse_tensors)
+
+
+def _parse_tensors(raw: bytes) -> dict:
     file = read_tensors(raw)
     body = {name: _json_metadata(name, text) for name, text in file.metadata.items()}
     texts = body.pop("texts", {})
@@ -76,7 +81,7 @@ def _json_metadata(name: str, text: str) -> object:
 
 
 # Writers such as safetensors' own add texts of theirs ("format": "pt").
-_JSON_METADATA = ("render", "request", "step_mask", "texts")
+_JSON_METADATA = ("final_obs", "info", "render", "request", "step_mask", "texts")
 
 _KIND_NAMES = {
     bool: "a boolean",

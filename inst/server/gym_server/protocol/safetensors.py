@@ -21,6 +21,10 @@ from gym_server.errors import GymServerError
 
 TENSORS = "application/x-safetensors"
 
+# The bytes of arrays are in the order that R and Fortran keep: a tensor with two or more dimensions
+# is transposed, and its shape reversed, because a file's order is by rows by definition.
+COLUMN_TENSORS = f"{TENSORS}; order=column"
+
 _LARGEST_HEADER = 2**20
 
 _NAMES = {
@@ -50,6 +54,12 @@ def tensor_name(dtype: np.dtype) -> str:
     return _NAMES[dtype.str[1:]]
 
 
+def native_dtype(name: str) -> tuple[np.dtype, np.dtype]:
+    """Return the dtype of a name as it lies in a file, and in the machine's own byte order."""
+    stored = _DTYPES[name]
+    return stored, stored.newbyteorder("=")
+
+
 class Tensor(NamedTuple):
     """An array as it lies in a file; its bytes are only looked at by ``array()``."""
 
@@ -58,19 +68,29 @@ class Tensor(NamedTuple):
     data: bytes | memoryview
 
     @classmethod
-    def of(cls, array: np.ndarray) -> Tensor:
-        """Copy an array; ``has_tensor()`` tells whether its dtype has a name."""
-        name = tensor_name(array.dtype)
-        array = array.astype(_DTYPES[name], copy=False)
+    def of(cls, array: np.ndarray, by_column: bool = False) -> Tensor:
+        """Copy an array.
+
+        Args:
+            array: ``has_tensor()`` tells whether its dtype has a name.
+            by_column: whether to transpose it, see ``COLUMN_TENSORS``.
+        """
+        dtype = array.dtype
+        name = _NAMES[dtype.str[1:]]
+        if dtype != _DTYPES[name]:
+            array = array.astype(_DTYPES[name], copy=False)
+        if array.ndim < 2:
+            return cls(name, array.shape, array.tobytes())
+        if by_column:
+            array = array.T
         if array.ndim == 2 and array.flags.f_contiguous and array.shape[1] <= _FEW_COLUMNS:
             array = _by_rows(array)
         return cls(name, array.shape, array.tobytes())
 
     def array(self) -> np.ndarray:
         """Return the array, as a copy in the machine's own byte order."""
-        dtype = _DTYPES[self.dtype]
-        array = np.frombuffer(self.data, dtype).reshape(self.shape)
-        return array.astype(dtype.newbyteorder("="))
+        stored, native = native_dtype(self.dtype)
+        return np.frombuffer(self.data, stored).reshape(self.shape).astype(native)
 
 
 @dataclass(frozen=True)
@@ -80,10 +100,12 @@ class Parts:
     Attributes:
         tensors: each part that is made of numbers, by its name.
         texts: each text, by its name.
+        by_column: whether the tensors are transposed, see ``COLUMN_TENSORS``.
     """
 
     tensors: dict[str, Tensor] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
+    by_column: bool = False
 
 
 _FEW_COLUMNS = 16
@@ -105,29 +127,41 @@ class TensorFile(NamedTuple):
 
 
 def write(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:
+    """Return a file; see ``join()``."""
+    return join(tensors, quoted(metadata))
+
+
+def quoted(metadata: Mapping[str, str]) -> bytes:
+    """Return metadata as they stand in a header."""
+    return _encode(metadata)[1:-1].encode("ascii")
+
+
+def join(tensors: Mapping[str, Tensor], metadata: bytes) -> bytes:
     """Return a file.
 
     The metadata comes last in the header: what lies before it is the same for the same names,
     dtypes and shapes, so that a reader can know it again.
+
+    Args:
+        tensors: by name.
+        metadata: as ``quoted()`` returns them, joined by commas.
     """
     names, beginning = _layout(
-        tuple((name, tensor.dtype, tensor.shape) for name, tensor in tensors.items())
+        tuple([(name, tensor.dtype, tensor.shape) for name, tensor in tensors.items()])
     )
-    text = b'%b"__metadata__":%b}' % (beginning, _encode(metadata).encode("ascii"))
-    return b"".join((*_headed(text), *(tensors[name].data for name in names)))
+    header = b'%b"__metadata__":{%b}}' % (beginning, metadata)
+    return b"".join((*_headed(header), *[tensors[name].data for name in names]))
 
 
-def add_metadata(file: bytes, name: str, text: str) -> bytes:
+def add_metadata(file: bytes, metadata: bytes) -> bytes:
     """Return a file with one more text, after the others that it must have.
 
     Args:
-        file: as ``write()`` returns it; it is not looked at more closely.
-        name: the text's.
-        text: the text.
+        file: as ``join()`` returns it; it is not looked at more closely.
+        metadata: as ``quoted()`` returns them.
     """
     end = 8 + int.from_bytes(file[:8], "little")
-    header = file[8:end].rstrip(b" ").removesuffix(b"}}")
-    header += b",%b}}" % _encode({name: text})[1:-1].encode("ascii")
+    header = b"%b,%b}}" % (file[8:end].rstrip(b" ").removesuffix(b"}}"), metadata)
     return b"".join((*_headed(header), file[end:]))
 
 

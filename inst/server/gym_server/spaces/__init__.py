@@ -20,19 +20,26 @@ from gym_server.spaces import (  # noqa: F401
     tuple_,
 )
 from gym_server.spaces.batches import (
+    batch_json_writer,
+    batch_tensor_writer,
     decode_sub_envs,
-    decode_sub_envs_tensors,
-    encode_batch,
-    encode_batch_tensors,
     encode_sub_envs,
+    sub_envs_tensor_reader,
 )
-from gym_server.spaces.kinds import NotInSpace, brief_space, decode, encode
+from gym_server.spaces.kinds import (
+    NotInSpace,
+    brief_space,
+    decode,
+    encode,
+    json_reader,
+    json_writer,
+)
 from gym_server.spaces.membership import contains
 from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe
 from gym_server.spaces.tensor_parts import (
-    decode_tensors,
-    encode_tensors,
+    tensor_reader,
+    tensor_writer,
     travels_as_tensors,
 )
 from gym_server.spaces.wide_boxes import with_wide_boxes
@@ -40,19 +47,21 @@ from gym_server.spaces.wide_boxes import with_wide_boxes
 __all__ = [
     "NotInSpace",
     "Parts",
+    "batch_json_writer",
+    "batch_tensor_writer",
     "brief_space",
     "contains",
     "decode",
     "decode_sub_envs",
-    "decode_sub_envs_tensors",
-    "decode_tensors",
     "describe",
     "encode",
-    "encode_batch",
-    "encode_batch_tensors",
     "encode_sub_envs",
-    "encode_tensors",
+    "json_reader",
+    "json_writer",
     "stack",
+    "sub_envs_tensor_reader",
+    "tensor_reader",
+    "tensor_writer",
     "travels_as_tensors",
     "with_wide_boxes",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from typing import Any, Protocol
 
 import numpy as np
@@ -85,6 +85,28 @@ class Bounds:
     low: np.ndarray | int
     high: np.ndarray | int
 
+    @cached_property
+    def _same_for_all(self) -> tuple[Any, Any] | None:
+        """The bounds as two numbers, where all elements have the same."""
+        # What is derived from NumPy's arrays compares as it likes.
+        if not {type(self.low), type(self.high)} <= {np.ndarray, int}:
+            return None
+        low, high = np.asarray(self.low), np.asarray(self.high)
+        if not low.size or low.min() != low.max() or high.min() != high.max():
+            return None
+        return low.flat[0].item(), high.flat[0].item()
+
+    def hold(self, array: np.ndarray) -> bool:
+        """Tell whether all elements of an array lie inside; NaN does not."""
+        same = self._same_for_all
+        if same is None or not array.size:
+            inside = (array >= self.low) & (array <= self.high)
+            return bool(inside.all())
+        low, high = same
+        # Two passes without an array between them.
+        least, most = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
+        return bool(least >= low and most <= high)
+
 
 @singledispatch
 def bounds_of(space: object) -> Bounds:
@@ -94,8 +116,8 @@ def bounds_of(space: object) -> Bounds:
 
 def check_bounds(space: object, bounds: Bounds, array: np.ndarray) -> None:
     """Raise NotInSpace, with the index, for the first element that lies outside (or is NaN)."""
-    inside = (array >= bounds.low) & (array <= bounds.high)
-    if not inside.all():
+    if not bounds.hold(array):
+        inside = (array >= bounds.low) & (array <= bounds.high)
         first = tuple(int(index) for index in np.argwhere(~inside)[0])
         refusal = NotInSpace(space, array[first].item())
         refusal.path[:] = first

@@ -8,7 +8,7 @@ over the sub-environments of an array.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import singledispatch
+from functools import partial, singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,11 +28,14 @@ from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode_part, encode
 from gym_server.spaces.stacking import stack, unstack
 from gym_server.spaces.tensor_parts import (
+    TakeApart,
+    array_putter,
+    array_taker,
+    dict_taker,
     part_name,
-    put_array,
-    put_part_together,
     refuse_leftovers,
-    take_array,
+    take_text,
+    tuple_taker,
 )
 
 _ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
@@ -64,6 +67,11 @@ def _(space: Tuple, batch: tuple) -> object:
 @encode_batch.register
 def _(space: Dict, batch: dict) -> object:
     return {str(key): encode_batch(part, batch[key]) for key, part in space.spaces.items()}
+
+
+def batch_json_writer(space: Space) -> Callable[[Any], Any]:
+    """Return ``encode_batch()`` for one space: its kind is not looked up for each batch."""
+    return partial(encode_batch.dispatch(type(space)), space)
 
 
 def encode_sub_envs(space: Space, batch: object) -> list:
@@ -130,158 +138,185 @@ def _reader_of(space: Any) -> Callable[[object], object]:
 # Tensors ------------------------------------------------------------------------------------
 
 
-def encode_batch_tensors(space: Space, name: str, batch: object) -> Parts:
-    """Return a batch of members of a space as tensors; see ``travels_as_tensors()``."""
-    parts = Parts()
-    _take_apart(space, name, batch, parts)
-    return parts
+def batch_tensor_writer(space: Space, name: str) -> Callable[[Any, bool], Parts]:
+    """Return what returns a batch of members as tensors of a name; see ``tensor_writer()``."""
+    take_apart = _take_apart(space, name)
+
+    def write(batch: Any, by_column: bool = False) -> Parts:
+        parts = Parts({}, {}, by_column)
+        take_apart(batch, parts)
+        return parts
+
+    return write
 
 
 @singledispatch
-def _take_apart(space: Space, name: str, batch: object, parts: Parts) -> None:
+def _take_apart(space: Space, name: str) -> TakeApart:
     raise TypeError(f"no tensors for {type(space).__name__}")
 
 
 for _kind in (Box, MultiBinary, MultiDiscrete):
-    _take_apart.register(_kind, put_array)
+    _take_apart.register(_kind, array_putter)
 
 
 @_take_apart.register
-def _(space: Discrete, name: str, batch: object, parts: Parts) -> None:
-    parts.tensors[name] = Tensor.of(np.asarray(batch, wide_dtype(space)))
+def _(space: Discrete, name: str) -> TakeApart:
+    dtype = wide_dtype(space)
+
+    def put(batch: Any, parts: Parts) -> None:
+        parts.tensors[name] = Tensor.of(np.asarray(batch, dtype))
+
+    return put
 
 
 @_take_apart.register
-def _(space: Text, name: str, batch: tuple, parts: Parts) -> None:
-    for sub_env, text in enumerate(batch):
-        parts.texts[part_name(name, sub_env)] = encode(space, text)
+def _(space: Text, name: str) -> TakeApart:
+    def put(batch: Any, parts: Parts) -> None:
+        for sub_env, text in enumerate(batch):
+            parts.texts[part_name(name, sub_env)] = encode(space, text)
+
+    return put
 
 
 @_take_apart.register
-def _(space: Tuple, name: str, batch: tuple, parts: Parts) -> None:
-    for index, (part, items) in enumerate(zip(space.spaces, batch, strict=True)):
-        _take_apart(part, part_name(name, index), items, parts)
+def _(space: Tuple, name: str) -> TakeApart:
+    return tuple_taker(
+        [_take_apart(part, part_name(name, i)) for i, part in enumerate(space.spaces)]
+    )
 
 
 @_take_apart.register
-def _(space: Dict, name: str, batch: dict, parts: Parts) -> None:
-    for key, part in space.spaces.items():
-        _take_apart(part, part_name(name, key), batch[key], parts)
+def _(space: Dict, name: str) -> TakeApart:
+    return dict_taker(
+        {key: _take_apart(part, part_name(name, key)) for key, part in space.spaces.items()}
+    )
 
 
-def decode_sub_envs_tensors(
-    space: Space, name: str, sent: Parts, num_envs: int, whose: str
-) -> object:
-    """Return the batch that tensors are, with the sub-environments along their first axes.
+def sub_envs_tensor_reader(space: Space, name: str) -> Callable[[Parts, int, str], object]:
+    """Return what returns the batch that tensors are, with sub-environments along first axes.
+
+    It is given the parts that were sent, how many sub-environments there are, and in words which
+    these are, as ``decode_sub_envs()`` is.  It raises NotInSpace as that does, and for a part too
+    few or too many, or of another dtype or shape.
 
     Args:
         space: of one sub-environment.
         name: of the tensors.
-        sent: the parts that were sent.
-        num_envs: how many sub-environments there are.
-        whose: as for ``decode_sub_envs()``.
-
-    Raises:
-        NotInSpace: as for ``decode_sub_envs()``, and for a part too few or too many, or of another
-            dtype or shape.
     """
-    left = Parts(dict(sent.tensors), dict(sent.texts))
-    batch = _put_together(space, name, left, _SubEnvs(num_envs, whose))
-    refuse_leftovers(space, name, left)
-    return batch
+    put_together = _put_together(space, name, ())
+
+    def read(sent: Parts, num_envs: int, whose: str) -> object:
+        left = Parts(dict(sent.tensors), dict(sent.texts))
+        batch = put_together(left, num_envs, whose)
+        refuse_leftovers(space, name, left)
+        return batch
+
+    return read
 
 
-class _SubEnvs(NamedTuple):
-    """The sub-environments that a batch is for.
-
-    Attributes:
-        num_envs: how many there are.
-        whose: names them; see ``decode_sub_envs()``.
-        path: leads to the part of their members that is being decoded.
-    """
-
-    num_envs: int
-    whose: str
-    path: tuple[str | int, ...] = ()
-
-    def inside(self, step: str | int) -> _SubEnvs:
-        return self._replace(path=(*self.path, step))
+# Takes the parts of a batch out of others, and returns the batch of so many sub-environments.
+_PutTogether = Callable[[Parts, int, str], object]
 
 
 @singledispatch
-def _put_together(space: Space, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    raise NotInSpace(space, name, "its members travel as JSON")
+def _put_together(space: Space, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    """Return what puts a batch together, which a path leads to inside of the whole batch."""
+
+    def refuse(parts: Parts, num_envs: int, whose: str) -> object:
+        raise NotInSpace(space, name, "its members travel as JSON")
+
+    return refuse
 
 
 @_put_together.register
-def _(space: Tuple, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    return tuple(
-        _put_together(part, part_name(name, index), parts, sub_envs.inside(index))
+def _(space: Tuple, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    parts_of = [
+        _put_together(part, part_name(name, index), (*path, index))
         for index, part in enumerate(space.spaces)
-    )
+    ]
+    return lambda *how: tuple([put_together(*how) for put_together in parts_of])
 
 
 @_put_together.register
-def _(space: Dict, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    return {
-        key: _put_together(part, part_name(name, key), parts, sub_envs.inside(str(key)))
+def _(space: Dict, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    parts_of = {
+        key: _put_together(part, part_name(name, key), (*path, str(key)))
         for key, part in space.spaces.items()
     }
+    return lambda *how: {key: put_together(*how) for key, put_together in parts_of.items()}
 
 
 @_put_together.register
-def _(space: Text, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    try:
-        return tuple(
-            put_part_together(space, name, sub_env, parts, sub_env)
-            for sub_env in range(sub_envs.num_envs)
-        )
-    except NotInSpace as refusal:
-        refusal.path[1:1] = sub_envs.path
-        raise
+def _(space: Text, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    def put_together(parts: Parts, num_envs: int, whose: str) -> object:
+        texts = []
+        for sub_env in range(num_envs):
+            try:
+                texts.append(take_text(space, part_name(name, sub_env), parts))
+            except NotInSpace as refusal:
+                refusal.path[:0] = (sub_env, *path)
+                raise
+        return tuple(texts)
+
+    return put_together
 
 
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: ArraySpace, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    return _take_sub_envs(space, name, space.dtype, parts, sub_envs)
+def _(space: ArraySpace, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    return _array_together(space, name, space.dtype, path)
 
 
 @_put_together.register
-def _(space: Discrete, name: str, parts: Parts, sub_envs: _SubEnvs) -> object:
-    wide = wide_dtype(space)
-    sent = parts.tensors.get(name)
-    # R has only 32 bit integers.
-    is_short = sent is not None and sent.dtype == "I32" and wide == np.int64
-    array = _take_sub_envs(space, name, np.dtype(np.int32) if is_short else wide, parts, sub_envs)
-    return array.astype(space.dtype, copy=False)
+def _(space: Discrete, name: str, path: tuple[str | int, ...]) -> _PutTogether:
+    wide, dtype = wide_dtype(space), space.dtype
+    of_wide = _array_together(space, name, wide, path)
+    if wide != np.int64:
+        return of_wide
+    of_short = _array_together(space, name, np.dtype(np.int32), path)
+
+    def put_together(parts: Parts, num_envs: int, whose: str) -> object:
+        sent = parts.tensors.get(name)
+        # R has only 32 bit integers.
+        is_short = sent is not None and sent.dtype == "I32"
+        array = (of_short if is_short else of_wide)(parts, num_envs, whose)
+        return array.astype(dtype, copy=False)
+
+    return put_together
 
 
-def _take_sub_envs(
-    space: Any, name: str, dtype: np.dtype, parts: Parts, sub_envs: _SubEnvs
-) -> np.ndarray:
-    try:
-        _check_number(space, parts.tensors.get(name), sub_envs)
-        array = take_array(space, name, dtype, (sub_envs.num_envs, *(space.shape or ())), parts)
-    except NotInSpace as refusal:
-        refusal.path[:] = sub_envs.path
-        raise
-    try:
-        check_bounds(space, bounds_of(space), array)
-    except NotInSpace as refusal:
-        # The first step of its path is the sub-environment.
-        refusal.path[1:1] = sub_envs.path
-        raise
-    return array
+def _array_together(
+    space: Any, name: str, dtype: np.dtype, path: tuple[str | int, ...]
+) -> Callable[[Parts, int, str], np.ndarray]:
+    take, bounds, shape = array_taker(space, name, dtype), bounds_of(space), space.shape or ()
+
+    def put_together(parts: Parts, num_envs: int, whose: str) -> np.ndarray:
+        try:
+            _check_number(space, shape, parts.tensors.get(name), num_envs, whose)
+            array = take(parts, (num_envs, *shape))
+        except NotInSpace as refusal:
+            refusal.path[:] = path
+            raise
+        try:
+            check_bounds(space, bounds, array)
+        except NotInSpace as refusal:
+            # The first step of its path is the sub-environment.
+            refusal.path[1:1] = path
+            raise
+        return array
+
+    return put_together
 
 
-def _check_number(space: Any, sent: Tensor | None, sub_envs: _SubEnvs) -> None:
-    if not sent or not sent.shape or sent.shape[1:] != (space.shape or ()):
+def _check_number(
+    space: Space, shape: tuple[int, ...], sent: Tensor | None, num_envs: int, whose: str
+) -> None:
+    if not sent or not sent.shape or sent.shape[1:] != shape:
         return
-    if sent.shape[0] != sub_envs.num_envs:
+    if sent.shape[0] != num_envs:
         raise NotInSpace(
             space,
             f"{sent.dtype} {list(sent.shape)}",
-            f"one action for each of {sub_envs.whose} is needed, not {sent.shape[0]}",
+            f"one action for each of {whose} is needed, not {sent.shape[0]}",
         )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from functools import singledispatch
+from collections.abc import Callable
+from functools import partial, singledispatch
 from typing import Any
 
 from gymnasium.spaces import Space
@@ -72,6 +73,16 @@ def decode(space: Space, value: object) -> object:
         NotInSpace: when the value stands for none.
     """
     raise TypeError(f"no decoding for {type(space).__name__}")
+
+
+def json_writer(space: Space) -> Callable[[Any], Any]:
+    """Return ``encode()`` for one space: its kind is not looked up for each member."""
+    return partial(encode.dispatch(type(space)), space)
+
+
+def json_reader(space: Space) -> Callable[[object], object]:
+    """Return ``decode()`` for one space: its kind is not looked up for each member."""
+    return partial(decode.dispatch(type(space)), space)
 
 
 def decode_part(space: Space, value: object, *path: str | int) -> object:

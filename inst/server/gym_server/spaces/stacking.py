@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Space, Tuple
 
+# The spaces whose batches are one array.
+ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
+
 
 @singledispatch
 def stack(space: Space, members: list) -> Any:
@@ -58,3 +61,36 @@ def _(space: Tuple, batch: tuple) -> list:
 def _(space: Dict, batch: dict) -> list:
     parts = [unstack(part, batch[key]) for key, part in space.spaces.items()]
     return [dict(zip(space.spaces, member, strict=True)) for member in zip(*parts, strict=True)]
+
+
+def member_of(space: Space, batch: Any, row: int) -> object:
+    """Return one member of a batch as Gymnasium's vector environments have it."""
+    match space:
+        case Dict():
+            return {key: member_of(part, batch[key], row) for key, part in space.spaces.items()}
+        case Tuple():
+            parts = zip(space.spaces, batch, strict=True)
+            return tuple(member_of(part, items, row) for part, items in parts)
+        case _:
+            return batch[row]
+
+
+def join(space: Space, batches: list) -> Any:
+    """Return batches as Gymnasium's vector environments have them as one batch."""
+    if len(batches) == 1:
+        return batches[0]
+    match space:
+        case Tuple():
+            return tuple(
+                join(part, [batch[index] for batch in batches])
+                for index, part in enumerate(space.spaces)
+            )
+        case Dict():
+            return {
+                key: join(part, [batch[key] for batch in batches])
+                for key, part in space.spaces.items()
+            }
+        case _ if isinstance(space, ARRAYS):
+            return np.concatenate(batches)
+        case _:
+            return tuple(member for batch in batches for member in batch)

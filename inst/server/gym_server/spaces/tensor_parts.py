@@ -1,11 +1,13 @@
 """Members of a space as tensors: the parts of nested ones are named by JSON pointer.
 
 Sequence, Graph and OneOf have no fixed parts and travel as JSON only, and so does a space that
-holds one of them.
+holds one of them.  What takes a space's members apart and puts them together is made once for a
+space, with the names of all its parts.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -21,30 +23,47 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, tensor_name
+from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, native_dtype, tensor_name
 from gym_server.spaces.arrays import ArraySpace, bounds_of, check_bounds
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode
 
-
-def encode_tensors(space: Space, name: str, value: object) -> Parts:
-    """Return a member of a space as tensors; see ``travels_as_tensors()``."""
-    parts = Parts()
-    _take_apart(space, name, value, parts)
-    return parts
+# Puts the parts of a value into others.
+TakeApart = Callable[[Any, Parts], None]
+# Takes a member's parts out of others, and returns the member.
+PutTogether = Callable[[Parts], object]
 
 
-def decode_tensors(space: Space, name: str, sent: Parts) -> object:
-    """Return the member of a space that some tensors are.
+def tensor_writer(space: Space, name: str) -> Callable[[Any, bool], Parts]:
+    """Return what returns a member of a space as tensors of a name; see ``travels_as_tensors()``.
 
-    Raises:
-        NotInSpace: when they are none: a part too few or too many, another dtype or shape, or
-            outside the bounds.
+    It is given the member, and whether the tensors are wanted by column.
     """
-    left = Parts(dict(sent.tensors), dict(sent.texts))
-    member = _put_together(space, name, left)
-    refuse_leftovers(space, name, left)
-    return member
+    take_apart = _take_apart(space, name)
+
+    def write(value: Any, by_column: bool = False) -> Parts:
+        parts = Parts({}, {}, by_column)
+        take_apart(value, parts)
+        return parts
+
+    return write
+
+
+def tensor_reader(space: Space, name: str) -> Callable[[Parts], object]:
+    """Return what returns the member of a space that tensors of a name are.
+
+    It raises NotInSpace when they are none: a part too few or too many, another dtype or shape, or
+    outside the bounds.
+    """
+    put_together = _put_together(space, name)
+
+    def read(sent: Parts) -> object:
+        left = Parts(dict(sent.tensors), dict(sent.texts))
+        member = put_together(left)
+        refuse_leftovers(space, name, left)
+        return member
+
+    return read
 
 
 def refuse_leftovers(space: Space, name: str, left: Parts) -> None:
@@ -61,13 +80,16 @@ def travels_as_tensors(space: Space) -> bool:
 
 
 @singledispatch
-def _take_apart(space: Space, name: str, value: object, parts: Parts) -> None:
+def _take_apart(space: Space, name: str) -> TakeApart:
     raise TypeError(f"no tensors for {type(space).__name__}")
 
 
 @singledispatch
-def _put_together(space: Space, name: str, parts: Parts) -> object:
-    raise NotInSpace(space, name, "its members travel as JSON")
+def _put_together(space: Space, name: str) -> PutTogether:
+    def refuse(parts: Parts) -> object:
+        raise NotInSpace(space, name, "its members travel as JSON")
+
+    return refuse
 
 
 def part_name(name: str, key: object) -> str:
@@ -75,32 +97,43 @@ def part_name(name: str, key: object) -> str:
     return f"{name}/{str(key).replace('~', '~0').replace('/', '~1')}"
 
 
-def put_part_together(
-    space: Space, name: str, key: object, parts: Parts, step: str | int
-) -> object:
-    """Return a part of a member; a refusal names the step that leads to it."""
-    try:
-        return _put_together(space, part_name(name, key), parts)
-    except NotInSpace as refusal:
-        refusal.path.insert(0, step)
-        raise
+def _part_together(space: Space, name: str, key: object, step: str | int) -> PutTogether:
+    """Return what puts a part of a member together; a refusal names the step that leads to it."""
+    put_together = _put_together(space, part_name(name, key))
+
+    def put_part_together(parts: Parts) -> object:
+        try:
+            return put_together(parts)
+        except NotInSpace as refusal:
+            refusal.path.insert(0, step)
+            raise
+
+    return put_part_together
 
 
-def take_array(
-    space: object, name: str, dtype: np.dtype, shape: tuple[int, ...], parts: Parts
-) -> np.ndarray:
-    """Take the tensor of a name out of some parts; raise NotInSpace for another dtype or shape."""
-    tensor = parts.tensors.pop(name, None)
-    if tensor is None:
-        raise NotInSpace(space, None, f"there is no tensor {name!r}")
+def array_taker(
+    space: object, name: str, dtype: np.dtype
+) -> Callable[[Parts, tuple[int, ...]], np.ndarray]:
+    """Return what takes the tensor of a name and a shape out of some parts, as an array of its own.
+
+    It raises NotInSpace for another dtype or shape.
+    """
     wanted = tensor_name(dtype)
-    if (tensor.dtype, tensor.shape) != (wanted, shape):
-        raise NotInSpace(
-            space,
-            f"{tensor.dtype} {list(tensor.shape)}",
-            f"{wanted} {list(shape)} is needed",
-        )
-    return tensor.array()
+    stored, native = native_dtype(wanted)
+
+    def take(parts: Parts, shape: tuple[int, ...]) -> np.ndarray:
+        tensor = parts.tensors.pop(name, None)
+        if tensor is None:
+            raise NotInSpace(space, None, f"there is no tensor {name!r}")
+        if tensor.dtype != wanted or tensor.shape != shape:
+            raise NotInSpace(
+                space,
+                f"{tensor.dtype} {list(tensor.shape)}",
+                f"{wanted} {list(shape)} is needed",
+            )
+        return np.frombuffer(tensor.data, stored).reshape(shape).astype(native)
+
+    return take
 
 
 # Arrays -------------------------------------------------------------------------------------
@@ -118,48 +151,72 @@ def _(space: Space) -> bool:
 @_take_apart.register(Box)
 @_take_apart.register(MultiBinary)
 @_take_apart.register(MultiDiscrete)
-def put_array(space: ArraySpace, name: str, value: object, parts: Parts) -> None:
-    """Put an array of a space's numbers, of one member or of many, into some parts."""
-    array = np.asarray(value)
-    if not has_tensor(array.dtype):
-        array = array.astype(space.dtype)
-    parts.tensors[name] = Tensor.of(array)
+def array_putter(space: ArraySpace, name: str) -> TakeApart:
+    """Return what puts an array of a space's numbers, of one member or of many, into some parts."""
+    dtype = space.dtype
+
+    def put(value: Any, parts: Parts) -> None:
+        array = np.asarray(value)
+        if not has_tensor(array.dtype):
+            array = array.astype(dtype)
+        parts.tensors[name] = Tensor.of(array, parts.by_column)
+
+    return put
 
 
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: ArraySpace, name: str, parts: Parts) -> object:
-    array = take_array(space, name, space.dtype, space.shape, parts)
-    check_bounds(space, bounds_of(space), array)
-    return array
+def _(space: ArraySpace, name: str) -> PutTogether:
+    take, bounds, shape = array_taker(space, name, space.dtype), bounds_of(space), space.shape
+
+    def put_together(parts: Parts) -> object:
+        array = take(parts, shape)
+        check_bounds(space, bounds, array)
+        return array
+
+    return put_together
 
 
 # Discrete -----------------------------------------------------------------------------------
 
 
 @_take_apart.register
-def _(space: Discrete, name: str, value: Any, parts: Parts) -> None:
-    parts.tensors[name] = Tensor.of(np.array(int(value), wide_dtype(space)))
+def _(space: Discrete, name: str) -> TakeApart:
+    dtype = wide_dtype(space)
+
+    def put(value: Any, parts: Parts) -> None:
+        parts.tensors[name] = Tensor.of(np.array(int(value), dtype))
+
+    return put
 
 
 @_put_together.register
-def _(space: Discrete, name: str, parts: Parts) -> object:
-    return decode(space, take_array(space, name, wide_dtype(space), (), parts).item())
+def _(space: Discrete, name: str) -> PutTogether:
+    take = array_taker(space, name, wide_dtype(space))
+    return lambda parts: decode(space, take(parts, ()).item())
 
 
 # Text ---------------------------------------------------------------------------------------
 
 
 @_take_apart.register
-def _(space: Text, name: str, value: object, parts: Parts) -> None:
-    if not isinstance(value, str):
-        raise TypeError(f"a text should be a str, not {type(value).__name__}")
-    parts.texts[name] = str(value)
+def _(space: Text, name: str) -> TakeApart:
+    def put(value: Any, parts: Parts) -> None:
+        if not isinstance(value, str):
+            raise TypeError(f"a text should be a str, not {type(value).__name__}")
+        parts.texts[name] = str(value)
+
+    return put
 
 
 @_put_together.register
-def _(space: Text, name: str, parts: Parts) -> object:
+def _(space: Text, name: str) -> PutTogether:
+    return lambda parts: take_text(space, name, parts)
+
+
+def take_text(space: Text, name: str, parts: Parts) -> object:
+    """Take the text of a name out of some parts."""
     text = parts.texts.pop(name, None)
     if text is None:
         raise NotInSpace(space, None, f"there is no text {name!r}")
@@ -175,17 +232,26 @@ def _(space: Tuple) -> bool:
 
 
 @_take_apart.register
-def _(space: Tuple, name: str, value: tuple, parts: Parts) -> None:
-    for index, (part, item) in enumerate(zip(space.spaces, value, strict=True)):
-        _take_apart(part, part_name(name, index), item, parts)
+def _(space: Tuple, name: str) -> TakeApart:
+    return tuple_taker(
+        [_take_apart(part, part_name(name, i)) for i, part in enumerate(space.spaces)]
+    )
+
+
+def tuple_taker(take_apart: list[TakeApart]) -> TakeApart:
+    """Return what takes a tuple apart, given what takes its parts apart."""
+
+    def take_all_apart(value: Any, parts: Parts) -> None:
+        for take, item in zip(take_apart, value, strict=True):
+            take(item, parts)
+
+    return take_all_apart
 
 
 @_put_together.register
-def _(space: Tuple, name: str, parts: Parts) -> object:
-    return tuple(
-        put_part_together(part, name, index, parts, index)
-        for index, part in enumerate(space.spaces)
-    )
+def _(space: Tuple, name: str) -> PutTogether:
+    parts_of = [_part_together(part, name, i, i) for i, part in enumerate(space.spaces)]
+    return lambda parts: tuple([put_together(parts) for put_together in parts_of])
 
 
 # Dict ---------------------------------------------------------------------------------------
@@ -197,14 +263,25 @@ def _(space: Dict) -> bool:
 
 
 @_take_apart.register
-def _(space: Dict, name: str, value: dict, parts: Parts) -> None:
-    for key, part in space.spaces.items():
-        _take_apart(part, part_name(name, key), value[key], parts)
+def _(space: Dict, name: str) -> TakeApart:
+    return dict_taker(
+        {key: _take_apart(part, part_name(name, key)) for key, part in space.spaces.items()}
+    )
+
+
+def dict_taker(take_apart: dict[Any, TakeApart]) -> TakeApart:
+    """Return what takes a dict apart, given what takes its parts apart."""
+
+    def take_all_apart(value: Any, parts: Parts) -> None:
+        for key, take in take_apart.items():
+            take(value[key], parts)
+
+    return take_all_apart
 
 
 @_put_together.register
-def _(space: Dict, name: str, parts: Parts) -> object:
-    return {
-        key: put_part_together(part, name, key, parts, str(key))
-        for key, part in space.spaces.items()
+def _(space: Dict, name: str) -> PutTogether:
+    parts_of = {
+        key: _part_together(part, name, key, str(key)) for key, part in space.spaces.items()
     }
+    return lambda parts: {key: put_together(parts) for key, put_together in parts_of.items()}

@@ -2,7 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import threading
+from collections.abc import Callable, Iterator
+
+_lock = threading.Lock()
+# By the thread that is to be interrupted by them.
+_break_offs: dict[int, Callable[[], object]] = {}
+
+
+@contextlib.contextmanager
+def interrupted_by(break_off: Callable[[], object]) -> Iterator[None]:
+    """Let an interrupt of this thread call a function, and raise ``SystemExit`` only at the end.
+
+    For what must not end halfway, or waits for something that no exception breaks off.
+
+    Args:
+        break_off: lets the thread get to the end soon; called in the thread that interrupts.
+    """
+    thread = threading.get_ident()
+    with _lock:
+        _break_offs[thread] = break_off
+    try:
+        yield
+    finally:
+        with _lock:
+            was_interrupted = _break_offs.pop(thread, None) is None
+        if was_interrupted:
+            raise SystemExit
 
 
 def interrupt(thread: int) -> None:
@@ -14,4 +42,11 @@ def interrupt(thread: int) -> None:
     Args:
         thread: its identity.
     """
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+    with _lock:
+        break_off = _break_offs.pop(thread, None)
+        if break_off is None:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(thread), ctypes.py_object(SystemExit)
+            )
+    if break_off is not None:
+        break_off()

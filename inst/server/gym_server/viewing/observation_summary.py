@@ -3,34 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Dict, Space, Tuple
 
 # More of them are not shown.
 _MOST = 64
 _LONGEST_TEXT = 200
-
-
-def sub_env_of(space: Space, batch: Any, sub_env: int) -> object:
-    """Return the observation of one sub-environment out of a batch.
-
-    Args:
-        space: of one sub-environment.
-        batch: as Gymnasium's vector environments have it.
-        sub_env: its number, from 0.
-    """
-    match space:
-        case Dict():
-            return {
-                key: sub_env_of(part, batch[key], sub_env) for key, part in space.spaces.items()
-            }
-        case Tuple():
-            parts = zip(space.spaces, batch, strict=True)
-            return tuple(sub_env_of(part, items, sub_env) for part, items in parts)
-        case _:
-            return batch[sub_env]
 
 
 def entries(observation: object) -> dict:

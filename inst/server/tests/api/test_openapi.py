@@ -25,7 +25,14 @@ def test_the_document_is_made_of_the_fields_that_are_parsed():
     body = document(ROUTES)["paths"]["/v1/envs/{instance_id}/step/"]["post"]["requestBody"]
     schema = body["content"]["application/json"]["schema"]
     assert schema["required"] == ["action"]
-    assert set(schema["properties"]) == {"action", "render", "request", "step_mask"}
+    assert set(schema["properties"]) == {
+        "action",
+        "final_obs",
+        "info",
+        "render",
+        "request",
+        "step_mask",
+    }
     json.dumps(schema, allow_nan=False)
 
 

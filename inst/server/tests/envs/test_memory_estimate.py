@@ -8,7 +8,7 @@ from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
 
 from gym_server.api.app import Config, create_app
 from gym_server.budget import Budget
-from gym_server.envs import make, vectorization
+from gym_server.envs import make
 from gym_server.envs.config import Wrapper
 from gym_server.envs.memory_estimate import observation_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
@@ -226,7 +226,7 @@ def test_every_space_can_be_estimated(kind):
 def test_a_vector_environment_that_is_refused_is_closed(limited, monkeypatch):
     closed = []
     monkeypatch.setattr(CartPoleVectorEnv, "close", lambda env, **_: closed.append(env))
-    monkeypatch.setattr(vectorization, "answer_bytes", lambda space: np.inf)
+    monkeypatch.setattr("gym_server.vector_envs.make.answer_bytes", lambda space: np.inf)
     answer = create(limited(), num_envs=2)
     assert (answer.status_code, answer.json["code"]) == (429, "too_much_memory")
     assert len(closed) == 1

@@ -8,7 +8,7 @@ import gymnasium
 
 from faulty_envs.counting import Counting
 from faulty_envs.drawing import Drawing, OldRenderModes
-from faulty_envs.hanging import Hanging, HangsWhere, Meeting, Spins
+from faulty_envs.hanging import Hanging, HangsWhenClosedElsewhere, HangsWhere, Meeting, Spins
 from faulty_envs.odd_spaces import (
     SPACES,
     CustomSpace,
@@ -23,6 +23,7 @@ from faulty_envs.odd_spaces import (
 from faulty_envs.raising import (
     ExitsInStep,
     ImportsInStep,
+    RaisesElsewhere,
     RaisesInClose,
     RaisesInConstructor,
     RaisesInReset,
@@ -43,6 +44,7 @@ for _kind in (
     Echo,
     ExitsInStep,
     Hanging,
+    HangsWhenClosedElsewhere,
     HangsWhere,
     Insists,
     KillsItself,
@@ -52,6 +54,7 @@ for _kind in (
     Nested,
     NotANumber,
     OldRenderModes,
+    RaisesElsewhere,
     RaisesInClose,
     RaisesInConstructor,
     RaisesInReset,

@@ -1,5 +1,6 @@
 """Environments that take long, or never return."""
 
+import multiprocessing
 import os
 import time
 from pathlib import Path
@@ -60,7 +61,10 @@ class HangsWhere(Counting):
 
 
 class Spins(Counting):
-    """Loops without an end where its kwarg says: in "init", "step", "render" or "close"."""
+    """Loops without an end where its kwarg says: in "init", "step", "render" or "close".
+
+    With "init elsewhere" in the constructor, in a process that another one has started.
+    """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
@@ -68,6 +72,8 @@ class Spins(Counting):
         super().__init__()
         self.where, self.render_mode = where, render_mode
         self.spin("init")
+        if multiprocessing.parent_process() is not None:
+            self.spin("init elsewhere")
 
     def spin(self, here):
         while self.where == here:
@@ -83,3 +89,11 @@ class Spins(Counting):
 
     def close(self):
         self.spin("close")
+
+
+class HangsWhenClosedElsewhere(Counting):
+    """Hangs when it is closed in a process that another one has started."""
+
+    def close(self):
+        if multiprocessing.parent_process() is not None:
+            time.sleep(3600)

@@ -1,5 +1,6 @@
 """Environments that raise errors."""
 
+import multiprocessing
 import os
 import sys
 
@@ -46,3 +47,12 @@ class Variables(Counting):
 
     def __init__(self):
         raise ValueError(dict(os.environ))
+
+
+class RaisesElsewhere(Counting):
+    """Cannot be made in a process that another one has started."""
+
+    def __init__(self, seconds=0.001):
+        super().__init__(seconds)
+        if multiprocessing.parent_process() is not None:
+            raise RuntimeError("not here")

@@ -200,6 +200,7 @@ def test_all_about_an_instance(client, create):
         "render_fps": 50,
         "num_envs": None,
         "vectorization_mode": None,
+        "num_workers": None,
         "autoreset_mode": None,
         "render_mode": "human",
         "kwargs": {"sutton_barto_reward": True},

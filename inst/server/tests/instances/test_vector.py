@@ -332,3 +332,13 @@ def test_wrappers_are_put_around_each_sub_env(client, create):
     post(client, url, "reset")
     answers = [post(client, url, "step", action=[0, 0]) for _ in range(2)]
     assert [answer["truncated"] for answer in answers] == [[False] * 2, [True] * 2]
+
+
+@pytest.mark.parametrize("num_workers", [0, 2])
+def test_a_lander_is_drawn_when_somebody_asks(client, create, num_workers):
+    pytest.importorskip("Box2D")
+    url = create("LunarLander-v3", num_envs=2, num_workers=num_workers)
+    post(client, url, "reset", seed=1)
+    assert client.get(url).json["render_mode"] == "rgb_array"
+    assert client.get(f"{url}/render?sub_env=1").content_type == "image/png"
+    post(client, url, "step", action=[2, 2])

@@ -76,6 +76,8 @@ def calls_of(action, accept):
         ("GET", "render/", b"", "image/png"),
         ("GET", "render/?sub_env=9", b"", "image/png"),
         ("POST", "reset/", {"seed": [1]}, accept),
+        ("POST", "reset/", {"seed": 6, "info": False}, accept),
+        ("POST", "step/", {"action": action, "info": False}, accept),
     ]
 
 
@@ -92,7 +94,14 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("accept", ["application/json", "application/x-safetensors"])
+@pytest.mark.parametrize(
+    "accept",
+    [
+        "application/json",
+        "application/x-safetensors",
+        "application/x-safetensors; order=column",
+    ],
+)
 @pytest.mark.parametrize(("env_id", "action", "fields"), CASES)
 def test_an_isolated_environment_answers_as_any_other_does(servers, env_id, action, fields, accept):
     calls = calls_of(action, accept)

@@ -5,9 +5,10 @@ import threading
 import pytest
 
 from gym_server.api.app import Config, create_app
-from gym_server.envs.vector_envs import AsyncSubEnvs
 from gym_server.errors import GymServerError
+from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.limits import Limits, Room, Watchers
+from gym_server.vector_envs.sub_envs import SubEnvs
 
 
 @pytest.fixture
@@ -133,7 +134,7 @@ def test_one_watcher_too_many_is_told_so(limited):
 
 
 def ask_for_processes(client, number):
-    return make(client, num_envs=number, vectorization_mode="async")
+    return make(client, num_envs=number, num_workers=number)
 
 
 def test_all_together_have_only_so_many_processes(limited):
@@ -151,6 +152,36 @@ def test_all_together_have_only_so_many_processes(limited):
     assert make(client, num_envs=8).status_code == make(client).status_code == 200
     client.post(f"/v1/envs/{first.json['instance_id']}/close/")
     assert ask_for_processes(client, 2).status_code == 200
+
+
+def test_processes_that_nobody_asked_for_are_no_more_than_there_is_room_for(limited, monkeypatch):
+    monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
+    client = limited(max_processes=3)
+
+    def chosen_of(client):
+        instance_id = make(client, env_id="Acrobot-v1", num_envs=128).json["instance_id"]
+        return client.get(f"/v1/envs/{instance_id}").json["num_workers"]
+
+    assert [chosen_of(client), chosen_of(client)] == [3, 0]
+    refusal = ask_for_processes(client, 1)
+    assert refused(refusal, "too_many_processes")
+    # One alone would run nothing beside another one.
+    assert chosen_of(limited(max_processes=1)) == 0
+    # A choice of fewer than what was kept ready leaves room.
+    client = limited(max_processes=4)
+    assert make(client, env_id="CliffWalking-v1", num_envs=64).status_code == 200
+    assert chosen_of(client) == 4
+
+
+@pytest.mark.parametrize("told", [-5, "many", None])
+def test_what_an_isolated_environment_tells_of_its_processes_frees_no_room(
+    limited, monkeypatch, told
+):
+    about = WorkerBackend.about
+    monkeypatch.setattr(WorkerBackend, "about", lambda self: {**about(self), "num_workers": told})
+    client = limited(isolate="all", max_processes=3)
+    assert ask_for_processes(client, 2).status_code == 200
+    assert refused(make(client), "too_many_processes")
 
 
 def test_processes_that_are_started_at_once_are_no_more(limited):
@@ -171,15 +202,15 @@ def test_processes_that_are_started_at_once_are_no_more(limited):
 def test_processes_count_until_they_have_ended(limited, monkeypatch):
     client = limited(max_processes=2)
     closing, released = threading.Event(), threading.Event()
-    close = AsyncSubEnvs.close_extras
+    close = SubEnvs.close
 
-    def close_when_released(self, **how):
+    def close_when_released(self):
         closing.set()
         released.wait(20)
-        close(self, **how)
+        close(self)
 
     url = f"/v1/envs/{ask_for_processes(client, 2).json['instance_id']}"
-    monkeypatch.setattr(AsyncSubEnvs, "close_extras", close_when_released)
+    monkeypatch.setattr(SubEnvs, "close", close_when_released)
     closer = threading.Thread(target=lambda: client.post(f"{url}/close/"))
     closer.start()
     assert closing.wait(20)

@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 from conftest import ServerProcess, created
 from faulty_envs import HangsWhere
+from running import descendants, is_running
 
+from gym_server.api.app import Config, create_app
+from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.limits import Limits
 
 # Ample for whatever does not hang.
@@ -169,13 +172,13 @@ def test_sub_envs_in_processes_end_with_it(quick, eventually):
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}
     url = created(client, "faulty_envs:Hanging-v0", **fields)
-    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.processes
+    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.pids
     client.post(f"{url}/reset/")
     # Their start takes its time.
     app._watchdog._limits = Limits(max_call_seconds=0.2)
     answer = client.post(f"{url}/step/", json={"action": [0, 0]})
     assert (answer.status_code, answer.json["code"]) == (504, "call_too_long")
-    eventually(lambda: not any(map(is_alive, processes)))
+    eventually(lambda: not any(map(is_running, processes)))
 
 
 def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
@@ -216,14 +219,6 @@ def test_what_is_slow_but_not_too_slow_delays_nobody(serve):
 
 
 # Without HTTP --------------------------------------------------------------------------------
-
-
-def is_alive(process):
-    try:
-        return process.is_alive()
-    except ValueError:
-        # It is closed already.
-        return False
 
 
 def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, eventually):
@@ -270,8 +265,20 @@ def test_one_that_was_evicted_may_hang_once_more_and_others_are_drawn(quick, mon
     assert in_time == [200]
 
 
-@pytest.mark.parametrize("where", ["init", "step", "render", "close"])
-def test_a_loop_without_an_end_is_broken_off(serve, eventually, where):
+@pytest.mark.parametrize(
+    ("where", "fields"),
+    [
+        ("init", {}),
+        # Processes may be chosen, or have been.
+        ("init", {"num_envs": 64}),
+        ("init", {"num_envs": 4, "num_workers": 2}),
+        ("init elsewhere", {"num_envs": 4, "num_workers": 2}),
+        ("step", {}),
+        ("render", {}),
+        ("close", {}),
+    ],
+)
+def test_a_loop_without_an_end_is_broken_off(serve, eventually, where, fields):
     server = serve("--max-call-seconds", "0.5", "--isolate", "none")
 
     def threads():
@@ -279,7 +286,7 @@ def test_a_loop_without_an_end_is_broken_off(serve, eventually, where):
 
     def play():
         making = {"env_id": "faulty_envs:Spins-v0", "kwargs": {"where": where}}
-        status, answer = server.post("/v1/envs/", making)
+        status, answer = server.post("/v1/envs/", {**making, **fields})
         if status != 200:
             return status, answer
         url = f"/v1/envs/{answer['instance_id']}"
@@ -298,6 +305,31 @@ def test_a_loop_without_an_end_is_broken_off(serve, eventually, where):
     eventually(lambda: threads() <= before)
     # None of them uses the processor any more.
     eventually(lambda: _busy_threads(server.process.pid) == 0)
+    # None is left but the two from which processes start.
+    eventually(lambda: len(descendants(server.process.pid)) <= 2)
+
+
+def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
+    started = []
+
+    class StartsSlowly(WorkerBackend):
+        def __init__(self, *args):
+            end = time.monotonic() + 1
+            while time.monotonic() < end:
+                pass
+            super().__init__(*args)
+            started.append(self._worker.pid)
+
+    monkeypatch.setattr("gym_server.manager.instance_manager.WorkerBackend", StartsSlowly)
+    limits = Limits(max_call_seconds=0.3)
+    app = create_app(Config(limits=limits, isolate="all"))
+    try:
+        answer = app.test_client().post("/v1/envs/", json={"env_id": "CartPole-v1"})
+        assert too_long((answer.status_code, answer.json))
+        assert len(started) == 1
+        eventually(lambda: not is_running(started[0]))
+    finally:
+        app.close()
 
 
 def _busy_threads(pid):

@@ -43,11 +43,11 @@ def test_a_member_comes_back_through_json_as_it_was(seed):
 def test_a_member_comes_back_through_tensors_as_it_was(seed):
     for space, member in pairs(seed, tensors=True):
         assert spaces.travels_as_tensors(space)
-        parts = spaces.encode_tensors(space, "action", member)
+        parts = spaces.tensor_writer(space, "action")(member)
         raw = write(parts.tensors, {"texts": json.dumps(parts.texts)})
         file = read(raw)
         sent = Parts(file.tensors, json.loads(file.metadata["texts"]))
-        back = spaces.decode_tensors(space, "action", sent)
+        back = spaces.tensor_reader(space, "action")(sent)
         assert same(member, back), (space, member, back)
         # Another reader sees the same.
         published = safetensors.numpy.load(raw)

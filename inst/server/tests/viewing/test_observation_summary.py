@@ -5,8 +5,8 @@ from faulty_envs import SPACES
 from gymnasium.vector.utils import batch_space, create_empty_array
 
 from gym_server.protocol.answers import dumps
-from gym_server.spaces.stacking import stack
-from gym_server.viewing.observation_summary import entries, sub_env_of
+from gym_server.spaces.stacking import member_of, stack
+from gym_server.viewing.observation_summary import entries
 
 
 def test_an_array_is_its_numbers_in_order():
@@ -61,10 +61,10 @@ def test_a_sub_env_is_taken_out_of_a_batch(kind):
     members = [space.sample() for _ in range(3)]
     batch = stack(space, members)
     for sub_env, member in enumerate(members):
-        assert entries(sub_env_of(space, batch, sub_env)) == entries(member)
+        assert entries(member_of(space, batch, sub_env)) == entries(member)
 
 
 def test_what_gymnasium_batches_can_be_taken_apart():
     space = gymnasium.spaces.Dict({"a": gymnasium.spaces.Box(0, 1, (2,))})
     batch = create_empty_array(batch_space(space, 2).spaces["a"], n=2)
-    assert sub_env_of(space, {"a": batch}, 1)["a"].shape == batch[1].shape
+    assert member_of(space, {"a": batch}, 1)["a"].shape == batch[1].shape

@@ -1,3 +1,6 @@
+import sys
+import types
+
 import gymnasium
 import pytest
 from faulty_envs import Counting
@@ -37,6 +40,11 @@ class OtherSubEnvs(OwnSubEnvs):
         super().__init__(num_envs)
         self.single_action_space = gymnasium.spaces.Discrete(9)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
+
+
+class SlowCounting(Counting):
+    def __init__(self):
+        super().__init__(seconds=0.001)
 
 
 gymnasium.register("faultyOtherSubEnvs-v0", entry_point=Counting, vector_entry_point=OtherSubEnvs)
@@ -188,10 +196,7 @@ def test_a_server_has_a_largest_number_of_sub_envs(small_server):
     assert "--max-num-envs" in answer.json["hint"]
 
 
-def test_processes_are_fewer(client):
-    refusal = refused(client, 429, num_envs=65, vectorization_mode="async")
-    assert refusal["code"] == "too_many_sub_envs"
-    assert "--max-num-envs" in refusal["hint"]
+def test_there_is_a_largest_number_by_default(client):
     refusal = refused(client, 429, num_envs=16385)
     assert refusal["message"] == "This server takes at most 16384 sub-environments, not 16385"
 
@@ -224,3 +229,91 @@ def test_an_environment_that_cannot_be_made_says_why(client, mode):
 def test_arguments_cannot_change_what_was_chosen(client):
     for name in ("num_envs", "vectorization_mode", "vector_kwargs", "wrappers"):
         assert refused(client, kwargs={name: 3})["code"] == "invalid_kwargs"
+
+
+# How many processes ---------------------------------------------------------------------------
+
+
+def about(client, env_id="Acrobot-v1", **fields):
+    answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
+    assert answer.status_code == 200, answer.json
+    return client.get(f"/v1/envs/{answer.json['instance_id']}").json
+
+
+@pytest.mark.parametrize(
+    ("fields", "mode", "num_workers"),
+    [
+        ({"num_envs": 2, "num_workers": 0}, "sync", 0),
+        ({"num_envs": 2, "num_workers": 2}, "async", 2),
+        ({"num_envs": 100, "num_workers": 1}, "async", 1),
+        ({"num_envs": 3, "vectorization_mode": "async"}, "async", 3),
+        ({"num_envs": 100, "vectorization_mode": "async"}, "async", 4),
+        ({"num_envs": 100, "vectorization_mode": "async", "num_workers": 2}, "async", 2),
+        ({"num_envs": 16}, "sync", 0),
+        ({"num_envs": 48}, "async", 2),
+        ({"num_envs": 128}, "async", 4),
+        ({"num_envs": 128, "vectorization_mode": "sync"}, "sync", 0),
+        ({"num_envs": None}, None, None),
+        ({"env_id": "CartPole-v1", "num_envs": 128}, "vector_entry_point", None),
+        ({"env_id": "CartPole-v1", "num_envs": 2, "num_workers": 0}, "sync", 0),
+        # A step of it takes 5 us.
+        ({"env_id": "FrozenLake-v1", "num_envs": 64}, "sync", 0),
+        # A step of this one is measured.
+        (
+            {"env_id": "faulty_envs:Counting-v0", "num_envs": 64, "kwargs": {"seconds": 0.001}},
+            "async",
+            4,
+        ),
+    ],
+)
+def test_processes_are_used_where_they_pay(client, monkeypatch, fields, mode, num_workers):
+    monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
+    found = about(client, **fields)
+    assert (found["vectorization_mode"], found["num_workers"]) == (mode, num_workers)
+
+
+@pytest.mark.parametrize(
+    ("fields", "wanted"),
+    [
+        ({"num_workers": -1}, "must be an integer, 0 or greater, not -1"),
+        ({"num_workers": 1.5}, "must be an integer, 0 or greater, not 1.5"),
+        ({"num_workers": 3}, "must be at most 2, the number of sub-environments, not 3"),
+        ({"num_workers": 1, "vectorization_mode": "sync"}, "must be 0 with vectorization_mode"),
+        ({"num_workers": 0, "vectorization_mode": "async"}, "must be at least 1 with"),
+        ({"num_workers": 1, "vectorization_mode": "vector_entry_point"}, "must be left out with"),
+        ({"num_workers": 1, "num_envs": None}, "The parameter 'num_workers' is for vector env"),
+    ],
+)
+def test_a_number_of_processes_that_cannot_be_is_refused(client, fields, wanted):
+    refusal = refused(client, **fields)
+    assert refusal["code"] == "invalid_parameter"
+    assert wanted in refusal["message"]
+
+
+@pytest.mark.parametrize(
+    ("env_id", "why"),
+    [
+        ("faulty_envs:RaisesElsewhere-v0", "The environment raised RuntimeError: not here"),
+        # Only this process knows its class.
+        ("faultyLocal-v0", "pickle"),
+        ("faultyUnread-v0", "known_here"),
+    ],
+)
+def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeypatch, env_id, why):
+    monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
+    gymnasium.register("faultyLocal-v0", entry_point=lambda: Counting(seconds=0.001))
+    # A name can be sent whatever it means there.
+    known_here = types.ModuleType("known_here")
+    known_here.Slow = type("Slow", (SlowCounting,), {"__module__": "known_here"})
+    monkeypatch.setitem(sys.modules, "known_here", known_here)
+    gymnasium.register("faultyUnread-v0", entry_point=known_here.Slow)
+    try:
+        found = about(client, env_id, num_envs=64)
+        assert (found["vectorization_mode"], found["num_workers"]) == ("sync", 0)
+        answer = client.post("/v1/envs/", json={"env_id": env_id, "num_envs": 64, "num_workers": 2})
+        assert (answer.status_code, answer.json["code"]) == (400, "not_supported")
+        assert "cannot be made in another process: " in answer.json["message"]
+        assert why in answer.json["message"]
+        assert "num_workers 0" in answer.json["hint"]
+    finally:
+        del gymnasium.registry["faultyLocal-v0"], gymnasium.registry["faultyUnread-v0"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import logging
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import cast
@@ -14,13 +15,15 @@ from gym_server.envs import argument_limits, make
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.envs.vector_envs import AsyncSubEnvs, SubEnv, SyncSubEnvs
-from gym_server.errors import GymServerError, wrong_length
+from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.vector_envs.entry_point import EntryPointEnv
+from gym_server.vector_envs.num_workers import choose_num_workers, may_share_processes
+from gym_server.vector_envs.sub_env import SubEnv
+from gym_server.vector_envs.sub_envs import SubEnvs
 
-# Of vectorization_mode "async", which runs each sub-environment in a process.
-MOST_PROCESSES = 64
+log = logging.getLogger(__name__)
 
 
 def make_vector_env(
@@ -29,7 +32,7 @@ def make_vector_env(
     max_num_envs: int,
     renderer: RenderThread,
     memory: MemoryReservation,
-) -> tuple[VectorEnv, str]:
+) -> tuple[EntryPointEnv | SubEnvs, str]:
     """Make a vector environment.
 
     Args:
@@ -57,13 +60,13 @@ def make_vector_env(
         match config.vectorization_mode:
             case None:
                 env = None if _why_no_entry_point(request) else _try_entry_point(request)
-                return (_make_sync(request), "sync") if env is None else (env, "vector_entry_point")
-            case "sync":
-                return _make_sync(request), "sync"
-            case "async":
-                return _make_async(request), "async"
+                if env is None:
+                    return _make_sub_envs(request)
+            case "sync" | "async":
+                return _make_sub_envs(request)
             case _:
-                return _require_entry_point(request), "vector_entry_point"
+                env = _require_entry_point(request)
+        return EntryPointEnv(env, renderer), "vector_entry_point"
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ class _Request:
 def check_single(config: EnvConfig) -> None:
     """Raise ``invalid_parameter`` for parameters that only vector environments have."""
     of_vector_environments = {
+        "num_workers": config.num_workers,
         "vectorization_mode": config.vectorization_mode,
         "autoreset_mode": config.autoreset_mode,
         "seed": config.seed if isinstance(config.seed, tuple) else None,
@@ -108,12 +112,25 @@ def _check(config: EnvConfig, num_envs: int, max_num_envs: int) -> None:
             f"This server takes at most {max_num_envs} sub-environments, not {num_envs}",
             "the server's option --max-num-envs sets the limit",
         )
-    if config.vectorization_mode == "async" and num_envs > MOST_PROCESSES:
-        raise GymServerError(
-            "too_many_sub_envs",
-            f"'async' takes at most {MOST_PROCESSES} sub-environments, a process each, not "
-            f"{num_envs}",
-            "vectorization_mode 'sync' takes as many as the server's option --max-num-envs says",
+    if config.num_workers is not None:
+        _check_num_workers(config, config.num_workers, num_envs)
+
+
+def _check_num_workers(config: EnvConfig, num_workers: int, num_envs: int) -> None:
+    wanted = {
+        "sync": "0 with vectorization_mode 'sync', whose sub-environments run in the server's "
+        "process",
+        "async": "at least 1 with vectorization_mode 'async'",
+        "vector_entry_point": "left out with vectorization_mode 'vector_entry_point', which runs "
+        "in the server's process",
+    }
+    fits = {"sync": num_workers == 0, "async": num_workers > 0, "vector_entry_point": False}
+    mode = config.vectorization_mode
+    if mode is not None and not fits[mode]:
+        raise invalid_parameter("num_workers", num_workers, wanted[mode])
+    if num_workers > num_envs:
+        raise invalid_parameter(
+            "num_workers", num_workers, f"at most {num_envs}, the number of sub-environments"
         )
 
 
@@ -124,6 +141,8 @@ def _why_no_entry_point(request: _Request) -> str | None:
     """Return why the environment's own implementation cannot do it, if that is known beforehand."""
     if request.spec.vector_entry_point is None:
         return f"{request.spec.id} has none"
+    if request.config.num_workers is not None:
+        return "it runs in the server's process, and num_workers was given"
     if request.config.wrappers or request.spec.additional_wrappers:
         return "it takes no wrappers"
     if request.kwargs.get("max_episode_steps", 1) in (-1, None):
@@ -224,18 +243,10 @@ def _with_time_limit(request: _Request) -> EnvSpec:
     return spec
 
 
-# Gymnasium's implementations --------------------------------------------------------------------
+# Sub-environments that are environments of their own ------------------------------------------
 
 
-def _make_sync(request: _Request) -> VectorEnv:
-    return _make_sub_envs(SyncSubEnvs, request)
-
-
-def _make_async(request: _Request) -> VectorEnv:
-    return _make_sub_envs(AsyncSubEnvs, request)
-
-
-def _make_sub_envs(kind: type[SyncSubEnvs] | type[AsyncSubEnvs], request: _Request) -> VectorEnv:
+def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
     render_mode = make.choose_render_mode(
         make.load_creator(request.spec), request.spec, request.config.render_mode
     )
@@ -248,6 +259,26 @@ def _make_sub_envs(kind: type[SyncSubEnvs] | type[AsyncSubEnvs], request: _Reque
         request.renderer,
         request.memory,
     )
-    env = make.ask(kind, sub_env, request.num_envs, request.autoreset_mode)
+    num_workers = make.ask(
+        choose_num_workers, request.config, request.spec, sub_env, request.renderer
+    )
+    try:
+        env = make.ask(_make_with, request, sub_env, num_workers)
+    except GymServerError as refusal:
+        if request.config.wants_workers or num_workers == 0 or refusal.code != "not_supported":
+            raise
+        log.info("%s runs in the server's process: %s", request.spec.id, refusal.message)
+        env = make.ask(_make_with, request, sub_env, 0)
     env.spec = _with_time_limit(request)
-    return env
+    return env, "async" if env.num_workers else "sync"
+
+
+def _make_with(request: _Request, sub_env: SubEnv, num_workers: int) -> SubEnvs:
+    return SubEnvs(
+        sub_env,
+        request.num_envs,
+        request.autoreset_mode,
+        num_workers,
+        request.renderer,
+        keeps_processes=may_share_processes(request.spec),
+    )

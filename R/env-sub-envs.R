@@ -1,0 +1,167 @@
+# How many sub-environments an environment gets that is made from its id.
+#
+# The rule depends on the environment and on how many episodes are played, never on cores, workers
+# or time: then a seed gives the same results everywhere. Many sub-environments share the cost of a
+# message and of asking the policy; too many make large messages, and most of them wait while the
+# last episodes of a batch end.
+
+entry_point_sub_envs <- 256L
+most_sub_envs <- 256L
+fewest_sub_envs <- 16L
+
+# So many bytes may the observations of all sub-environments take, where there are more than 16.
+most_observation_bytes <- 2^20
+
+# For fewer episodes than this no worker processes are used.
+few_episodes <- 32L
+
+#' Choose how many sub-environments with seeds of their own an environment gets
+#' @return A power of two, an integer.
+#' @noRd
+count_sub_envs <- function(observation_bytes) {
+  room <- 2^floor(log2(most_observation_bytes / max(observation_bytes, 1)))
+  as.integer(min(most_sub_envs, max(fewest_sub_envs, room)))
+}
+
+# How much an observation takes on the wire. Only arrays, which may be large, are counted.
+observation_bytes <- function(space) {
+  if (has_parts(space)) {
+    sum(vapply(space$spaces, observation_bytes, 0))
+  } else if (inherits(space, "gym_space_array")) {
+    prod(space$shape) * dtype_bytes(space$dtype)
+  } else {
+    0
+  }
+}
+
+dtype_bytes <- function(dtype) {
+  bits <- suppressWarnings(as.numeric(sub("^[a-z]+", "", dtype)))
+  if (is.na(bits)) 1 else bits / 8
+}
+
+#' Prepare to make an environment with any number of sub-environments
+#' @return A function that makes it. Its attribute `known` is an environment in which what was found
+#'   out about it is kept, as long as the client lives.
+#' @noRd
+env_maker <- function(env_id, arguments, client, call) {
+  make <- function(num_envs, ...) {
+    rlang::exec(
+      make_unseeded, env_id, !!!arguments, num_envs = num_envs, ..., client = client, call = call
+    )
+  }
+  attr(make, "known") <- known_of_env(client, env_id, arguments)
+  make
+}
+
+known_of_env <- function(client, env_id, arguments) {
+  check_client(client)
+  state <- client_state(client)
+  state$known_envs <- state$known_envs %||% new.env(parent = emptyenv())
+  key <- rlang::hash(list(env_id, arguments))
+  state$known_envs[[key]] <- state$known_envs[[key]] %||% new.env(parent = emptyenv())
+  state$known_envs[[key]]
+}
+
+#' Make an environment with sub-environments, and without any where the server cannot make them
+#'
+#' @param make As [env_maker()] returns it.
+#' @return A list: `env`, the environment, and `batch_size`, how many episodes make a batch where
+#'   each sub-environment has a seed of its own.
+#' @noRd
+make_sub_envs <- function(make, num_envs, num_workers, max_envs, call) {
+  traits <- sub_env_traits(make)
+  if (isTRUE(traits$own_implementation)) {
+    check_no_workers(num_workers, call)
+    own <- if_supported(
+      make(num_envs %||% entry_point_sub_envs, vectorization_mode = "vector_entry_point")
+    )
+    if (!is.null(own)) {
+      return(list(env = own))
+    }
+  }
+  full <- num_envs %||% count_sub_envs(traits$observation_bytes %||% 0)
+  # No more sub-environments are made than there are episodes.
+  most_workers <- num_workers %||% if (max_envs < few_episodes) 0L
+  env <- if (!is.null(num_envs)) {
+    make_seeded(make, num_envs, traits, most_workers)
+  } else if (!is.null(traits)) {
+    first_supported(
+      function(n) make_seeded(make, n, traits, most_workers), counts_to_try(min(max_envs, full))
+    )
+  }
+  list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
+}
+
+# Makes sub-environments with seeds of their own. What has a vector implementation uses no workers.
+# `NULL` as `most_workers` lets the server choose; no more than one for each sub-environment are
+# possible.
+make_seeded <- function(make, n, traits, most_workers = NULL) {
+  own <- isTRUE(traits$own_implementation)
+  make(
+    n, num_workers = if (!is.null(most_workers)) min(most_workers, n),
+    vectorization_mode = if (own) "sync", autoreset_mode = "SameStep"
+  )
+}
+
+# Fewer sub-environments are tried where the server refuses so many.
+counts_to_try <- function(n) {
+  unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))
+}
+
+first_supported <- function(make, counts) {
+  for (n in counts) {
+    env <- if_supported(make(n))
+    if (!is.null(env)) {
+      return(env)
+    }
+  }
+}
+
+# Does the server choose the environment's own vector implementation where it may choose, and how
+# large is an observation? The question is asked once, with one sub-environment, because making many
+# takes long. NULL where the server cannot make that one.
+sub_env_traits <- function(make) {
+  known <- attr(make, "known")
+  if (is.null(known$traits)) {
+    sub_env <- if_supported(make(1L))
+    if (is.null(sub_env)) {
+      return(NULL)
+    }
+    on.exit(close_quietly(sub_env))
+    known$traits <- list(
+      own_implementation = identical(sub_env$vectorization_mode, "vector_entry_point"),
+      observation_bytes = observation_bytes(sub_env$single_observation_space)
+    )
+  }
+  known$traits
+}
+
+check_no_workers <- function(num_workers, call) {
+  if (isTRUE(num_workers > 0)) {
+    gym_abort(
+      c(paste0("`num_workers = ", num_workers, "` is for sub-environments that are environments ",
+               "of their own, and this environment has a vector implementation, which plays all ",
+               "of them in one process."),
+        i = "Leave it out."),
+      class = "gym_error_argument", argument = "num_workers", value = num_workers, call = call
+    )
+  }
+}
+
+# The codes of errors that an environment with fewer sub-environments, or with none, may not have.
+fewer_sub_envs_codes <- c(
+  "not_supported", "too_many_sub_envs", "too_much_memory", "unsupported_space"
+)
+
+# Evaluates code that makes an environment. NULL where the server cannot make such sub-environments,
+# or not that many.
+if_supported <- function(code) {
+  tryCatch(
+    code,
+    gym_error_http = function(cnd) {
+      if (!isTRUE(cnd$code %in% fewer_sub_envs_codes)) {
+        rlang::cnd_signal(cnd)
+      }
+    }
+  )
+}

@@ -1,0 +1,141 @@
+# Readers and writers of values, made once for a space and called in every step. They take values as
+# they nearly always are; anything else goes the general way, which tells what is wrong with it.
+
+#' Make the function that reads a space's values from JSON
+#' @return A function as [decode_value()], without the space.
+#' @noRd
+json_reader <- function(space) UseMethod("json_reader")
+
+#' @exportS3Method
+json_reader.default <- function(space) function(json) decode_value(space, json)
+
+#' @exportS3Method
+json_reader.gym_space_array <- function(space) {
+  n <- prod(space$shape)
+  if (length(space$shape) > 1L || !startsWith(space$dtype, "float")) {
+    return(json_reader.default(space))
+  }
+  function(json) {
+    values <- unlist(json, use.names = FALSE)
+    if (is.double(values) && length(values) == n && !anyNA(values)) {
+      values
+    } else {
+      decode_value(space, json)
+    }
+  }
+}
+
+#' @exportS3Method
+json_reader.gym_space_discrete <- function(space) {
+  function(json) if (is.integer(json) && length(json) == 1L) json else decode_value(space, json)
+}
+
+#' @exportS3Method
+json_reader.gym_space_tuple <- function(space) {
+  readers <- lapply(unname(space$spaces), json_reader)
+  keys <- names(space$spaces)
+  function(json) {
+    if (!is.list(json) || length(json) != length(readers) || !identical(names(json), keys)) {
+      return(decode_value(space, json))
+    }
+    for (i in seq_along(readers)) {
+      json[[i]] <- readers[[i]](json[[i]])
+    }
+    json
+  }
+}
+
+#' @exportS3Method
+json_reader.gym_space_dict <- json_reader.gym_space_tuple
+
+# Writers ----------------------------------------------------------------------------------
+
+#' Make the function that checks an action and writes it as a member of a JSON object
+#' @return A function of an action; it returns `NULL` for one that [check_value()] must look at.
+#' @noRd
+json_writer <- function(space) UseMethod("json_writer")
+
+#' @exportS3Method
+json_writer.default <- function(space) function(value) NULL
+
+#' @exportS3Method
+json_writer.gym_space_discrete <- function(space) {
+  function(value) {
+    if (is_plain_whole(value)) sprintf('"action":%.0f,', as.double(value))
+  }
+}
+
+is_plain_whole <- function(x) {
+  length(x) == 1L && (is.numeric(x) || is.logical(x)) && !is.object(x) && is.finite(x) &&
+    x == trunc(x)
+}
+
+#' @exportS3Method
+json_writer.gym_space_box <- function(space) {
+  n <- prod(space$shape)
+  if (length(space$shape) != 1L || !startsWith(space$dtype, "float")) {
+    return(json_writer.default(space))
+  }
+  function(value) {
+    if (length(value) == n && is_plain_double(value) && is.null(dim(value)) &&
+          all(is.finite(value))) {
+      paste0('"action":', json_array(json_number(value)), ",")
+    }
+  }
+}
+
+is_plain_double <- function(x) is.double(x) && !is.object(x)
+
+#' Make the function that checks a batch of actions and puts it into tensors
+#'
+#' @param space The space of one action, `n` the number of actions.
+#' @return A function of a batch; it returns `NULL` for one that [check_batch()] must look at,
+#'   integers as they are, and otherwise a list of tensors.
+#' @noRd
+tensors_writer <- function(space, n) UseMethod("tensors_writer")
+
+#' @exportS3Method
+tensors_writer.default <- function(space, n) function(values) NULL
+
+#' @exportS3Method
+tensors_writer.gym_space_discrete <- function(space, n) {
+  if (space$dtype == "uint64") {
+    return(tensors_writer.default(space, n))
+  }
+  function(values) if (length(values) == n && is.null(dim(values))) plain_integers(values)
+}
+
+# Whole numbers as integers, `NULL` for what has to be looked at.
+plain_integers <- function(values) {
+  if (is.object(values)) {
+    NULL
+  } else if (is.integer(values) || is.logical(values)) {
+    if (!anyNA(values)) as.integer(values)
+  } else if (is.double(values) && within_integer(values)) {
+    whole <- as.integer(values)
+    if (all(whole == values)) whole
+  }
+}
+
+# The largest float32. Larger numbers are refused.
+float_limits <- c(float32 = 3.4028234e38, float64 = .Machine$double.xmax)
+
+#' @exportS3Method
+tensors_writer.gym_space_box <- function(space, n) {
+  shape <- c(as.integer(n), space$shape)
+  limit <- float_limits[space$dtype]
+  if (length(shape) != 2L || is.na(limit)) {
+    return(tensors_writer.default(space, n))
+  }
+  type <- tensor_dtypes[[space$dtype]]
+  write <- tensor_types[[type]]$write
+  fits <- function(values) {
+    is_plain_double(values) && identical(dim(values), shape) && isTRUE(max(abs(values)) <= limit)
+  }
+  function(values) {
+    if (fits(values)) {
+      numbers <- if (shape[[2L]] == 1L) values else t(values)
+      list(action = list(dtype = type, shape = shape, bytes = write(as.vector(numbers))))
+    }
+  }
+}

@@ -1,0 +1,1 @@
+"""Vector environments: many sub-environments that are played together."""

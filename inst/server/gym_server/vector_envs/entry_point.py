@@ -1,0 +1,92 @@
+"""Vector environments that bring an implementation of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+from gym_server.errors import GymServerError
+from gym_server.rendering.render_thread import RenderThread
+from gym_server.spaces.stacking import member_of
+
+# An environment that draws all its sub-environments at once may have no more than these.
+_MOST_DRAWN_AT_ONCE = 16
+
+
+class EntryPointEnv:
+    """An environment's own implementation, which has one generator for all sub-environments.
+
+    It has the attributes and methods of ``SubEnvs``.
+    """
+
+    runs_each = False
+    draws_when_stepped = False
+    draws_in_process = True
+    num_workers = None
+    moved = None
+
+    def __init__(self, env: VectorEnv, renderer: RenderThread) -> None:
+        """Take over an environment.
+
+        Args:
+            env: the environment.
+            renderer: the process's render thread.
+        """
+        self._env: Any = env
+        self._renderer = renderer
+        self.num_envs = env.num_envs
+        self.autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
+        self.ended = np.zeros(env.num_envs, dtype=bool)
+        self.metadata = env.metadata
+        self.render_mode = env.render_mode
+        self.spec = env.spec
+        self.single_observation_space = env.single_observation_space
+        self.single_action_space = env.single_action_space
+        self.observation_space = env.observation_space
+        self.action_space = env.action_space
+
+    def reset(
+        self, seed: int | None, options: dict | None, mask: None, with_infos: bool = True
+    ) -> tuple[Any, dict]:
+        """Begin an episode in all of them."""
+        observation, info = self._env.reset(seed=seed, options=options)
+        self.ended[:] = False
+        return observation, info if with_infos else {}
+
+    def step(self, which: None, actions: Any, with_infos: bool = True) -> tuple:
+        """Step all of them."""
+        observation, reward, terminated, truncated, info = self._env.step(actions)
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            self.ended = np.asarray(terminated, dtype=bool) | np.asarray(truncated, dtype=bool)
+        if not with_infos:
+            info = {name: info[name] for name in ("final_obs", "_final_obs") if name in info}
+        return observation, reward, terminated, truncated, info
+
+    def draw(self, sub_env: int) -> object:
+        """Draw all sub-environments, and return one of the frames."""
+        if self.num_envs > _MOST_DRAWN_AT_ONCE:
+            raise GymServerError(
+                "cannot_render",
+                f"{self.spec.id if self.spec else 'This environment'} draws all of its "
+                f"{self.num_envs} sub-environments at once, and the most that this server lets it "
+                f"draw are {_MOST_DRAWN_AT_ONCE}",
+                "create the environment with vectorization_mode 'sync'",
+            )
+        return self._renderer.run(self._env.render)[sub_env]
+
+    def observed(self, sub_env: int, batch: object) -> object:
+        """Return the last observation of a sub-environment, given that of the last move."""
+        return member_of(self.single_observation_space, batch, sub_env)
+
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Do nothing: this process does not end by itself."""
+
+    def close(self) -> None:
+        """Close the environment on the render thread."""
+        self._renderer.run(self._env.close)
+
+    def kill(self, why: GymServerError | None = None) -> None:
+        """Do nothing: it runs in this process."""

@@ -1,0 +1,255 @@
+"""Sub-environments that are played one after the other in one process."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Space
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import concatenate, create_empty_array
+
+from gym_server.envs.drawing_on_demand import allow_drawing, save_drawing
+from gym_server.errors import GymServerError, environment_error
+from gym_server.spaces.stacking import ARRAYS
+from gym_server.vector_envs.sub_env import SubEnv
+
+
+class Info(NamedTuple):
+    """What a sub-environment told in a move.
+
+    Attributes:
+        info: of the move, or of the reset that followed it in the same step.
+        final: of the step that ended an episode, where a reset followed in the same step.
+    """
+
+    info: dict
+    final: dict | None = None
+
+
+class Outcome(NamedTuple):
+    """What came of a step, a row for each sub-environment that stepped.
+
+    Attributes:
+        observation: a batch.
+        reward: float64.
+        terminated: booleans.
+        truncated: booleans.
+        final: the last observations, by row, of episodes after which another one began in the same
+            step.
+        infos: one for each row; None where none were wanted.
+    """
+
+    observation: Any
+    reward: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    final: dict[int, object]
+    infos: list[Info] | None
+
+
+class Group:
+    """Some of the sub-environments of a vector environment.
+
+    Attributes:
+        envs: they themselves.
+        render_mode: that of each of them.
+    """
+
+    def __init__(
+        self,
+        sub_env: SubEnv,
+        numbers: Sequence[int],
+        autoreset_mode: AutoresetMode,
+    ) -> None:
+        """Make them.
+
+        Args:
+            sub_env: makes them.
+            numbers: theirs among all sub-environments, from 0; for errors.
+            autoreset_mode: when a sub-environment whose episode ended is reset.
+        """
+        self._numbers = numbers
+        self._mode = autoreset_mode
+        with contextlib.ExitStack() as undo:
+            self.envs: list[gymnasium.Env] = []
+            for env in sub_env.make_all(len(numbers)):
+                self.envs.append(env)
+                undo.callback(env.close)
+            self._check_spaces()
+            undo.pop_all()
+        self._observation_space = self.envs[0].observation_space
+        # Of those that nobody has drawn so far.
+        self._render_modes = [save_drawing(env) for env in self.envs]
+        self.render_mode = self._render_modes[0] or self.envs[0].render_mode
+        self._steps = [env.step for env in self.envs]
+        self._last: list[object] = [None] * len(numbers)
+        # These have played all episodes that they had seeds for, and move no more.
+        self._rests = [False] * len(numbers)
+        # The next move of these begins an episode, with mode NEXT_STEP.
+        self._ended = [False] * len(numbers)
+        # The seeds of the episodes that they begin by themselves, the next one last; None for
+        # episodes without end and without seeds.
+        self._seeds: list[list[int] | None] = [None] * len(numbers)
+
+    def _check_spaces(self) -> None:
+        first = self.envs[0]
+        for env in self.envs:
+            for name in ("observation_space", "action_space"):
+                space, wanted = getattr(env, name), getattr(first, name)
+                if space is not wanted and space != wanted:
+                    raise RuntimeError(
+                        f"its sub-environments differ: one has the {name} {wanted}, "
+                        f"another one {space}"
+                    )
+
+    # Moves ----------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        which: Sequence[int],
+        seeds: Sequence[int | None],
+        later: Sequence[Sequence[int] | None],
+        options: dict | None,
+    ) -> tuple[Any, list[Info]]:
+        """Begin episodes in some of them.
+
+        Args:
+            which: their places in this group.
+            seeds: theirs.
+            later: for each the seeds of the episodes that it begins by itself after this one, and
+                then it rests; None for episodes without seeds, one after the other.
+            options: the environment's own.
+
+        Returns:
+            The observations of all of them as a batch, and the infos of those that were reset.
+        """
+        infos = []
+        for index, seed, seeds_later in zip(which, seeds, later, strict=True):
+            with self._naming(index):
+                self._last[index], info = self.envs[index].reset(seed=seed, options=options)
+            infos.append(Info(info))
+            self._ended[index] = self._rests[index] = False
+            self._seeds[index] = None if seeds_later is None else list(reversed(seeds_later))
+        return stack_observations(self._observation_space, self._last), infos
+
+    def step(
+        self, which: Sequence[int] | None, actions: Iterable[object], with_infos: bool
+    ) -> Outcome:
+        """Step some of them.
+
+        Args:
+            which: their places in this group, in increasing order; None for all. One that rests
+                returns its last observation and the reward 0.
+            actions: one for each of them.
+            with_infos: whether infos are wanted.
+        """
+        which = range(len(self.envs)) if which is None else which
+        # Before any steps, and where no sub-environment is to blame.
+        actions = list(actions)
+        if len(actions) != len(which):
+            raise ValueError(f"{len(actions)} actions for {len(which)} sub-environments")
+        steps, last, ended, rests = self._steps, self._last, self._ended, self._rests
+        reward = np.zeros(len(which))
+        terminated = np.zeros(len(which), dtype=bool)
+        truncated = np.zeros(len(which), dtype=bool)
+        final: dict[int, object] = {}
+        infos: list[Info] = []
+        info: dict
+        index = 0
+        try:
+            for row, (index, action) in enumerate(zip(which, actions, strict=True)):
+                final_info = None
+                if rests[index]:
+                    info = {}
+                elif ended[index]:
+                    ended[index] = False
+                    last[index], info = self._begin_next(index)
+                else:
+                    last[index], reward[row], terminated[row], truncated[row], info = steps[index](
+                        action
+                    )
+                    if terminated[row] or truncated[row]:
+                        if self._mode is AutoresetMode.DISABLED:
+                            pass
+                        elif self._has_used_its_seeds(index):
+                            rests[index] = True
+                        elif self._mode is AutoresetMode.NEXT_STEP:
+                            ended[index] = True
+                        else:
+                            final[row], final_info = last[index], info
+                            last[index], info = self._begin_next(index)
+                if with_infos:
+                    infos.append(Info(info, final_info))
+        except BaseException as failure:
+            raise self._named(failure, index) from failure
+        observations = last if len(which) == len(last) else [last[index] for index in which]
+        return Outcome(
+            stack_observations(self._observation_space, observations),
+            reward,
+            terminated,
+            truncated,
+            final,
+            infos if with_infos else None,
+        )
+
+    def _has_used_its_seeds(self, index: int) -> bool:
+        seeds = self._seeds[index]
+        return seeds is not None and not seeds
+
+    def _begin_next(self, index: int) -> tuple[object, dict]:
+        seeds = self._seeds[index]
+        if seeds is None:
+            return self.envs[index].reset()
+        return self.envs[index].reset(seed=seeds.pop())
+
+    # Looks ----------------------------------------------------------------------------------
+
+    def render(self, index: int) -> object:
+        """Draw one of them."""
+        with self._naming(index):
+            allow_drawing(self.envs[index], self._render_modes[index])
+            return self.envs[index].render()
+
+    def observed(self, index: int) -> object:
+        """Return the last observation of one of them."""
+        return self._last[index]
+
+    def close(self) -> None:
+        """Close all of them, whatever goes wrong with one; raise the first error."""
+        with contextlib.ExitStack() as closing:
+            for env in self.envs:
+                closing.callback(env.close)
+
+    # Errors ---------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _naming(self, index: int) -> Any:
+        try:
+            yield
+        except BaseException as failure:
+            raise self._named(failure, index) from failure
+
+    def _named(self, failure: BaseException, index: int) -> GymServerError:
+        if isinstance(failure, GymServerError):
+            return failure
+        return environment_error(failure, f"Sub-environment {self._numbers[index]}")
+
+
+def stack_observations(space: Space, observations: list) -> Any:
+    """Return observations of a space as a batch, as Gymnasium's vector environments have it."""
+    if isinstance(space, ARRAYS):
+        batch: np.ndarray | None
+        try:
+            batch = np.array(observations)
+        except ValueError:
+            batch = None
+        # Gymnasium's function takes three times as long, and says what does not fit.
+        shape = (len(observations), *(space.shape or ()))
+        if batch is not None and batch.dtype == space.dtype and batch.shape == shape:
+            return batch
+    empty: Any = create_empty_array(space, n=len(observations))
+    return concatenate(space, observations, empty)

@@ -1,0 +1,36 @@
+"""Calls of several groups at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from gym_server.vector_envs.group_process import GroupProcess
+from gym_server.vector_envs.local_group import LocalGroup
+
+AnyGroup = LocalGroup | GroupProcess
+
+
+def call_all(calls: Iterable[tuple[AnyGroup, str, tuple]]) -> list:
+    """Begin all calls, wait for all results; then raise the first error.
+
+    Args:
+        calls: a group, the name of the method that begins a call of it, and that one's arguments.
+    """
+    results = []
+    begun = []
+    failure: BaseException | None = None
+    try:
+        for group, begin, arguments in calls:
+            getattr(group, begin)(*arguments)
+            begun.append(group)
+    except BaseException as refusal:
+        failure = refusal
+    for group in begun:
+        # All must be taken: a result that is left would be taken for that of the next call.
+        try:
+            results.append(group.finish())
+        except BaseException as refusal:
+            failure = failure or refusal
+    if failure is not None:
+        raise failure
+    return results

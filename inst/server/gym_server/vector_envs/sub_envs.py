@@ -1,0 +1,385 @@
+"""Vector environments whose sub-environments are environments of their own.
+
+They are groups, in this process or in processes of their own, and one call is sent to each group
+for a step of all. What comes of it is the same for any number of processes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Space
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from gym_server import spaces
+from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.errors import GymServerError, shutting_down
+from gym_server.processes.cores import spread
+from gym_server.rendering.render_thread import RenderThread
+from gym_server.spaces.stacking import ARRAYS, join, unstack
+from gym_server.threads.interrupt import interrupted_by
+from gym_server.vector_envs.group import Group, Outcome
+from gym_server.vector_envs.group_calls import AnyGroup, call_all
+from gym_server.vector_envs.group_process import GroupProcess
+from gym_server.vector_envs.infos import final_only, gather
+from gym_server.vector_envs.local_group import LocalGroup
+from gym_server.vector_envs.sub_env import SubEnv
+from gym_server.vector_envs.warm_processes import warm_processes
+
+# How long closing may take in a process before that is killed.
+_CLOSE_SECONDS = 3.0
+
+
+class SubEnvs:
+    """A vector environment of sub-environments of one kind.
+
+    Attributes:
+        num_envs: how many there are.
+        num_workers: how many processes run them; 0 for this process.
+        autoreset_mode: when a sub-environment whose episode ended is reset.
+        ended: which of them have ended and do not move until they are reset.
+        moved: which rows of the last step moved; None for all.
+        draws_when_stepped: whether its steps must run on the render thread.
+        draws_in_process: whether sub-environments draw in this process.
+        metadata, render_mode: as Gymnasium's environments have them.
+        spec: the environment's, set by whoever makes it.
+        single_observation_space, single_action_space: of one sub-environment.
+        observation_space, action_space: of all together.
+    """
+
+    # Each takes a seed and a reset of its own, and some can step while the others wait.
+    runs_each = True
+
+    def __init__(
+        self,
+        sub_env: SubEnv,
+        num_envs: int,
+        autoreset_mode: AutoresetMode,
+        num_workers: int,
+        renderer: RenderThread,
+        keeps_processes: bool = False,
+    ) -> None:
+        """Make all sub-environments.
+
+        Args:
+            sub_env: makes one of them.
+            num_envs: how many to make.
+            autoreset_mode: as above.
+            num_workers: how many processes run them; 0 for this process.
+            renderer: the process's render thread.
+            keeps_processes: whether the processes may run other environments afterwards.
+
+        Raises:
+            GymServerError: ``unsupported_space``, ``not_supported``, ``environment_died``; and
+                whatever an environment raises.
+        """
+        self.num_envs = num_envs
+        self.num_workers = num_workers
+        self.autoreset_mode = autoreset_mode
+        self.spec: EnvSpec | None = None
+        self.ended = np.zeros(num_envs, dtype=bool)
+        self.moved: np.ndarray | None = None
+        self._renderer = renderer
+        self._keeps_processes = keeps_processes
+        self._on_end: Callable[[GymServerError], None] = lambda why: None
+        self._is_closed = False
+        # How many episodes each begins by itself; below 0 without end.
+        self._to_begin = np.full(num_envs, -1)
+        # The place of each group's first sub-environment, and how many there are in all.
+        self._bounds = _bounds(num_envs, max(1, num_workers))
+        groups = [range(first, end) for first, end in pairwise(self._bounds)]
+        self._groups: list[AnyGroup] = []
+        if num_workers == 0:
+            group = Group(sub_env, groups[0], autoreset_mode)
+            self._groups.append(LocalGroup(group, renderer))
+            self._describe(group.envs[0], group.render_mode)
+        else:
+            self._describe_one(sub_env)
+            # An interrupt while the thread talks to the fork server would break that, and with it
+            # the processes of all others.
+            with interrupted_by(self.kill):
+                self._start(sub_env, groups)
+
+    # Making ---------------------------------------------------------------------------------
+
+    def _describe_one(self, sub_env: SubEnv) -> None:
+        """Learn what they are like from one in this process, which is closed again."""
+        one = sub_env()
+        try:
+            # Refuses a space that is not supported before any process starts.
+            spaces.describe(one.observation_space)
+            spaces.describe(one.action_space)
+            self._describe(one, one.render_mode)
+        finally:
+            self._renderer.run(one.close)
+        self.draws_when_stepped = self.draws_in_process = False
+
+    def _describe(self, env: Any, render_mode: str | None) -> None:
+        self.metadata = {**(env.metadata or {}), "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.single_observation_space: Space = env.observation_space
+        self.single_action_space: Space = env.action_space
+        self.observation_space = batch_space(env.observation_space, self.num_envs)
+        self.action_space = batch_space(env.action_space, self.num_envs)
+        self.draws_when_stepped = draws_when_stepped(env)
+        self.draws_in_process = True
+
+    def _start(self, sub_env: SubEnv, groups: Sequence[range]) -> None:
+        try:
+            for _ in groups:
+                self._groups.append(warm_processes.take())
+                # After it is where kill() looks: one of the two finds it.
+                if self._is_closed:
+                    raise shutting_down()
+            call_all(
+                (group, "begin_make", (sub_env, numbers, self.autoreset_mode))
+                for group, numbers in zip(self._groups, groups, strict=True)
+            )
+        except GymServerError as refusal:
+            self.kill()
+            if refusal.code == "environment_died":
+                raise
+            # One was made in this process without an error.
+            raise GymServerError(
+                "not_supported",
+                f"This environment cannot be made in another process: {refusal.message}",
+                "num_workers 0 runs the sub-environments in the server's process",
+            ) from refusal
+        except BaseException:
+            self.kill()
+            raise
+        spread(self.pids)
+
+    # Moves ----------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int | Sequence[int | Sequence[int] | None] | None,
+        options: dict | None,
+        mask: np.ndarray | None,
+        with_infos: bool = True,
+    ) -> tuple[Any, dict]:
+        """Begin an episode in each of them, or in those of a mask.
+
+        Args:
+            seed: one for all, each of which makes its own of it, or one for each; one for each may
+                also be several, the first for now and the others for the episodes that follow.
+            options: the environment's own.
+            mask: booleans; None for all. With a mask Gymnasium hands on ``{}`` for no options, and
+                so does this.
+            with_infos: whether infos are wanted.
+
+        Returns:
+            The observations of all of them, and an info.
+        """
+        seeds = _seeds_of(seed, self.num_envs)
+        which = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        own = [seeds[sub_env] for sub_env in which.tolist()]
+        first = [one[0] if isinstance(one, (tuple, list)) else one for one in own]
+        later = [one[1:] if isinstance(one, (tuple, list)) else None for one in own]
+        if mask is not None:
+            options = options or {}
+        results = self._ask(
+            "reset", which, lambda rows: (first[rows], later[rows], options), everywhere=True
+        )
+        self.ended[which] = False
+        self._to_begin[which] = [-1 if seeds is None else len(seeds) for seeds in later]
+        space = self.single_observation_space
+        observation = join(space, [batch for batch, _ in results])
+        if not with_infos:
+            return observation, {}
+        infos: list = [None] * self.num_envs
+        told = [info for _, infos_of_group in results for info in infos_of_group]
+        for sub_env, info in zip(which, told, strict=True):
+            infos[sub_env] = info
+        return observation, gather(infos, {}, self.num_envs)
+
+    def step(self, which: np.ndarray | None, actions: Any, with_infos: bool = True) -> tuple:
+        """Step some of them.
+
+        Args:
+            which: their numbers, in increasing order; None for all.
+            actions: a batch of one action for each of these.
+            with_infos: whether infos are wanted.
+
+        Returns:
+            What Gymnasium's vector environments return, with a row for each that stepped.
+        """
+        if which is not None and len(which) == self.num_envs:
+            which = None
+        resting = self.ended if which is None else self.ended[which]
+        self.moved = ~resting if resting.any() else None
+        space = self.single_action_space
+        members = actions if isinstance(space, ARRAYS) else unstack(space, actions)
+        outcomes: list[Outcome] = self._ask("step", which, lambda rows: (members[rows], with_infos))
+        outcome = outcomes[0] if len(outcomes) == 1 else self._joined(outcomes)
+        self._note_ends(which, outcome)
+        count = len(outcome.reward)
+        if outcome.infos is None:
+            info = final_only(outcome.final, count)
+        else:
+            info = gather(outcome.infos, outcome.final, count)
+        return outcome.observation, outcome.reward, outcome.terminated, outcome.truncated, info
+
+    def _joined(self, outcomes: list[Outcome]) -> Outcome:
+        final: dict[int, object] = {}
+        before = 0
+        for one in outcomes:
+            final.update((before + row, observation) for row, observation in one.final.items())
+            before += len(one.reward)
+        infos = None
+        if outcomes[0].infos is not None:
+            infos = [info for one in outcomes for info in one.infos or ()]
+        return Outcome(
+            join(self.single_observation_space, [one.observation for one in outcomes]),
+            np.concatenate([one.reward for one in outcomes]),
+            np.concatenate([one.terminated for one in outcomes]),
+            np.concatenate([one.truncated for one in outcomes]),
+            final,
+            infos,
+        )
+
+    def _note_ends(self, which: np.ndarray | None, outcome: Outcome) -> None:
+        """Note which of them wait for a reset, and which begin an episode by themselves."""
+        done = outcome.terminated | outcome.truncated
+        if not done.any():
+            return
+        over = np.flatnonzero(done) if which is None else which[done]
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            self.ended[over] = True
+        else:
+            to_begin = self._to_begin[over]
+            self.ended[over[to_begin == 0]] = True
+            self._to_begin[over[to_begin > 0]] -= 1
+
+    # Groups ---------------------------------------------------------------------------------
+
+    def _ask(
+        self,
+        method: str,
+        which: np.ndarray | None,
+        arguments: Callable[[slice], tuple],
+        everywhere: bool = False,
+    ) -> list:
+        """Call a method of the groups that have some sub-environments, at the same time.
+
+        Args:
+            method: its name.
+            which: the numbers of the sub-environments; None for all.
+            arguments: returns the further arguments for the sub-environments in a range of these.
+            everywhere: whether groups that have none of them are called as well.
+        """
+        bounds = self._bounds if which is None else np.searchsorted(which, self._bounds).tolist()
+
+        def calls() -> Iterator[tuple[AnyGroup, str, tuple]]:
+            for group, (first, last), start in zip(
+                self._groups, pairwise(bounds), self._bounds, strict=False
+            ):
+                if first < last or everywhere:
+                    rows = slice(first, last)
+                    own = None if which is None else (which[rows] - start).tolist()
+                    yield group, "begin", (method, own, *arguments(rows))
+
+        return call_all(calls())
+
+    def _ask_one(self, method: str, sub_env: int) -> Any:
+        place = int(np.searchsorted(self._bounds, sub_env, side="right")) - 1
+        group = self._groups[place]
+        group.begin(method, sub_env - self._bounds[place])
+        return group.finish()
+
+    # Looks ----------------------------------------------------------------------------------
+
+    def draw(self, sub_env: int) -> object:
+        """Draw a sub-environment."""
+        return self._ask_one("render", sub_env)
+
+    def observed(self, sub_env: int, batch: object) -> object:
+        """Return the last observation of a sub-environment."""
+        return self._ask_one("observed", sub_env)
+
+    # The end --------------------------------------------------------------------------------
+
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when one of its processes ends by itself, or at once if it has."""
+        self._on_end = on_end
+        for group in self._groups:
+            if isinstance(group, GroupProcess):
+                group.report_end(self._end)
+
+    def _end(self, why: GymServerError) -> None:
+        """Go with the process that has ended."""
+        if not self._is_closed:
+            self.kill(why)
+            self._on_end(why)
+
+    @property
+    def pids(self) -> list[int]:
+        """The numbers of its processes."""
+        return [group.pid for group in self._groups if isinstance(group, GroupProcess)]
+
+    def close(self) -> None:
+        """Close all sub-environments, and let their processes run others or end."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        for group in self._groups:
+            if isinstance(group, LocalGroup):
+                self._renderer.run(group.close)
+            else:
+                group.release()
+        if self.num_workers == 0:
+            return
+        is_overdue = threading.Event()
+
+        def end_overdue() -> None:
+            is_overdue.set()
+            self._kill_processes()
+
+        timer = threading.Timer(_CLOSE_SECONDS, end_overdue)
+        timer.daemon = True
+        timer.start()
+        try:
+            call_all((group, "begin", ("close",)) for group in self._groups)
+        except BaseException:
+            self._kill_processes()
+            if not is_overdue.is_set():
+                raise
+            # It was killed because it took too long, which is no error of the client's.
+            return
+        finally:
+            timer.cancel()
+        for group in self._groups:
+            if isinstance(group, GroupProcess) and self._keeps_processes:
+                warm_processes.put(group)
+        if not self._keeps_processes:
+            self._kill_processes()
+
+    def kill(self, why: GymServerError | None = None) -> None:
+        """Kill its processes, which ends what hangs in them."""
+        self._is_closed = True
+        self._kill_processes(why)
+
+    def _kill_processes(self, why: GymServerError | None = None) -> None:
+        for group in self._groups:
+            if isinstance(group, GroupProcess):
+                group.kill(why)
+
+
+def _bounds(num_envs: int, groups: int) -> list[int]:
+    """Return where groups of nearly the same size begin, and the number of all."""
+    return [num_envs * group // groups for group in range(groups + 1)]
+
+
+def _seeds_of(seed: Any, num_envs: int) -> Sequence[int | Sequence[int] | None]:
+    if seed is None:
+        return [None] * num_envs
+    if isinstance(seed, int):
+        return [seed + sub_env for sub_env in range(num_envs)]
+    return list(seed)

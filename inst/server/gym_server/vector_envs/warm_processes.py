@@ -1,0 +1,85 @@
+"""Processes that have no group at the moment and wait for the next one.
+
+To start a process takes 20 ms, and a second on Windows. One that has run environments of foreign
+packages is not kept: who knows what they have left in it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from gym_server.processes.cores import usable_cores
+from gym_server.vector_envs.group_process import GroupProcess
+
+# After so many seconds without a group a process ends.
+_IDLE_SECONDS = 600.0
+
+
+class WarmProcesses:
+    """Keeps at most as many processes as there are cores."""
+
+    def __init__(self, most: int | None = None, idle_seconds: float = _IDLE_SECONDS) -> None:
+        """Start with none.
+
+        Args:
+            most: how many to keep; None for one a core.
+            idle_seconds: how long to keep one.
+        """
+        self._most = usable_cores() if most is None else most
+        self._idle_seconds = idle_seconds
+        self._lock = threading.Lock()
+        # With the time at which each was put here, the last one last.
+        self._idle: list[tuple[float, GroupProcess]] = []
+        self._timer: threading.Timer | None = None
+
+    def take(self) -> GroupProcess:
+        """Return a process without a group, started if need be."""
+        with self._lock:
+            while self._idle:
+                process = self._idle.pop()[1]
+                if process.is_alive:
+                    return process
+        return GroupProcess()
+
+    def put(self, process: GroupProcess) -> None:
+        """Keep a process that has closed its group, or end it if there are enough."""
+        process.release()
+        with self._lock:
+            self._idle = [one for one in self._idle if one[1].is_alive]
+            keeps = process.is_alive and len(self._idle) < self._most
+            if keeps:
+                self._idle.append((time.monotonic(), process))
+            if keeps and self._timer is None:
+                self._start_timer()
+        if not keeps:
+            process.kill()
+
+    def _start_timer(self) -> None:
+        oldest, _ = self._idle[0]
+        left = oldest + self._idle_seconds - time.monotonic()
+        self._timer = threading.Timer(max(0.0, left), self._end_old)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def _end_old(self) -> None:
+        before = time.monotonic() - self._idle_seconds
+        with self._lock:
+            old = [process for since, process in self._idle if since <= before]
+            self._idle = [one for one in self._idle if one[0] > before]
+            self._timer = None
+            if self._idle:
+                self._start_timer()
+        for process in old:
+            process.kill()
+
+    def end(self) -> None:
+        """End all processes that wait here."""
+        with self._lock:
+            idle, self._idle = self._idle, []
+        for _, process in idle:
+            process.kill()
+
+
+# The processes of this process's vector environments.
+warm_processes = WarmProcesses()

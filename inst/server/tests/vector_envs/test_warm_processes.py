@@ -1,0 +1,126 @@
+import os
+import signal
+import time
+
+import gymnasium
+import pytest
+from gymnasium.vector import AutoresetMode
+from running import is_running
+
+from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.rendering.render_thread import RenderThread
+from gym_server.vector_envs.sub_env import SubEnv
+from gym_server.vector_envs.sub_envs import SubEnvs
+from gym_server.vector_envs.warm_processes import WarmProcesses
+
+
+@pytest.fixture
+def warm(monkeypatch):
+    def warm(**how):
+        made.append(WarmProcesses(**how))
+        for user in ("vector_envs.sub_envs", "manager.instance_manager"):
+            monkeypatch.setattr(f"gym_server.{user}.warm_processes", made[-1])
+        return made[-1]
+
+    made = []
+    yield warm
+    for one in made:
+        one.end()
+
+
+def make(keeps_processes=True, env_id="Acrobot-v1", num_workers=2):
+    spec = gymnasium.spec(env_id)
+    sub_env = SubEnv(spec, None, {}, (), RenderThread(), MemoryReservation())
+    return SubEnvs(
+        sub_env, 4, AutoresetMode.SAME_STEP, num_workers, RenderThread(), keeps_processes
+    )
+
+
+def test_a_process_runs_one_group_after_the_other(warm):
+    warm(most=2)
+    first = make()
+    pids = first.pids
+    start, _ = first.reset(3, None, None)
+    first.close()
+    second = make(env_id="Pendulum-v1")
+    assert sorted(second.pids) == sorted(pids)
+    assert second.reset(3, None, None)[0].shape == (4, 3)
+    second.close()
+    third = make()
+    assert sorted(third.pids) == sorted(pids)
+    assert third.reset(3, None, None)[0].tolist() == start.tolist()
+    third.close()
+
+
+def test_no_more_than_so_many_are_kept(warm, eventually):
+    warm(most=1)
+    env = make()
+    pids = env.pids
+    env.close()
+    eventually(lambda: sum(map(is_running, pids)) == 1)
+
+
+def test_what_others_must_not_get_is_not_kept(warm, eventually):
+    warm(most=2)
+    env = make(keeps_processes=False)
+    pids = env.pids
+    env.close()
+    eventually(lambda: not any(map(is_running, pids)))
+
+
+def test_they_end_after_a_while(warm, eventually):
+    warm(most=2, idle_seconds=0.2)
+    env = make()
+    pids = env.pids
+    env.close()
+    assert all(map(is_running, pids))
+    eventually(lambda: not any(map(is_running, pids)))
+
+
+def test_none_waits_longer_because_another_one_came_later(warm, eventually):
+    pool = warm(most=2, idle_seconds=2.0)
+    first, second = pool.take(), pool.take()
+    pool.put(first)
+    time.sleep(1.4)
+    pool.put(second)
+    began = time.monotonic()
+    eventually(lambda: not is_running(first.pid))
+    assert is_running(second.pid)
+    eventually(lambda: not is_running(second.pid))
+    # Not after twice as long, when the timer would ring again.
+    assert time.monotonic() - began < 2.5
+
+
+def test_one_that_has_ended_takes_no_place(warm, eventually):
+    pool = warm(most=1)
+    first, second = pool.take(), pool.take()
+    pool.put(first)
+    os.kill(first.pid, signal.SIGKILL)
+    eventually(lambda: not first.is_alive)
+    pool.put(second)
+    assert is_running(second.pid)
+    assert pool.take() is second
+    second.kill()
+
+
+def test_the_end_of_a_server_ends_them(warm, quick, eventually):
+    pool = warm(most=1)
+    app = quick()
+    process = pool.take()
+    pool.put(process)
+    app.close()
+    eventually(lambda: not is_running(process.pid))
+
+
+def test_one_that_has_ended_is_not_given_out(warm, eventually):
+    pool = warm(most=2)
+    env = make()
+    pids = env.pids
+    env.close()
+    os.kill(pids[0], signal.SIGKILL)
+    eventually(lambda: not is_running(pids[0]))
+    eventually(lambda: sum(process.is_alive for _, process in pool._idle) == 1)
+    another = make()
+    assert pids[0] not in another.pids
+    assert another.reset(1, None, None)[0].shape == (4, 6)
+    another.close()

@@ -1,0 +1,205 @@
+# Whole episodes by rollout(), with an environment that is named by its id, against Python's own
+# loop over one environment and against reticulate. All of them may use two cores.
+
+rollout_cores <- 2L
+
+rollout_names <- c(
+  gym = "gym, rollout()",
+  python = "Python",
+  by_hand = "gym, env$step(), 1,024 sub-environments",
+  workers = "gym, rollout(), %d worker processes"
+)
+
+# Evaluates code while this process, and whatever it starts, may use these cores only. Where the
+# system has no such limit all cores are used.
+on_cores <- function(count, code) {
+  allowed <- parallel::mcaffinity()
+  if (length(allowed) > count) {
+    parallel::mcaffinity(allowed[seq_len(count)])
+    on.exit(parallel::mcaffinity(allowed))
+  }
+  force(code)
+}
+
+# How many cores that leaves; without such a limit, all that there are.
+count_cores <- function() {
+  allowed <- length(parallel::mcaffinity())
+  if (allowed) min(allowed, rollout_cores) else parallel::detectCores()
+}
+
+compare_rollouts <- function(python, turns, quick) {
+  on_cores(rollout_cores, {
+    setup <- start_contenders(python)
+    on.exit(stop_contenders(setup))
+    rbind(
+      do.call(rbind, lapply(tasks, function(task) {
+        episodes <- if (quick) task$quick else task$episodes
+        play_paired(rollout_contenders(setup, task, episodes), turns, task$env_id)
+      })),
+      play_paired(candidate_contenders(setup, tasks[["LunarLander-v3"]]), turns, "16 candidates"),
+      if (has_num_workers()) {
+        task <- tasks[["LunarLander-v3"]]
+        episodes <- if (quick) task$quick else task$episodes
+        play_paired(worker_contenders(setup, task, episodes), turns, "worker processes")
+      }
+    )
+  })
+}
+
+# Can this version of the package be told how many worker processes to use?
+has_num_workers <- function() "num_workers" %in% names(formals(gym_make))
+
+start_contenders <- function(python) {
+  numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
+  list(
+    client = gym_server_start(python = python),
+    python = start_python(python),
+    reticulate = lapply(c(list(NULL), numpy_1), start_reticulate, python = python)
+  )
+}
+
+stop_contenders <- function(setup) {
+  for (worker in c(list(setup$python), setup$reticulate)) end_worker(worker)
+  gym_server_stop(setup$client)
+}
+
+# Turn by turn, every second time in the other direction, after each has been tried once. `play()`
+# of a contender gives steps a second.
+play_paired <- function(contenders, turns, what) {
+  for (contender in contenders) contender$warm_up()
+  do.call(rbind, lapply(seq_len(turns), function(turn) {
+    progress(what, ", turn ", turn, " of ", turns)
+    order <- if (turn %% 2L) contenders else rev(contenders)
+    do.call(rbind, lapply(order, function(one) {
+      measured(one$part, 0, one$name, one$called, turn, one$play(), "steps/s", one$env_id)
+    }))
+  }))
+}
+
+paired <- function(part, task, name, called, play, warm_up = play) {
+  called <- sprintf("%s, %d cores", called, count_cores())
+  list(
+    part = part, env_id = task$env_id, name = name, called = called, play = play,
+    warm_up = warm_up
+  )
+}
+
+rollout_contenders <- function(setup, task, episodes) {
+  policy <- task_policy(task)
+  play <- function(...) play_by_id(task, policy, episodes, setup$client, ...)
+  loop <- python_loop(setup$python, task, list(task_numbers(task)))
+  c(
+    list(
+      paired("env_rollouts", task, rollout_names[["gym"]],
+             sprintf("rollout(id, policy, %d)", episodes),
+             function() rate_of(function() sum(replicate(task$repeats, play()))),
+             # As many episodes, so that all worker processes run, but short ones.
+             function() play(max_steps = 2)),
+      paired("env_rollouts", task, rollout_names[["python"]],
+             sprintf("env.step(a) in a loop, %d episodes", episodes),
+             function() mean(replicate(task$repeats, loop(episodes))), function() loop(2L))
+    ),
+    if (task$reticulate) lapply(setup$reticulate, reticulate_episodes, task),
+    if (task$env_id == "FrozenLake-v1") list(steps_by_hand(setup, task))
+  )
+}
+
+# `play()` gives how many steps it took.
+rate_of <- function(play) {
+  started <- now()
+  steps <- play()
+  steps / (now() - started)
+}
+
+play_by_id <- function(task, policy, episodes, client, max_steps = NULL) {
+  env_id <- task$env_id
+  played <- if (task$stack) {
+    env_id |>
+      gym_wrap("AtariPreprocessing") |>
+      gym_wrap("FrameStackObservation", stack_size = 4) |>
+      rollout(policy, episodes, max_steps, seed = 1, client = client, frameskip = 1)
+  } else {
+    rollout(env_id, policy, episodes, max_steps, seed = 1, client = client)
+  }
+  sum(played$episodes$length)
+}
+
+task_policy <- function(task, numbers = task_numbers(task)) {
+  switch(task$kind,
+    table = function(observation) numbers[observation + 1L],
+    cards = function(observation) as.integer(observation$player_sum < numbers),
+    policy_network(c(task$inputs, task$outputs), "tanh", list(numbers))
+  )
+}
+
+# The loop in Python, a function of the number of episodes with each of the policies.
+python_loop <- function(worker, task, policies) {
+  numbers <- do.call(rbind, policies)
+  if (!is.matrix(policies[[1L]])) numbers <- policies[[1L]]
+  file <- write_numbers(numbers)
+  function(episodes) {
+    ask(worker, "episodes", task$env_id, task$kind, file, task$outputs, length(policies), episodes)
+  }
+}
+
+# How many sub-environments reticulate steps together, and for how long.
+reticulate_episodes <- function(worker, task) {
+  play <- function(seconds) ask(worker, "episodes", task$env_id, seconds, 32)
+  paired("env_rollouts", task, reticulate_name(worker), "SyncVectorEnv, 32 sub-environments",
+         function() play(2), function() play(0.1))
+}
+
+# What was the fastest before sub-environments began their episodes by themselves. A step that only
+# resets is none of the game's.
+steps_by_hand <- function(setup, task) {
+  n <- 1024L
+  env <- gym_make(task$env_id, num_envs = n, vectorization_mode = "sync", client = setup$client)
+  play <- function() {
+    env$reset(seed = 1)
+    ended <- logical(n)
+    steps <- 0
+    for (i in seq_len(50L)) {
+      steps <- steps + sum(!ended)
+      ended <- env$step(sample.int(task$outputs, n, replace = TRUE) - 1L)$done
+    }
+    steps
+  }
+  paired("env_rollouts", task, rollout_names[["by_hand"]], "env$step(random actions), sync",
+         function() rate_of(play))
+}
+
+# An iteration of a search: 16 candidates, 2 episodes each. Short, so a turn has several.
+candidate_contenders <- function(setup, task, candidates = 16L, episodes = 2L, iterations = 10L) {
+  numbers <- lapply(seq_len(candidates), function(seed) task_numbers(task, seed))
+  weights <- do.call(rbind, lapply(numbers, function(one) coef(task_policy(task, one))))
+  policies <- policy_candidates(task_policy(task), weights)
+  loop <- python_loop(setup$python, task, numbers)
+  called <- sprintf("%d candidates, %d episodes each", candidates, episodes)
+  play <- function() {
+    sum(vapply(seq_len(iterations), function(iteration) {
+      played <- rollout(task$env_id, policies, episodes, seed = iteration, client = setup$client)
+      sum(played$episodes$length)
+    }, 0))
+  }
+  list(
+    paired("candidates", task, rollout_names[["gym"]], called, function() rate_of(play)),
+    # The same steps again and again: the rate of several iterations is that of one.
+    paired("candidates", task, rollout_names[["python"]], called, function() {
+      mean(replicate(iterations, loop(episodes)))
+    })
+  )
+}
+
+# More worker processes than cores are to cost little.
+worker_contenders <- function(setup, task, episodes, num_envs = 128L) {
+  policy <- task_policy(task)
+  lapply(c(2L, 4L), function(num_workers) {
+    env <- gym_make(
+      task$env_id, num_envs = num_envs, num_workers = num_workers, client = setup$client
+    )
+    play <- function() sum(rollout(env, policy, episodes, seed = 1)$episodes$length)
+    paired("workers", task, sprintf(rollout_names[["workers"]], num_workers),
+           sprintf("%d sub-environments, %d episodes", num_envs, episodes),
+           function() rate_of(play))
+  })
+}

@@ -1,0 +1,213 @@
+# Microseconds of a step of CartPole through env$step(), and of a handle of curl that exchanges the
+# same bytes and knows nothing of environments: what R's own calls add.
+
+wire_names <- c(
+  gym = "gym, env$step()", parsed = "bare handle, parsed and checked", bare = "bare handle",
+  isolated = "gym, env$step(), isolated"
+)
+
+compare_steps <- function(python, turns, steps) {
+  client <- gym_server_start(python = python)
+  isolated <- gym_server_start(python = python, isolate = "all")
+  recorder <- start_recorder(python, client)
+  on.exit({
+    end_worker(recorder)
+    gym_server_stop(client)
+    gym_server_stop(isolated)
+  })
+  contenders <- c(
+    single_step_contenders(client, isolated, recorder),
+    unlist(lapply(c(32L, 1024L, 8192L), function(num_envs) {
+      vector_step_contenders(client, recorder, num_envs)
+    }), recursive = FALSE)
+  )
+  for (contender in contenders) contender$play(steps)
+  do.call(rbind, lapply(seq_len(turns), function(turn) {
+    if (turn %% 10L == 1L) progress("steps one by one, turn ", turn, " of ", turns)
+    order <- if (turn %% 2L) contenders else rev(contenders)
+    do.call(rbind, lapply(order, function(one) {
+      measured("wire", one$num_envs, one$name, one$called, turn, one$play(steps), "microseconds")
+    }))
+  }))
+}
+
+single_step_contenders <- function(client, isolated, recorder) {
+  env <- gym_make("CartPole-v1", seed = 1, client = client)
+  apart <- gym_make("CartPole-v1", seed = 1, client = isolated)
+  bare <- bare_step(client, recorder, NULL)
+  called <- "env$step(a)"
+  list(
+    step_contender(0, "gym", called, play_env_steps(env, 1L)),
+    step_contender(0, "isolated", called, play_env_steps(apart, 1L)),
+    step_contender(0, "parsed", "curl_fetch_memory(), parse_json()", function(steps) {
+      play_bare_steps(bare, steps, read_step)
+    }),
+    step_contender(0, "bare", "curl_fetch_memory()", function(steps) {
+      play_bare_steps(bare, steps, check_status)
+    })
+  )
+}
+
+vector_step_contenders <- function(client, recorder, num_envs) {
+  env <- gym_make("CartPole-v1", num_envs = num_envs, seed = 1, client = client)
+  bare <- bare_step(client, recorder, num_envs)
+  list(
+    step_contender(num_envs, "gym", paste("env$step(a),", env$vectorization_mode),
+                   play_env_steps(env, num_envs)),
+    step_contender(num_envs, "bare", "curl_fetch_memory()", function(steps) {
+      play_bare_steps(bare, steps, check_status)
+    })
+  )
+}
+
+step_contender <- function(num_envs, name, called, play) {
+  list(num_envs = num_envs, name = wire_names[[name]], called = called, play = play)
+}
+
+# The clock -----------------------------------------------------------------------
+
+# From a reset on no pole falls for so many steps with alternating actions. What resets costs is
+# not counted.
+steps_to_reset <- 8L
+
+# Microseconds that a step takes; `prepare()` is not timed, `step(i)` takes the ith step after it.
+time_steps <- function(steps, prepare, step) {
+  took <- 0
+  blocks <- ceiling(steps / steps_to_reset)
+  for (block in seq_len(blocks)) {
+    prepare()
+    started <- Sys.time()
+    for (i in seq_len(steps_to_reset)) step(i)
+    took <- took + as.numeric(Sys.time() - started, units = "secs")
+  }
+  1e6 * took / (blocks * steps_to_reset)
+}
+
+play_env_steps <- function(env, num_envs) {
+  actions <- alternating(num_envs)
+  env$reset(seed = 1)
+  function(steps) {
+    time_steps(steps, function() env$reset(seed = 1), function(i) env$step(actions[[1L + i %% 2L]]))
+  }
+}
+
+# The bare handle -------------------------------------------------------------------
+
+start_recorder <- function(python, client) {
+  port <- sub(".*:([0-9]+).*", "\\1", client$remote_base)
+  start_worker(python, c("tools/bench/recorder.py", port))
+}
+
+# An environment that a client has made and stepped by way of the recorder, with both actions, and
+# what it takes to send such steps to the server itself.
+bare_step <- function(client, recorder, num_envs) {
+  by_way <- create_GymClient(sprintf("http://127.0.0.1:%d", ask(recorder, "port")))
+  env <- gym_make("CartPole-v1", num_envs = num_envs, seed = 1, client = by_way)
+  env$reset(seed = 1)
+  requests <- lapply(alternating(max(num_envs, 1L)), function(actions) {
+    env$step(actions)
+    ask(recorder, "last")
+  })
+  path <- sub("^POST (\\S+) .*", "\\1", requests[[1L]]$head)
+  bare <- new.env()
+  bare$env <- env
+  bare$url <- paste0(client$remote_base, path)
+  bare$templates <- lapply(requests, function(one) body_template(jsonlite::base64_dec(one$body)))
+  bare$number <- 1e5
+  bare$size <- -1
+  bare$handle <- curl::new_handle(
+    post = TRUE, buffersize = 2^18, readfunction = function(nbytes, ...) next_chunk(bare, nbytes)
+  )
+  curl::handle_setheaders(bare$handle, .list = recorded_headers(requests[[1L]]$head))
+  bare
+}
+
+# Setting a body on a handle takes as long as half a request, so curl asks for it and only its size
+# is set, where it changes.
+exchange <- function(bare, body) {
+  if (length(body) != bare$size) {
+    bare$size <- length(body)
+    curl::handle_setopt(bare$handle, postfieldsize_large = bare$size)
+  }
+  bare$body <- body
+  bare$sent <- 0
+  curl::curl_fetch_memory(bare$url, bare$handle)
+}
+
+next_chunk <- function(bare, nbytes) {
+  if (bare$sent == 0 && length(bare$body) <= nbytes) {
+    bare$sent <- length(bare$body)
+    return(bare$body)
+  }
+  chunk <- bare$body[bare$sent + seq_len(min(nbytes, length(bare$body) - bare$sent))]
+  bare$sent <- bare$sent + length(chunk)
+  chunk
+}
+
+# Those that curl does not write by itself.
+recorded_headers <- function(head) {
+  lines <- strsplit(trimws(head), "\r\n", fixed = TRUE)[[1L]][-1L]
+  headers <- stats::setNames(as.list(sub("^[^:]*: *", "", lines)), sub(":.*", "", lines))
+  own <- c("host", "content-length", "expect")
+  c(headers[!tolower(names(headers)) %in% own], Expect = "")
+}
+
+# A body in parts: the JSON text that has the idempotency key, with a key of the bench's own, and
+# for safetensors the bytes of the tensors after it.
+body_template <- function(body) {
+  tensors <- body[[1L]] != charToRaw("{")
+  header <- if (tensors) readBin(body, "integer", 1L, endian = "little") else length(body)
+  before <- if (tensors) 8L else 0L
+  text <- rawToChar(body[before + seq_len(header)])
+  key <- regmatches(text, regexec("key\\\\*\":\\\\*\"([0-9a-f]+)", text))[[1L]][2L]
+  digits <- strsplit(key, "")[[1L]]
+  list(
+    text = sub(key, paste(rev(digits), collapse = ""), text, fixed = TRUE), tensors = tensors,
+    size = nchar(text), data = body[-seq_len(before + header)]
+  )
+}
+
+# The body with an idempotency key's number, as long as the recorded one where it ends in blanks.
+numbered_body <- function(template, number) {
+  text <- sub("(number\\\\*\":)[0-9]+", sprintf("\\1%.0f", number), template$text)
+  text <- sprintf("%-*s", template$size, sub(" +$", "", text))
+  size <- if (template$tensors) writeBin(c(nchar(text), 0L), raw(), endian = "little")
+  c(size, charToRaw(text), template$data)
+}
+
+# The bodies are made beforehand.
+play_bare_steps <- function(bare, steps, read) {
+  bodies <- NULL
+  time_steps(
+    steps,
+    function() {
+      bare$env$reset(seed = 1)
+      bodies <<- lapply(seq_len(steps_to_reset), function(i) {
+        numbered_body(bare$templates[[1L + i %% 2L]], bare$number + i)
+      })
+      bare$number <- bare$number + steps_to_reset
+    },
+    function(i) read(exchange(bare, bodies[[i]]))
+  )
+}
+
+check_status <- function(response) {
+  if (response$status_code != 200L) {
+    stop("The server refused the bare handle's step: ", rawToChar(response$content))
+  }
+}
+
+# What a careful client of a few lines does with the answer.
+read_step <- function(response) {
+  check_status(response)
+  answer <- jsonlite::parse_json(rawToChar(response$content))
+  observation <- as.numeric(unlist(answer$observation))
+  stopifnot(
+    length(observation) == 4L, is.numeric(answer$reward), is.logical(answer$terminated),
+    is.logical(answer$truncated), is.list(answer$info)
+  )
+  list(
+    observation = observation, reward = answer$reward,
+    done = answer$terminated || answer$truncated, info = answer$info
+  )
+}
