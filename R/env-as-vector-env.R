@@ -265,8 +265,10 @@ step_chooser <- function(env) {
   }
 }
 
+# Some rows of what a step returned.
 rows_of_step <- function(env, out, row) {
   space <- env$single_observation_space
+  # The two are nearly always the same, which identical() sees at once.
   same <- identical(out$observation, out$next_observation)
   observation <- batch_rows(space, out$observation, row)
   list(
@@ -287,15 +289,7 @@ joint_sub_envs <- function(env) {
     if (length(which) == n) {
       return(out)
     }
-    # The two are nearly always the same, which identical() sees at once.
-    same <- identical(out$observation, out$next_observation)
-    observation <- batch_rows(observed, out$observation, which)
-    after <- if (same) observation else batch_rows(observed, out$next_observation, which)
-    list(
-      observation = observation, reward = out$reward[which],
-      terminated = out$terminated[which], truncated = out$truncated[which],
-      next_observation = after
-    )
+    rows_of_step(env, out, which)
   }
   list(
     observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,

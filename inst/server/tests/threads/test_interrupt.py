@@ -26,13 +26,14 @@ def in_thread():
     return in_thread
 
 
-def test_an_interrupt_ends_a_loop(in_thread):
-    def play(waits):
-        waits()
-        while True:
-            pass
+def loop(waits):
+    waits()
+    while True:
+        pass
 
-    thread, came = in_thread(play)
+
+def test_an_interrupt_ends_a_loop(in_thread):
+    thread, came = in_thread(loop)
     interrupt(thread.ident)
     thread.join(10)
     assert came == [SystemExit]
@@ -61,9 +62,7 @@ def test_what_nobody_interrupted_goes_on_and_an_interrupt_ends_it_later(in_threa
     def play(waits):
         with interrupted_by(lambda: broken_off.append(1)):
             pass
-        waits()
-        while True:
-            pass
+        loop(waits)
 
     thread, came = in_thread(play)
     interrupt(thread.ident)
