@@ -8,11 +8,14 @@ https://gymnasium.farama.org/api/vector/ describes it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from gym_server.vector_envs.group import Info
+
+# The values of one key, by the sub-environments that have it.
+Values = dict[int, object]
 
 
 def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: int) -> dict:
@@ -23,51 +26,65 @@ def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: 
         final: the last observations of episodes that ended, by sub-environment.
         num_envs: how many sub-environments there are.
     """
-    gathered: dict[str, Any] = {}
+    by_key: dict[str, Values] = {}
     for row, info in enumerate(infos):
-        if row in final:
-            _enter_object(gathered, "final_obs", final[row], row, num_envs)
         if info is not None:
             if info.final is not None:
-                _enter(gathered, {"final_info": info.final}, row, num_envs)
-            _enter(gathered, info.info, row, num_envs)
-    return gathered
+                by_key.setdefault("final_info", {})[row] = info.final
+            for key, value in info.info.items():
+                by_key.setdefault(key, {})[row] = value
+    return {**_objects("final_obs", final, num_envs), **_arrays(by_key, num_envs)}
 
 
 def final_only(final: Mapping[int, object], num_envs: int) -> dict:
     """Return an info that holds the last observations and nothing else."""
-    return gather([None] * num_envs, final, num_envs) if final else {}
+    return _objects("final_obs", final, num_envs)
 
 
-def _enter(gathered: dict[str, Any], info: dict, row: int, num_envs: int) -> None:
-    for key, value in info.items():
-        if isinstance(value, dict):
-            _enter(gathered.setdefault(key, {}), value, row, num_envs)
-            _mark(gathered, key, row, num_envs)
-        elif key in gathered:
-            gathered[key][row] = value
-            _mark(gathered, key, row, num_envs)
-        elif type(value) in (int, float, bool) or isinstance(value, np.number):
-            gathered[key] = np.zeros(num_envs, dtype=type(value))
-            gathered[key][row] = value
-            _mark(gathered, key, row, num_envs)
-        elif isinstance(value, np.ndarray):
-            gathered[key] = np.zeros((num_envs, *value.shape), dtype=value.dtype)
-            gathered[key][row] = value
-            _mark(gathered, key, row, num_envs)
+def _arrays(by_key: Mapping[str, Values], num_envs: int) -> dict:
+    gathered: dict[str, Any] = {}
+    for key, values in by_key.items():
+        if all(isinstance(value, dict) for value in values.values()):
+            members: dict[str, Values] = {}
+            for row, value in values.items():
+                for name, member in cast(dict, value).items():
+                    members.setdefault(name, {})[row] = member
+            gathered[key] = _arrays(members, num_envs)
+            gathered[f"_{key}"] = _mask(values, num_envs)
         else:
-            _enter_object(gathered, key, value, row, num_envs)
+            gathered.update(_numbers(key, values, num_envs) or _objects(key, values, num_envs))
+    return gathered
 
 
-def _enter_object(gathered: dict, key: str, value: object, row: int, num_envs: int) -> None:
-    if key not in gathered:
-        gathered[key] = np.full(num_envs, None, dtype=object)
-    gathered[key][row] = value
-    _mark(gathered, key, row, num_envs)
+def _numbers(key: str, values: Values, num_envs: int) -> dict | None:
+    """Return an array of a type that holds all of them; None where there is no such type."""
+    if not all(_is_number(value) or isinstance(value, np.ndarray) for value in values.values()):
+        return None
+    rows = {row: np.asarray(value) for row, value in values.items()}
+    dtypes = {row.dtype for row in rows.values()}
+    shapes = {row.shape for row in rows.values()}
+    if len(shapes) > 1 or (len(dtypes) > 1 and any(dtype.kind not in "biufc" for dtype in dtypes)):
+        return None
+    array = np.zeros((num_envs, *shapes.pop()), dtype=np.result_type(*dtypes))
+    for place, row in rows.items():
+        array[place] = row
+    return {key: array, f"_{key}": _mask(values, num_envs)}
 
 
-def _mark(gathered: dict, key: str, row: int, num_envs: int) -> None:
-    mask = f"_{key}"
-    if mask not in gathered:
-        gathered[mask] = np.zeros(num_envs, dtype=bool)
-    gathered[mask][row] = True
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float, bool) or isinstance(value, np.number)
+
+
+def _objects(key: str, values: Mapping[int, object], num_envs: int) -> dict:
+    if not values:
+        return {}
+    array = np.full(num_envs, None, dtype=object)
+    for row, value in values.items():
+        array[row] = value
+    return {key: array, f"_{key}": _mask(values, num_envs)}
+
+
+def _mask(values: Mapping[int, object], num_envs: int) -> np.ndarray:
+    mask = np.zeros(num_envs, dtype=bool)
+    mask[list(values)] = True
+    return mask
