@@ -118,9 +118,9 @@ ask_instance <- function(client, instance_id, call) {
   )
   instance$draws <- !is.null(answer$render_mode)
   instance$done <- FALSE
-  # One for each form of the call, made when it is first called so.
-  instance$reset_lines <- vector("list", 4L)
-  instance$step_lines <- vector("list", 16L)
+  # One for each combination of a call's flags, made when it is first called so.
+  instance$prepared_resets <- vector("list", 4L)
+  instance$prepared_steps <- vector("list", 16L)
   instance
 }
 

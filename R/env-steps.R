@@ -1,5 +1,5 @@
-# Steps and resets. What an instance's calls have in common is bound once, in a line for each form
-# of the call, see new_line().
+# Steps and resets. What an instance's calls have in common is bound once, in a prepared call for
+# each combination of their flags, see prepare_call().
 
 #' Start an episode
 #' @param named Whether observations are to carry their names: those of the classic calls do not.
@@ -16,18 +16,19 @@ reset_instance <- function(client, instance, seed, options, return_info = FALSE,
   if (instance$classic) {
     check_classic_fields(client, fields, NULL, call)
   }
+  # A place for each combination of the flags.
   slot <- 1L + named + 2L * infos
-  line <- instance$reset_lines[[slot]]
-  if (is.null(line)) {
-    line <- reset_line(client, instance, named, infos)
-    instance$reset_lines[[slot]] <- line
+  prepared <- instance$prepared_resets[[slot]]
+  if (is.null(prepared)) {
+    prepared <- prepare_reset(client, instance, named, infos)
+    instance$prepared_resets[[slot]] <- prepared
   }
-  result <- call_line(client, line, json_members(fields), call)
+  result <- call_prepared(client, prepared, json_members(fields), call)
   instance$done <- FALSE
   if (return_info) result else result$observation
 }
 
-reset_line <- function(client, instance, named, infos) {
+prepare_reset <- function(client, instance, named, infos) {
   read_answer <- function(answer) {
     check_answer_info(answer)
     list(
@@ -45,7 +46,7 @@ reset_line <- function(client, instance, named, infos) {
     observation <- tensors_observation(instance, instance$observations, tensors, named)
     list(observation = observation, info = empty_object)
   }
-  instance_line(
+  prepare_instance_call(
     client, instance, instance$reset_route, FALSE, bare_fields(instance, infos), named,
     read_answer, read_quickly, finish
   )
@@ -59,13 +60,14 @@ reset_line <- function(client, instance, named, infos) {
 step_instance <- function(client, instance, action, render, which = NULL, named = FALSE,
                           infos = TRUE, finals = TRUE, call = rlang::caller_env()) {
   slot <- 1L + named + 2L * infos + 4L * render + 8L * finals
-  line <- instance$step_lines[[slot]]
-  if (is.null(line) || !identical(line$which, which)) {
+  prepared <- instance$prepared_steps[[slot]]
+  if (is.null(prepared) || !identical(prepared$which, which)) {
     check_which(which, instance, call)
-    line <- step_line(client, instance, render, which, named, infos, finals)
-    instance$step_lines[[slot]] <- line
+    prepared <- prepare_step(client, instance, render, which, named, infos, finals)
+    instance$prepared_steps[[slot]] <- prepared
   }
-  result <- call_line(client, line, line$write(action) %||% line$check(action, call), call)
+  content <- prepared$write(action) %||% prepared$check(action, call)
+  result <- call_prepared(client, prepared, content, call)
   if (is.null(instance$num_envs)) {
     if (isTRUE(instance$done)) {
       warn_step_after_done(instance, call)
@@ -76,22 +78,22 @@ step_instance <- function(client, instance, action, render, which = NULL, named 
   result
 }
 
-step_line <- function(client, instance, render, which, named, infos, finals) {
+prepare_step <- function(client, instance, render, which, named, infos, finals) {
   fields <- c(
     render = if (render) "true" else "false", bare_fields(instance, infos),
     final_obs = if (!finals && !instance$classic) "false"
   )
   n <- instance$num_envs
-  line <- if (is.null(n)) {
-    single_step_line(client, instance, fields, named)
+  prepared <- if (is.null(n)) {
+    prepare_single_step(client, instance, fields, named)
   } else {
     some <- length(which) && length(which) < n
     if (some) fields <- c(fields, step_mask = json_array(json_atoms(seq_len(n) %in% which)))
     stepping <- if (some) length(which) else n
-    vector_step_line(client, instance, fields, stepping, which, named, infos)
+    prepare_vector_step(client, instance, fields, stepping, which, named, infos)
   }
-  line$which <- which
-  line
+  prepared$which <- which
+  prepared
 }
 
 # The field by which a server is told to make no infos. Classic servers do not know it.
@@ -101,27 +103,28 @@ bare_fields <- function(instance, infos) {
 
 #' Prepare the calls of one of an instance's routes
 #' @param read_quickly Does what `read_answer` does for answers as they nearly always are; it may
-#'   return `NULL`, or fail. `finish` is as that of [tensors_line_reader()].
+#'   return `NULL`, or fail. `finish` is as that of [new_tensors_reader()].
 #' @noRd
-instance_line <- function(client, instance, route, sends, fields, named, read_answer, read_quickly,
-                          finish) {
+prepare_instance_call <- function(client, instance, route, sends, fields, named, read_answer,
+                                  read_quickly, finish) {
   read <- if (instance$takes_tensors) {
     space <- instance$single_observation_space
     labels <- if (named && inherits(space, "gym_space_box")) space$names
-    tensors_line_reader(client_state(client)$layouts, read_answer, finish, labels)
+    new_tensors_reader(client_state(client)$layouts, read_answer, finish, labels)
   } else {
-    json_line_reader(read_quickly)
+    new_json_reader(read_quickly)
   }
-  line <- new_line(client, route, sends, instance$takes_tensors || sends, fields, read, read_answer)
-  line$has_texts <- sends && has_texts(instance$single_action_space)
-  line
+  takes <- instance$takes_tensors || sends
+  prepared <- prepare_call(client, route, sends, takes, fields, read, read_answer)
+  prepared$has_texts <- sends && has_texts(instance$single_action_space)
+  prepared
 }
 
 # Steps of a single environment --------------------------------------------------------------
 
-single_step_line <- function(client, instance, fields, named) {
+prepare_single_step <- function(client, instance, fields, named) {
   space <- instance$observations
-  line <- instance_line(
+  prepared <- prepare_instance_call(
     client, instance, instance$step_route, instance$sends_tensors, fields, named,
     read_answer = function(answer) read_single_step(instance, answer, named),
     read_quickly = function(answer) read_quick_step(instance, answer, named),
@@ -132,10 +135,10 @@ single_step_line <- function(client, instance, fields, named) {
   )
   actions <- instance$actions
   general <- instance$sends_tensors || instance$classic
-  line$write <- if (general) function(action) NULL else json_writer(actions)
+  prepared$write <- if (general) function(action) NULL else json_writer(actions)
   # A classic server's error does not say that an action was wrong, so bounds are checked here.
   bounds <- instance$classic && inherits(actions, "gym_space_discrete")
-  line$check <- function(action, call) {
+  prepared$check <- function(action, call) {
     check_value(actions, action, "", call, bounds)
     if (instance$sends_tensors) {
       to_tensors(actions, action, "action", call)
@@ -143,7 +146,7 @@ single_step_line <- function(client, instance, fields, named) {
       paste0('"action":', write_value(actions, action), ",")
     }
   }
-  line
+  prepared
 }
 
 step_result <- function(observation, reward, terminated, truncated, info) {

@@ -86,20 +86,19 @@ make_sub_envs <- function(make, num_envs, num_workers, max_envs, call) {
     make_seeded(make, num_envs, traits, most_workers)
   } else if (!is.null(traits)) {
     first_supported(
-      function(n) make_seeded(make, n, traits, most_workers), counts_to_try(min(max_envs, full))
+      function(n) make_seeded(make, n, traits, if (!is.null(most_workers)) min(most_workers, n)),
+      counts_to_try(min(max_envs, full))
     )
   }
   list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
 }
 
 # Makes sub-environments with seeds of their own. What has a vector implementation uses no workers.
-# `NULL` as `most_workers` lets the server choose; no more than one for each sub-environment are
-# possible.
-make_seeded <- function(make, n, traits, most_workers = NULL) {
+# `NULL` as `num_workers` lets the server choose.
+make_seeded <- function(make, n, traits, num_workers = NULL) {
   own <- isTRUE(traits$own_implementation)
   make(
-    n, num_workers = if (!is.null(most_workers)) min(most_workers, n),
-    vectorization_mode = if (own) "sync", autoreset_mode = "SameStep"
+    n, num_workers = num_workers, vectorization_mode = if (own) "sync", autoreset_mode = "SameStep"
   )
 }
 

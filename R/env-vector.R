@@ -24,12 +24,12 @@ travels_as_tensors <- function(space, num_envs) {
 #' Prepare the steps of sub-environments
 #' @param n How many step, `which` the numbers of these.
 #' @noRd
-vector_step_line <- function(client, instance, fields, n, which, named, infos) {
+prepare_vector_step <- function(client, instance, fields, n, which, named, infos) {
   single <- instance$single_action_space
   actions <- batch_space(single, n)
   observed <- batch_space(instance$single_observation_space, n)
   read_answer <- function(answer) read_vector_step(instance, answer, observed, n, named, infos)
-  line <- instance_line(
+  prepared <- prepare_instance_call(
     client, instance, instance$step_route, instance$sends_tensors, fields, named, read_answer,
     read_quickly = read_answer,
     finish = function(tensors) {
@@ -38,12 +38,12 @@ vector_step_line <- function(client, instance, fields, n, which, named, infos) {
     }
   )
   if (instance$sends_tensors) {
-    line$write <- tensors_writer(single, n)
-    line$integers_table <- integers_table(n)
+    prepared$write <- tensors_writer(single, n)
+    prepared$integers_table <- integers_table(n)
   } else {
-    line$write <- function(action) NULL
+    prepared$write <- function(action) NULL
   }
-  line$check <- function(action, call) {
+  prepared$check <- function(action, call) {
     check_batch(single, actions, action, n, call, which)
     if (instance$sends_tensors) {
       to_tensors(actions, action, "action", call)
@@ -51,7 +51,7 @@ vector_step_line <- function(client, instance, fields, n, which, named, infos) {
       paste0('"action":', write_batch(single, action, n), ",")
     }
   }
-  line
+  prepared
 }
 
 vector_step_result <- function(observation, parts, info, next_observation = observation) {

@@ -34,15 +34,16 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
-    steps = list(), frames = list(), target = target, each = each, report = report
+    steps = list(), frames = list(), target = target, each = each, report = report,
+    vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
+    keep_next = keep_next
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
   play <- function() {
     for (first in seq(1L, n, by = together)) {
       if (first <= batch$needed) {
-        last <- min(n, first + together - 1L)
-        play_episodes(vector_env, batch, first, last, policy, max_steps, keep_steps, keep_next)
+        play_episodes(batch, first, min(n, first + together - 1L))
       }
     }
   }
@@ -65,116 +66,108 @@ naming_call <- function(code, vector_env) {
   )
 }
 
-# Plays the episodes from `first` to `last` of a batch. `game` is what stays the same, `player` what
-# changes: `rows` has an element for each sub-environment that plays (which episode of the batch,
-# its number, the return so far, and how many steps had been taken when the episode began), and
-# `observation` a row.
-play_episodes <- function(vector_env, batch, first, last, policy, max_steps, keep_steps,
-                          keep_next) {
-  game <- list(
-    vector_env = vector_env, batch = batch, last = last, policy = policy, max_steps = max_steps,
-    keep_steps = keep_steps, keep_next = keep_next
-  )
+# Plays the episodes from `first` to `last` of a batch. What changes with each step is `playing`:
+# `rows` has an element for each sub-environment that plays (which episode of the batch, its number,
+# the return so far, and how many steps had been taken when the episode began), `observation` a row;
+# `acting` is the policy for these rows, whose candidates are `candidate`.
+play_episodes <- function(batch, first, last) {
+  vector_env <- batch$vector_env
   episode <- seq.int(first, min(last, batch$needed, first + vector_env$num_envs - 1L))
-  observation <- begin_episodes(vector_env, batch, episode, last)
-  ask_beforehand(policy, batch, episode, observation, vector_env)
-  rows <- list(episode = episode, sub_env = batch$sub_env[episode],
-               return = numeric(length(episode)), began = integer(length(episode)))
-  player <- new_player(game, rows, observation)
-  step <- if (keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
-  while (length(player$rows$episode)) {
-    n <- length(player$rows$episode)
-    player$action <- act_batch(player$acting, player$observation, n, vector_env)
-    out <- step(player$action, player$rows$sub_env)
-    end_step(game, player, out)
-  }
-}
-
-new_player <- function(game, rows, observation) {
-  candidate <- game$batch$candidate[rows$episode]
-  rlang::env(
-    rows = rows, observation = observation, taken = 0L, action = NULL,
-    candidate = candidate, acting = policy_rows(game$policy, candidate)
+  observation <- begin_episodes(batch, episode, last)
+  ask_beforehand(batch, episode, observation)
+  candidate <- batch$candidate[episode]
+  playing <- rlang::env(
+    last = last, taken = 0L, observation = observation,
+    rows = list(episode = episode, sub_env = batch$sub_env[episode],
+                return = numeric(length(episode)), began = integer(length(episode))),
+    candidate = candidate, acting = policy_rows(batch$policy, candidate)
   )
+  step <- if (batch$keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
+  while (length(playing$rows$episode)) {
+    n <- length(playing$rows$episode)
+    action <- act_batch(playing$acting, playing$observation, n, vector_env)
+    out <- step(action, playing$rows$sub_env)
+    end_step(batch, playing, action, out)
+  }
 }
 
 #' Note what came of a step, and begin the next episodes where some have ended
 #' @param out As a step of [as_vector_env()] returns it.
 #' @noRd
-end_step <- function(game, player, out) {
-  batch <- game$batch
-  rows <- player$rows
-  player$taken <- player$taken + 1L
-  keep_frame(batch, game$vector_env, rows$episode)
-  player$rows$return <- rows$return + out$reward
-  if (game$keep_steps) {
+end_step <- function(batch, playing, action, out) {
+  rows <- playing$rows
+  playing$taken <- playing$taken + 1L
+  keep_frame(batch, rows$episode)
+  playing$rows$return <- rows$return + out$reward
+  if (batch$keep_steps) {
     batch$steps[[length(batch$steps) + 1L]] <- list(
-      at = rows$episode, observation = player$observation, action = player$action,
+      at = rows$episode, observation = playing$observation, action = action,
       reward = out$reward, terminated = out$terminated, truncated = out$truncated,
-      next_observation = if (game$keep_next) out$next_observation
+      next_observation = if (batch$keep_next) out$next_observation
     )
   }
-  player$observation <- out$observation
+  playing$observation <- out$observation
   ended <- out$terminated | out$truncated
   # Where an episode is cut short the environment begins no other by itself.
-  waiting <- if (isTRUE(game$vector_env$begins_next)) !ended else TRUE
-  if (game$max_steps < Inf) {
-    ended <- ended | player$taken - rows$began >= game$max_steps
+  waiting <- if (isTRUE(batch$vector_env$begins_next)) !ended else TRUE
+  if (batch$max_steps < Inf) {
+    ended <- ended | playing$taken - rows$began >= batch$max_steps
   }
   if (any(ended)) {
-    length <- (player$taken - rows$began)[ended]
-    end_episodes(batch, rows$episode[ended], player$rows$return[ended], length,
+    length <- (playing$taken - rows$began)[ended]
+    end_episodes(batch, rows$episode[ended], playing$rows$return[ended], length,
                  lapply(out[flags], `[`, ended))
-    begin_next_episodes(game, player, ended, ended & waiting)
+    begin_next_episodes(batch, playing, ended, ended & waiting)
   }
 }
 
 # `waiting` are those that have `ended` and that the environment does not begin by itself.
-begin_next_episodes <- function(game, player, ended, waiting) {
-  vector_env <- game$vector_env
-  batch <- game$batch
-  rows <- player$rows
+begin_next_episodes <- function(batch, playing, ended, waiting) {
+  vector_env <- batch$vector_env
+  rows <- playing$rows
   rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
   rows$return[ended] <- 0
-  rows$began[ended] <- player$taken
-  going <- which(rows$episode <= min(game$last, batch$needed))
+  rows$began[ended] <- playing$taken
+  going <- which(rows$episode <= min(playing$last, batch$needed))
   if (length(going) < length(ended)) {
     rows <- lapply(rows, `[`, going)
     waiting <- waiting[going]
-    player$observation <- batch_rows(vector_env$observation_space, player$observation, going)
+    playing$observation <- batch_rows(vector_env$observation_space, playing$observation, going)
   }
-  player$rows <- rows
+  playing$rows <- rows
   if (!length(going)) {
     return(invisible())
   }
   if (any(waiting)) {
-    player$observation <- begin_waiting(game, rows, player$observation, which(waiting))
+    playing$observation <- begin_waiting(batch, playing, which(waiting))
   }
-  begun <- which(rows$began == player$taken)
-  ask_beforehand(game$policy, batch, rows$episode, player$observation, vector_env, begun)
+  begun <- which(rows$began == playing$taken)
+  ask_beforehand(batch, rows$episode, playing$observation, begun)
   candidate <- batch$candidate[rows$episode]
-  if (!identical(candidate, player$candidate)) {
-    player$candidate <- candidate
-    player$acting <- policy_rows(game$policy, candidate)
+  if (!identical(candidate, playing$candidate)) {
+    playing$candidate <- candidate
+    playing$acting <- policy_rows(batch$policy, candidate)
   }
 }
 
 # Puts the first observations of the episodes that the environment does not begin by itself in the
 # place of the last observations of those before.
-begin_waiting <- function(game, rows, observation, waiting) {
-  begun <- begin_episodes(game$vector_env, game$batch, rows$episode[waiting], game$last)
-  n <- length(rows$episode)
+begin_waiting <- function(batch, playing, waiting) {
+  episode <- playing$rows$episode
+  begun <- begin_episodes(batch, episode[waiting], playing$last)
+  n <- length(episode)
   if (length(waiting) == n) {
     begun
   } else {
-    replace_rows(game$vector_env$observation_space, observation, n, waiting, begun)
+    replace_rows(batch$vector_env$observation_space, playing$observation, n, waiting, begun)
   }
 }
 
 # Resets the sub-environments of the episodes that begin. Where all must be reset together, those
 # that play none are left out of what it returns. One that begins its next episodes by itself gets
 # the seeds of all of them, up to the episode `last`.
-begin_episodes <- function(vector_env, batch, episode, last) {
+begin_episodes <- function(batch, episode, last) {
+  vector_env <- batch$vector_env
   sub_envs <- batch$sub_env[episode]
   observation <- if (vector_env$one_seed) {
     of_all <- vector_env$reset(batch$seed[[episode[[1L]]]])
@@ -188,13 +181,14 @@ begin_episodes <- function(vector_env, batch, episode, last) {
   } else {
     vector_env$reset(batch$seed[episode], sub_envs)
   }
-  keep_frame(batch, vector_env, episode)
+  keep_frame(batch, episode)
   observation
 }
 
 # A function is asked about a single episode before it plays several of them side by side.
-ask_beforehand <- function(policy, batch, episode, observation, vector_env,
-                           begun = seq_along(episode)) {
+ask_beforehand <- function(batch, episode, observation, begun = seq_along(episode)) {
+  policy <- batch$policy
+  vector_env <- batch$vector_env
   if (vector_env$num_envs == 1L || !(is.function(policy) || inherits(policy, "gym_policy_list"))) {
     return(invisible())
   }
@@ -209,10 +203,11 @@ ask_beforehand <- function(policy, batch, episode, observation, vector_env,
 }
 
 # Frames are kept where there is one sub-environment, which plays one episode after the other.
-keep_frame <- function(batch, vector_env, playing) {
-  if (!is.null(vector_env$frame)) {
-    frames <- if (length(batch$frames) >= playing) batch$frames[[playing]]
-    batch$frames[[playing]] <- c(frames, list(vector_env$frame()))
+keep_frame <- function(batch, episode) {
+  frame <- batch$vector_env$frame
+  if (!is.null(frame)) {
+    frames <- if (length(batch$frames) >= episode) batch$frames[[episode]]
+    batch$frames[[episode]] <- c(frames, list(frame()))
   }
 }
 

@@ -60,7 +60,7 @@ check_same_search <- function(path, there, here, call) {
     lines <- vapply(differ, function(name) {
       texts <- c(argument_text(name, there[[name]]), argument_text(name, here[[name]]))
       if (texts[[1L]] == texts[[2L]]) {
-        paste0("`", name, "` is another there, or was written down by an earlier version.")
+        paste0("`", name, "` is another there.")
       } else {
         paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
       }

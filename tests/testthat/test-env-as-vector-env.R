@@ -84,3 +84,41 @@ test_that("another class of environments is played by its own method", {
   expect_identical(played$episodes$sub_env, c(1:2, 1:2, 1L))
   expect_identical(played$env_id, "Counter")
 })
+
+test_that("those that play are stepped with those before, until fewer than half of these play", {
+  env <- list(num_envs = 8L, single_action_space = space_discrete(100))
+  choose <- step_chooser(env)
+  asked <- choose(11:18, 1:8)
+  expect_identical(asked, list(action = 11:18, which = NULL, n = 8L, row = NULL))
+  playing <- c(1L, 2L, 4L, 6L, 8L)
+  asked <- choose(playing, playing)
+  expect_null(asked$which)
+  expect_identical(asked$n, 8L)
+  expect_identical(asked$row, playing)
+  expect_identical(asked$action[playing], playing)
+  expect_length(asked$action, 8L)
+  asked <- choose(31:34, c(1L, 2L, 6L, 8L))
+  expect_identical(asked, list(action = 31:34, which = c(1L, 2L, 6L, 8L), n = 4L, row = NULL))
+  asked <- choose(41:43, c(2L, 6L, 8L))
+  expect_identical(asked$which, c(1L, 2L, 6L, 8L))
+  expect_identical(asked$row, 2:4)
+  expect_identical(asked$action[2:4], 41:43)
+  expect_identical(choose(5L, 8L), list(action = 5L, which = 8L, n = 1L, row = NULL))
+  # One that was left out is back.
+  expect_identical(choose(6:7, c(3L, 8L))$which, c(3L, 8L))
+})
+
+test_that("rows of a step are taken of all that it returned", {
+  env <- list(single_observation_space = box_space(rep(0, 2), rep(9, 2)))
+  observation <- matrix(1:6 + 0, 3)
+  out <- list(observation = observation, reward = c(0.1, 0.2, 0.3),
+              terminated = c(FALSE, TRUE, FALSE), truncated = c(TRUE, FALSE, FALSE),
+              next_observation = observation + 10)
+  expect_identical(
+    rows_of_step(env, out, 2:3),
+    list(observation = observation[2:3, ], reward = c(0.2, 0.3), terminated = c(TRUE, FALSE),
+         truncated = c(FALSE, FALSE), next_observation = observation[2:3, ] + 10)
+  )
+  out$next_observation <- observation
+  expect_identical(rows_of_step(env, out, 1)$next_observation, observation[1, , drop = FALSE])
+})

@@ -35,14 +35,14 @@ test_that("an action in another form than the last one is checked and sent", {
 })
 
 test_that("a header is prepared for numbers of any length", {
-  line <- new.env()
-  line$has_texts <- FALSE
-  line$fields <- c(render = "false")
+  prepared <- new.env()
+  prepared$has_texts <- FALSE
+  prepared$fields <- c(render = "false")
   for (n in c(3L, join_as_integers)) {
-    line$integers_table <- integers_table(n)
+    prepared$integers_table <- integers_table(n)
     integers <- rep_len(0:2, n)
     for (number in c(1, 9, 10, 99999, 1e15)) {
-      file <- read_tensors(line_tensors(line, integers, "key", number))
+      file <- read_tensors(prepared_tensors(prepared, integers, "key", number))
       expect_identical(file$tensors$action, integers)
       expect_identical(file$metadata$request, sprintf('{"key":"key","number":%.0f}', number))
     }

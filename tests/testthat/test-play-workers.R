@@ -133,3 +133,29 @@ test_that("no more workers are asked for than there are sub-environments", {
   expect_identical(play(1, num_workers = 2)$episodes, play(1)$episodes)
   expect_identical(play(3, num_workers = 5)$episodes, play(3)$episodes)
 })
+
+test_that("more workers than the sub-environments asked for are the server's error", {
+  cnd <- expect_error(
+    rollout("FrozenLake-v1", policy_random(), 40, num_envs = 2, num_workers = 3,
+            client = test_client()),
+    class = "gym_error_http_400"
+  )
+  expect_match(conditionMessage(cnd), "num_workers")
+})
+
+test_that("a landscape is the same for any number of workers", {
+  client <- test_client()
+  search <- search_random("Acrobot-v1", policy_network(c(6, 3)), rounds = 2, episodes = 2,
+                          max_steps = 20, seed = 1, client = client)
+  make <- gym:::make_seeded
+  play <- function(num_workers) {
+    made <- list()
+    local_functions(make_seeded = function(...) {
+      made[[1L]] <<- make(..., num_workers = num_workers)
+    })
+    landscape <- search_landscape(search, size = 3, episodes = 4, seed = 1, client = client)
+    expect_identical(made[[1L]]$num_workers, num_workers)
+    landscape$grid
+  }
+  expect_identical(play(2L), play(0L))
+})

@@ -12,27 +12,27 @@
 #'   result, or `NULL` where the response is unusual. It may fail, and changes nothing.
 #' @param read_answer A function of a parsed answer, which returns the result or says what is wrong.
 #' @noRd
-new_line <- function(client, route, sends, takes, fields, read, read_answer) {
-  line <- new.env(parent = emptyenv())
-  line$route <- route
-  line$url <- paste0(client$remote_base, route)
-  line$sends <- sends
-  line$takes <- takes
-  line$kind <- handle_kind(character(), if (sends) list(), takes)
-  line$fields <- fields
-  line$read <- read
-  line$read_answer <- read_answer
-  line
+prepare_call <- function(client, route, sends, takes, fields, read, read_answer) {
+  prepared <- new.env(parent = emptyenv())
+  prepared$route <- route
+  prepared$url <- paste0(client$remote_base, route)
+  prepared$sends <- sends
+  prepared$takes <- takes
+  prepared$kind <- handle_kind(character(), if (sends) list(), takes)
+  prepared$fields <- fields
+  prepared$read <- read
+  prepared$read_answer <- read_answer
+  prepared
 }
 
 #' Make a call
 #'
-#' @param line From [new_line()].
+#' @param prepared From [prepare_call()].
 #' @param content What is sent: the members of a JSON object, each with a comma after it; or, where
 #'   tensors are sent, a list as [to_tensors()] returns it, or integers, the tensor "action".
-#' @return What the line's functions return.
+#' @return What the functions of the prepared call return.
 #' @noRd
-call_line <- function(client, line, content, call) {
+call_prepared <- function(client, prepared, content, call) {
   force(content)
   state <- client_state(client)
   connection <- state$connection
@@ -41,15 +41,16 @@ call_line <- function(client, line, content, call) {
   }
   connection$busy <- TRUE
   on.exit(connection$busy <- FALSE)
-  handle <- connection$handles[[line$kind]] %||% handle_of_kind(client, connection, line$kind)
+  kind <- prepared$kind
+  handle <- connection$handles[[kind]] %||% handle_of_kind(client, connection, kind)
   keys <- connection$keys
   number <- keys$number + 1
   keys$number <- number
   key <- keys$key
-  bytes <- if (line$sends) {
-    line_tensors(line, content, key, number)
+  bytes <- if (prepared$sends) {
+    prepared_tensors(prepared, content, key, number)
   } else {
-    line_json(line, content, key, number)
+    prepared_json(prepared, content, key, number)
   }
   connection$body <- bytes
   if (length(bytes) != handle$body_size) {
@@ -57,29 +58,29 @@ call_line <- function(client, line, content, call) {
   }
   state$too_large <- FALSE
   connection$sent <- 0L
-  result <- one_attempt(connection, handle$curl, line, key, number, state)
+  result <- one_attempt(connection, handle$curl, prepared, key, number, state)
   if (is.null(attr(result, "unread"))) {
     return(result)
   }
   sent <- list(key = key, number = number)
   response <- fetch(
-    client, connection, handle, line$route, sent, !isTRUE(state$classic), call,
+    client, connection, handle, prepared$route, sent, !isTRUE(state$classic), call,
     received = attr(result, "unread")
   )
   response$key <- sent
-  line$read_answer(read_answer(response, "POST", call))
+  prepared$read_answer(read_answer(response, "POST", call))
 }
 
 # Returns the result; where it is unusual, something with the attribute "unread", which is the
 # response or the connection's error.
-one_attempt <- function(connection, handle, line, key, number, state) {
+one_attempt <- function(connection, handle, prepared, key, number, state) {
   response <- NULL
   # Looked at, it returns from this function. tryCatch() would take three times as long.
   delayedAssign("leave", return(structure(list(), unread = response)))
   withCallingHandlers(
     {
-      response <- connection$fetch(line$url, handle)
-      line$read(response, key, number) %||% leave
+      response <- connection$fetch(prepared$url, handle)
+      prepared$read(response, key, number) %||% leave
     },
     error = function(cnd) {
       if (is.null(response)) response <<- cnd
@@ -99,14 +100,14 @@ one_attempt <- function(connection, handle, line, key, number, state) {
 
 json_blanks <- rep(as.raw(0x20), 256L)
 
-line_json <- function(line, content, key, number) {
-  if (!identical(line$key, key)) {
-    line$request <- paste0(
-      json_members(line$fields), '"request":{"key":"', key, '","number":'
+prepared_json <- function(prepared, content, key, number) {
+  if (!identical(prepared$key, key)) {
+    prepared$request <- paste0(
+      json_members(prepared$fields), '"request":{"key":"', key, '","number":'
     )
-    line$key <- key
+    prepared$key <- key
   }
-  bytes <- charToRaw(paste0("{", content, line$request, sprintf("%.0f}}", number)))
+  bytes <- charToRaw(paste0("{", content, prepared$request, sprintf("%.0f}}", number)))
   missing <- 256L - length(bytes)
   if (missing > 0L) c(bytes, json_blanks[seq_len(missing)]) else bytes
 }
@@ -119,15 +120,15 @@ json_members <- function(fields) {
 # From this number on integers are put behind a header as integers: R joins them faster than bytes.
 join_as_integers <- 1024L
 
-line_tensors <- function(line, content, key, number) {
-  if (line$has_texts) {
-    return(tensors_with_texts(line, content, key, number))
+prepared_tensors <- function(prepared, content, key, number) {
+  if (prepared$has_texts) {
+    return(tensors_with_texts(prepared, content, key, number))
   }
   digits <- charToRaw(sprintf("%.0f", number))
   if (is.integer(content)) {
-    with_integers(line_header(line, line$integers_table, key, digits), content)
+    with_integers(prepared_header(prepared, prepared$integers_table, key, digits), content)
   } else {
-    header <- line_header(line, tensors_table(content), key, digits)
+    header <- prepared_header(prepared, tensors_table(content), key, digits)
     do.call(c, c(list(header), lapply(unname(content), `[[`, "bytes")))
   }
 }
@@ -141,22 +142,22 @@ with_integers <- function(header, integers) {
   }
 }
 
-line_header <- function(line, table, key, digits) {
-  parts <- line$header
+prepared_header <- function(prepared, table, key, digits) {
+  parts <- prepared$header
   known <- length(digits) == length(parts$digits) && identical(parts$table, table) &&
     identical(parts$key, key)
   if (!known) {
-    parts <- header_parts(line$fields, table, key, digits)
-    line$header <- parts
+    parts <- header_parts(prepared$fields, table, key, digits)
+    prepared$header <- parts
   }
   c(parts$before, digits, parts$after)
 }
 
 # Texts stand among the metadata, so that the header is another one each time.
-tensors_with_texts <- function(line, content, key, number) {
+tensors_with_texts <- function(prepared, content, key, number) {
   texts <- vapply(content, is.character, NA)
   fields <- c(
-    line$fields, texts = if (any(texts)) to_json(content[texts]),
+    prepared$fields, texts = if (any(texts)) to_json(content[texts]),
     request = key_json(list(key = key, number = number))
   )
   write_tensors(content[!texts], fields)

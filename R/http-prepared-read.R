@@ -1,10 +1,10 @@
 # Reading the answers of calls that are made in every step, in which only the numbers differ.
 
-#' Make the function that reads the responses of a line that come as JSON
+#' Make the function that reads the responses of a prepared call that come as JSON
 #'
-#' @param read_answer As that of [new_line()]; it may return `NULL`, or fail.
+#' @param read_answer As that of [prepare_call()]; it may return `NULL`, or fail.
 #' @noRd
-json_line_reader <- function(read_answer) {
+new_json_reader <- function(read_answer) {
   function(response, key, number) {
     content <- response$content
     if (response$status_code != 200L || !identical(response$type, json_type) ||
@@ -21,15 +21,15 @@ is_echo <- function(request, key, number) {
   is.null(request) || identical(request$key, key) && isTRUE(request$number == number)
 }
 
-#' Make the function that reads the responses of a line that come as tensors
+#' Make the function that reads the responses of a prepared call that come as tensors
 #'
 #' @param layouts As [read_tensors()] takes them.
 #' @param finish A function of the tensors of an answer that says nothing more than these, whose
 #'   like `read_answer` has read before. The tensor "observation" has its names.
 #' @param labels The names of the numbers of an observation, `NULL` for none.
 #' @noRd
-tensors_line_reader <- function(layouts, read_answer, finish, labels) {
-  read_json <- json_line_reader(read_answer)
+new_tensors_reader <- function(layouts, read_answer, finish, labels) {
+  read_json <- new_json_reader(read_answer)
   form <- NULL
   function(response, key, number) {
     tensors <- if (!is.null(form)) tensors_of_form(form, response, key, number)
