@@ -192,8 +192,7 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
   }
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)
-  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L) {
-    check_range(place$policy, call)
+  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L && has_range(place$policy)) {
     unit <- unit_outputs(outputs[, 1L], output_activation(place$policy))
     return(list(kind = "output", values = unit, actions = actions))
   }
