@@ -2,8 +2,8 @@
 #'
 #' Makes a network without hidden neurons, whose outputs are weighted sums of the observation's
 #' numbers. That is enough for many environments, MuJoCo's robots among them (Mania, Guy and Recht
-#' 2018; Rajeswaran et al. 2017). It has as many inputs and outputs as the environment that it plays,
-#' and its weights are 0 until a search finds others.
+#' 2018; Rajeswaran et al. 2017). It has as many inputs and outputs as the environment that it
+#' plays, and its weights are 0 until a search finds others.
 #'
 #' An action is made of the outputs as [policy_network()] tells for outputs without a range: of
 #' several actions the one with the largest output, of two the second where the only output is above
@@ -20,8 +20,8 @@
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31.
 #'
-#'   A. Rajeswaran, K. Lowrey, E. Todorov and S. Kakade (2017), Towards generalization and simplicity
-#'   in continuous control, NeurIPS 30.
+#'   A. Rajeswaran, K. Lowrey, E. Todorov and S. Kakade (2017), Towards generalization and
+#'   simplicity in continuous control, NeurIPS 30.
 #' @seealso [policy_network()]
 #' @export
 #' @examples

@@ -35,8 +35,9 @@
 #'
 #' With `normalize = TRUE` each number of a Box comes in less its mean and divided by its standard
 #' deviation, so that numbers of different size weigh alike. These moments are those of the
-#' observations that the policy was trained on. They belong to it: a search updates them, playing and
-#' evaluating leave them as they are, and before the first update observations come in as they are.
+#' observations that the policy was trained on. They belong to it: a search updates them, playing
+#' and evaluating leave them as they are, and before the first update observations come in as they
+#' are.
 #' A number that has not changed so far comes in as 0.
 #'
 #' @param sizes How many inputs, neurons in each hidden layer, and outputs there
@@ -46,8 +47,8 @@
 #'   are not given are then drawn when it is first played, from a number that is drawn now.
 #' @param activation The activations' names: one of the hidden layers and one of
 #'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
-#'   each layer after the inputs. `"tanh"`, `"logistic"` and `"identity"` (what comes in goes out) are
-#'   computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package sigmoid,
+#'   each layer after the inputs. `"tanh"`, `"logistic"` and `"identity"` (what comes in goes out)
+#'   are computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package sigmoid,
 #'   which must then be installed.
 #' @param weights The weights: a list of matrices, one for each layer after the
 #'   inputs, with one row for each neuron of the layer and one column for each of

@@ -1,5 +1,5 @@
-# The weights of a network: a matrix for each layer after the inputs, with a row for each neuron and a
-# column for each of what it takes; with a bias there is one column more, the last.
+# The weights of a network: a matrix for each layer after the inputs, with a row for each neuron and
+# a column for each of what it takes; with a bias there is one column more, the last.
 
 # The shapes of the matrices.
 weight_shapes <- function(sizes, bias) {
