@@ -48,8 +48,8 @@
 #' @param activation The activations' names: one of the hidden layers and one of
 #'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
 #'   each layer after the inputs. `"tanh"`, `"logistic"` and `"identity"` (what comes in goes out)
-#'   are computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package sigmoid,
-#'   which must then be installed.
+#'   are computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package
+#'   sigmoid, which must then be installed.
 #' @param weights The weights: a list of matrices, one for each layer after the
 #'   inputs, with one row for each neuron of the layer and one column for each of
 #'   the layer before; with `bias = TRUE` one column more, the last, for the bias. `NULL`, the
