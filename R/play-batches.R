@@ -53,7 +53,8 @@ cut_batches <- function(batch_size, candidates, episodes) {
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
     candidates = candidates, episodes = as.integer(episodes), streams = streams,
-    common_seeds = common_seeds, draw_seeds = draw_environment_seeds, seeds = NULL, played_batches = 0, played_episodes = 0,
+    common_seeds = common_seeds, draw_seeds = draw_environment_seeds, seeds = NULL,
+    played_batches = 0, played_episodes = 0,
     batches = list()
   )
 }
