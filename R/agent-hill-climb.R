@@ -2,7 +2,7 @@
 #'
 #' Adds noise to the best weights so far, uniformly from `-noise` to `noise`, and keeps what does
 #' better. It sticks where the best weights were lucky, or where all weights nearby do equally
-#' badly: `vignette("from-luck-to-learning", package = "gym")` shows it.
+#' badly.
 #'
 #' @param noise How far from the best weights a candidate may be in each weight, a number above 0.
 #' @param candidates How many candidates are played in an iteration, a whole number of at least 1;

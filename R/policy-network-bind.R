@@ -3,6 +3,7 @@
 
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
+  env <- one_sub_env(env)
   policy <- with_sizes_of(policy, env)
   check_inputs(policy, env, call)
   check_outputs(policy, env, call)
@@ -11,6 +12,17 @@ policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env
   policy$action_space <- env$action_space
   policy["env_id"] <- list(env$spec$id)
   policy
+}
+
+# The spaces of one sub-environment.
+one_sub_env <- function(env) {
+  if (is.null(env$single_observation_space)) {
+    return(env)
+  }
+  list(
+    observation_space = env$single_observation_space, action_space = env$single_action_space,
+    spec = env$spec
+  )
 }
 
 # Fills in the sizes that are the environment's own, and the weights.

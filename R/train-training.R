@@ -76,6 +76,9 @@ summary.gym_training <- function(object, ...) {
 print.summary.gym_training <- function(x, ...) {
   training <- x$training
   cat(training_lines(training)[1:3], sep = "\n")
+  if (is.null(training$history)) {
+    return(invisible(x))
+  }
   stopping <- training$evaluations[training$evaluations$kind == "stopping", ]
   last <- training$history[nrow(training$history), ]
   several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
