@@ -40,22 +40,49 @@ gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = N
     abort_no_weights(policy, "policy", call)
   }
   seed <- seed %||% draw_seed()
-  # All arguments are those of now.
-  arguments <- list(
-    env, episodes = episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,
-    client = client, num_workers = num_workers, progress = FALSE
-  )
-  policy <- with_vector_env(
-    env, 1, function(vector_env) policy_bind(policy, vector_env, call = call), max_steps, ...,
-    client = client, call = call
-  )
+  in_env <- function(episodes, play) {
+    with_vector_env(env, episodes, play, max_steps, ..., num_envs = num_envs,
+                    num_workers = num_workers, client = client, call = call)
+  }
+  policy <- in_env(1, function(vector_env) policy_bind(policy, vector_env, call = call))
+  played <- same_episodes(seed, as.integer(episodes), max_steps)
   objective <- function(weights) {
     candidates <- policy_candidates(policy, if (is.matrix(weights)) weights else rbind(weights))
-    played <- do.call(rollout, c(arguments[1L], list(candidates), arguments[-1L]))
-    episodes <- played$episodes
-    -vapply(split(episodes$return, episodes$candidate), mean, 0, USE.NAMES = FALSE)
+    count <- nrow(candidates$weights)
+    -in_env(count * episodes, function(vector_env) played(vector_env, candidates, count))
   }
   structure(objective, policy = policy, class = c("gym_objective", "function"))
+}
+
+# Makes a function that plays the same episodes with each candidate, and returns the mean returns.
+# Nothing is drawn there: optim(method = "SANN") draws in C, and goes on with what drawing in the
+# function that it calls leaves behind, the same each time.
+same_episodes <- function(seed, episodes, max_steps) {
+  streams <- new_streams(seed)
+  seeds <- with_generator(streams$seeds, draw_environment_seeds(episodes))
+  kept <- saved_streams(streams)
+  play <- function(vector_env, candidates, which) {
+    history <- new_history(length(which), episodes, restore_streams(kept), common_seeds = TRUE)
+    taken <- 0L
+    history$draw_seeds <- function(n) {
+      taken <<- taken + n
+      seeds[taken - n + seq_len(n)]
+    }
+    play_batches(
+      vector_env, history, function(these) policy_subset(candidates, which[these]),
+      max_steps = max_steps %||% Inf
+    )
+    returns <- unlist(lapply(history$batches, function(batch) batch$return))
+    colMeans(matrix(returns, episodes))
+  }
+  function(vector_env, candidates, count) {
+    # Where all sub-environments share a seed, a candidate beside others would play other episodes.
+    if (vector_env$one_seed) {
+      vapply(seq_len(count), function(one) play(vector_env, candidates, one), 0)
+    } else {
+      play(vector_env, candidates, seq_len(count))
+    }
+  }
 }
 
 #' @export

@@ -34,10 +34,8 @@ plot.gym_training <- function(x, main = NULL, xlab = "steps of the environment",
                    lwd = 2)
   final <- data$final
   if (!is.null(final)) {
-    if (!is.na(final$se) && final$upper > final$lower) {
-      graphics::arrows(final$steps, final$lower, final$steps, final$upper, angle = 90, code = 3L,
-                       length = 0.04, col = okabe_ito$orange, lwd = 2)
-    }
+    graphics::segments(final$steps, final$lower, final$steps, final$upper, lwd = 2,
+                       col = okabe_ito$orange)
     graphics::points(final$steps, final$mean_return, pch = 16L, col = okabe_ito$orange, cex = 1.3)
   }
   graphics::title(main = main %||% training_title(x), line = 2.5)
