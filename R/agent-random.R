@@ -96,7 +96,9 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
   settings["env"] <- list(if (!is.character(env)) env)
   settings["seed"] <- list(seed)
-  file <- if (!is.null(checkpoint)) open_checkpoint(checkpoint, env, settings, resume)
+  file <- if (!is.null(checkpoint)) {
+    open_checkpoint(checkpoint, search_arguments(env, settings), resume)
+  }
   if (isTRUE(file$saved$finished)) {
     client <- if (is_playable(env)) env$client else if (!is_registered(env)) client
     return(finished_search(file$saved, settings, client, file$path))

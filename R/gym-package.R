@@ -29,8 +29,10 @@
 #' | `gym_error_connection` | no server there, connection lost, time over; an answer that is none |
 #' | `gym_error_server_start` | a server could not be started |
 #' | `gym_error_install` | what the server needs could not be installed |
-#' | `gym_error_checkpoint` | a search cannot go on from its file, or not keep one |
+#' | `gym_error_checkpoint` | a search or a training cannot go on from its file, or not keep one |
 #' | `gym_error_search` | a search ended early; what was played is its field `result` |
+#' | `gym_error_training` | the same of a training |
+#' | `gym_error_agent` | an agent returned what it must not, or a candidate's return is not finite |
 #'
 #' A `gym_error_http` also has a class with the status, such as
 #' `gym_error_http_400`, and the fields `status` (a number), `code` (a word for

@@ -19,14 +19,15 @@
 #' @param max_steps After how many steps an episode is cut short.
 #' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
 #'   none; `each`, how many episodes a candidate plays.
+#' @param keep_moments Whether to keep the moments of the observations that were acted on.
 #' @param keep_steps,keep_next Whether to keep each step, and the observation after it.
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
-#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps` and `frames`. Candidates
-#'   after one that has reached the target are left out.
+#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`.
+#'   Candidates after one that has reached the target are left out.
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
-                       each = 1L, keep_steps = FALSE, keep_next = FALSE,
+                       each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
                        report = function(ended) NULL) {
   n <- length(episodes$episode)
   at_once <- vector_env$num_envs
@@ -36,7 +37,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     steps = list(), frames = list(), target = target, each = each, report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
-    keep_next = keep_next
+    keep_next = keep_next, moments = if (keep_moments) no_moments()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
@@ -50,7 +51,8 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
-  c(lapply(mget(columns, batch), utils::head, batch$needed), mget(c("steps", "frames"), batch))
+  kept <- mget(c("steps", "frames", "moments"), batch)
+  c(lapply(mget(columns, batch), utils::head, batch$needed), kept)
 }
 
 # An error of the environment names the user's call, not the step that was taken for it.
@@ -99,6 +101,11 @@ end_step <- function(batch, playing, action, out) {
   playing$taken <- playing$taken + 1L
   keep_frame(batch, rows$episode)
   playing$rows$return <- rows$return + out$reward
+  if (!is.null(batch$moments)) {
+    batch$moments <- merge_moments(
+      batch$moments, moments_of(number_rows(playing$observation))
+    )
+  }
   if (batch$keep_steps) {
     batch$steps[[length(batch$steps) + 1L]] <- list(
       at = rows$episode, observation = playing$observation, action = action,

@@ -53,7 +53,8 @@ cut_batches <- function(batch_size, candidates, episodes) {
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
     candidates = candidates, episodes = as.integer(episodes), streams = streams,
-    common_seeds = common_seeds, seeds = NULL, played_batches = 0, played_episodes = 0,
+    common_seeds = common_seeds, draw_seeds = draw_environment_seeds, seeds = NULL,
+    played_batches = 0, played_episodes = 0,
     batches = list()
   )
 }
@@ -99,7 +100,7 @@ play_batches <- function(vector_env, history, policy_of, after = function(histor
 
 # Where one generator serves all sub-environments, those that begin together share a seed.
 draw_episode_seeds <- function(vector_env, history, episodes) {
-  draw <- function(n) with_generator(history$streams$seeds, draw_environment_seeds(n))
+  draw <- function(n) with_generator(history$streams$seeds, history$draw_seeds(n))
   n <- length(episodes$episode)
   if (vector_env$one_seed) {
     at_once <- vector_env$num_envs

@@ -190,15 +190,21 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
     )
   }
+  decide_action(place, values, outputs)
+}
+
+# One of some actions; where a single output chooses between two and has a range, the output.
+decide_action <- function(place, values, outputs) {
+  space <- place$action_space
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)
-  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L) {
-    check_range(place$policy, call)
+  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L && has_range(place$policy)) {
     unit <- unit_outputs(outputs[, 1L], output_activation(place$policy))
-    return(list(kind = "output", values = unit, actions = actions))
+    list(kind = "output", values = unit, actions = actions)
+  } else {
+    chosen <- as.integer(policy_actions(place, values, outputs))
+    list(kind = "choice", values = chosen, actions = actions)
   }
-  chosen <- as.integer(policy_actions(place, values, outputs))
-  list(kind = "choice", values = chosen, actions = actions)
 }
 
 decide_value <- function(place, values, outputs, action, call) {

@@ -10,7 +10,7 @@
 #'   `label_y`), `layers` (data frame `x`, `label`).
 #' @noRd
 network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
-  check_weights(policy$weights, policy$sizes, "policy$weights", call)
+  check_network(policy, call)
   check_count(most, min = 3, arg = "neurons", call = call)
   check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
   layers <- length(policy$sizes)
@@ -102,7 +102,7 @@ output_labels <- function(policy) {
   }
   actions <- action_names(policy$env_id, space$n %||% max(outputs, 2L), space$start %||% 0L)
   if (outputs == 1L && length(actions) == 2L) {
-    half <- if (output_activation(policy) == "tanh") "0" else "0.5"
+    half <- if (output_activation(policy) %in% c("logistic", "Gompertz")) "0.5" else "0"
     return(paste0("above ", half, ":\n", actions[[2L]], "\n\notherwise:\n", actions[[1L]]))
   }
   actions

@@ -1,6 +1,6 @@
 # The activation functions of a network's layers.
 
-base_activations <- c("tanh", "logistic")
+base_activations <- c("tanh", "logistic", "identity")
 sigmoid_activations <- c("Gompertz", "ReLU", "leakyReLU")
 
 layer_activations <- function(activation, sizes, call = rlang::caller_env()) {
@@ -46,6 +46,7 @@ activate <- function(x, activation) {
   switch(activation,
     tanh = tanh(x),
     logistic = stats::plogis(x),
+    identity = x,
     sigmoid::sigmoid(x, method = activation)
   )
 }
@@ -53,4 +54,13 @@ activate <- function(x, activation) {
 # Scales outputs that have a range to the range from 0 to 1.
 unit_outputs <- function(outputs, activation) {
   if (activation == "tanh") (outputs + 1) / 2 else outputs
+}
+
+# Of a single output: does it stand for the second of two actions? It is that above the middle of
+# its range; without a range above 0. Exactly the middle is the first, as round() gives 0 for 0.5.
+above_half <- function(output, activation) {
+  switch(activation,
+    logistic = , Gompertz = output > 0.5,
+    output > 0
+  )
 }

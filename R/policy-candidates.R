@@ -25,6 +25,7 @@ policy_candidates <- function(policy, weights) {
   if (!inherits(policy, "gym_policy_network")) {
     abort_no_weights(policy, "policy", rlang::current_env())
   }
+  check_network(policy)
   check_candidate_weights(weights, sum(lengths(policy$weights)))
   storage.mode(weights) <- "double"
   new_candidates(policy, weights)

@@ -28,6 +28,7 @@
 #' coef(near) <- coef(policy) + rnorm(10, sd = 0.1)
 coef.gym_policy_network <- function(object, ...) {
   check_dots_empty(...)
+  check_network(object)
   weight_vector(object)
 }
 
@@ -53,6 +54,7 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
 #' @export
 `coef<-.gym_policy_network` <- function(object, ..., value) {
   check_dots_empty(...)
+  check_network(object)
   count <- sum(lengths(object$weights))
   if (!is.numeric(value) || length(value) != count) {
     abort_argument(value, paste("a vector of", count_of(count, "number")), "value",

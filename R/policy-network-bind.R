@@ -3,12 +3,45 @@
 
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
-  check_weights(policy$weights, policy$sizes, "policy$weights", call)
+  env <- one_sub_env(env)
+  policy <- with_sizes_of(policy, env)
   check_inputs(policy, env, call)
   check_outputs(policy, env, call)
+  check_network(policy, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy["env_id"] <- list(env$spec$id)
+  policy
+}
+
+# The spaces of one sub-environment.
+one_sub_env <- function(env) {
+  if (is.null(env$single_observation_space)) {
+    return(env)
+  }
+  list(
+    observation_space = env$single_observation_space, action_space = env$single_action_space,
+    spec = env$spec
+  )
+}
+
+# Fills in the sizes that are the environment's own, and the weights.
+with_sizes_of <- function(policy, env) {
+  if (!anyNA(policy$sizes)) {
+    return(policy)
+  }
+  own <- c(space_width(env$observation_space) %||% NA, outputs_for(env$action_space) %||% NA)
+  ends <- c(1L, length(policy$sizes))
+  policy$sizes[ends] <- as.integer(ifelse(is.na(policy$sizes[ends]), own, policy$sizes[ends]))
+  if (anyNA(policy$sizes)) {
+    return(policy)
+  }
+  policy$weights <- if (is.null(policy$weights_seed)) {
+    zero_weights(policy$sizes, policy$bias)
+  } else {
+    with_generator(new_generator(policy$weights_seed), draw_weights(policy$sizes, policy$bias))
+  }
+  policy$weights_seed <- NULL
   policy
 }
 
@@ -18,6 +51,14 @@ check_inputs <- function(policy, env, call) {
   gives <- space_width(space)
   if (is.null(gives)) {
     abort_fit(policy, paste("A network cannot observe", format(space)), env, call)
+  }
+  if (!is.null(policy$moments) && inherits(space, "gym_space_discrete")) {
+    gym_abort(
+      c(paste0("Observations that are numbers of a range can be normalized, but those of ",
+               environment_label(env), " are ", format(space), "."),
+        i = "Make the policy with `normalize = FALSE`."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
   }
   if (gives != inputs) {
     problem <- paste0(
@@ -50,11 +91,8 @@ check_outputs <- function(policy, env, call) {
     )
     abort_fit(policy, problem, env, call)
   }
-  if (!discrete) {
+  if (!discrete && has_range(policy)) {
     check_bounded(policy, env, call)
-  }
-  if (rounded || !discrete) {
-    check_range(policy, call)
   }
 }
 
@@ -62,9 +100,13 @@ check_bounded <- function(policy, env, call) {
   space <- env$action_space
   if (!all(is.finite(c(space$low, space$high)))) {
     gym_abort(
-      paste0(
-        "A network's outputs are scaled to the bounds of the action, but ",
-        environment_label(env), " takes ", format(space), " with a side without a bound."
+      c(
+        paste0(
+          "The outputs of \"", output_activation(policy), "\" are scaled to the bounds of the ",
+          "action, but ", environment_label(env), " takes ", format(space),
+          " with a side without a bound."
+        ),
+        i = "Outputs of \"identity\" are taken as they are."
       ),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
@@ -81,16 +123,19 @@ abort_fit <- function(policy, problem, env, call) {
 # The sizes that would fit, with the hidden layers left as they are.
 fitting_sizes <- function(policy, env) {
   inputs <- space_width(env$observation_space)
-  outputs <- space_width(env$action_space)
+  outputs <- outputs_for(env$action_space)
   if (is.null(inputs) || is.null(outputs)) {
     return(NULL)
-  }
-  if (inherits(env$action_space, "gym_space_discrete") && outputs == 2) {
-    outputs <- 1
   }
   hidden <- policy$sizes[-c(1L, length(policy$sizes))]
   sizes <- paste(c(inputs, hidden, outputs), collapse = ", ")
   paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
+}
+
+# How many outputs a network gets for actions of this space: a single one chooses between two.
+outputs_for <- function(space) {
+  width <- space_width(space)
+  if (inherits(space, "gym_space_discrete") && width == 2) 1L else width
 }
 
 # How many inputs a network needs for an observation of this space, or outputs for an action of it.

@@ -1,8 +1,7 @@
 #' Decide by a small neural network
 #'
-#' Makes a network without biases and draws its weights, uniformly between -1 and
-#' 1, from R's generator. Each layer multiplies what comes in by its weights and
-#' applies its activation.
+#' Makes a network and draws its weights, uniformly between -1 and 1, from R's generator. Each layer
+#' multiplies what comes in by its weights and applies its activation.
 #'
 #' # From outputs to an action
 #'
@@ -23,8 +22,9 @@
 #'   and is refused.
 #'
 #' The range of `"logistic"` and `"Gompertz"` goes from 0 to 1, that of `"tanh"`
-#' from -1 to 1. `"ReLU"` and `"leakyReLU"` have none, and as the last activation
-#' serve only where the largest output is taken.
+#' from -1 to 1. `"identity"`, `"ReLU"` and `"leakyReLU"` have none. Then a single output gives the
+#' second of two actions where it is above 0, and the outputs are the numbers of a Box, cut at its
+#' bounds where it has some.
 #'
 #' # Observations
 #'
@@ -33,20 +33,34 @@
 #' instance, gives one input for each of its values: 1 for the one observed, 0 for
 #' the others.
 #'
+#' With `normalize = TRUE` each number of a Box comes in less its mean and divided by its standard
+#' deviation, so that numbers of different size weigh alike. These moments are those of the
+#' observations that the policy was trained on. They belong to it: a search updates them, playing
+#' and evaluating leave them as they are, and before the first update observations come in as they
+#' are.
+#' A number that has not changed so far comes in as 0.
+#'
 #' @param sizes How many inputs, neurons in each hidden layer, and outputs there
 #'   are: whole numbers, at least two of them. The default, `c(4, 2, 1)`, is the
-#'   network of the tutorial: 4 x 2 + 2 x 1 = 10 weights.
+#'   network of the tutorial: 4 x 2 + 2 x 1 = 10 weights. The first and the last may be `NA`: then
+#'   they are the environment's own, with a single output where there are two actions; weights that
+#'   are not given are then drawn when it is first played, from a number that is drawn now.
 #' @param activation The activations' names: one of the hidden layers and one of
 #'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
-#'   each layer after the inputs. `"tanh"` and `"logistic"` are computed with base
-#'   R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package sigmoid,
-#'   which must then be installed.
+#'   each layer after the inputs. `"tanh"`, `"logistic"` and `"identity"` (what comes in goes out)
+#'   are computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package
+#'   sigmoid, which must then be installed.
 #' @param weights The weights: a list of matrices, one for each layer after the
 #'   inputs, with one row for each neuron of the layer and one column for each of
-#'   the layer before. `NULL`, the default, draws them.
+#'   the layer before; with `bias = TRUE` one column more, the last, for the bias. `NULL`, the
+#'   default, draws them.
+#' @param bias Is a number added to what each neuron sums up, its bias? `FALSE`, the default, or
+#'   `TRUE`.
+#' @param normalize Are observations normalised? `FALSE`, the default, or `TRUE`, see below.
 #' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and
 #'   [search_random()]; a list with the elements `sizes` (integers), `activation`
-#'   (strings, one for each layer), `weights` (a list of matrices),
+#'   (strings, one for each layer), `weights` (a list of matrices), `bias` (a logical), `moments`
+#'   (`NULL`, or a list of `count`, `mean`, `squares` and `scale`, of the observations),
 #'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
 #'   string), all `NULL` until it is played.
 #' @section Errors: `gym_error_argument` when sizes, activations and weights do not
@@ -68,20 +82,29 @@
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 1), nrow = 1)))
 #' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
 policy_network <- function(sizes = c(4, 2, 1), activation = c("tanh", "logistic"),
-                           weights = NULL) {
-  check_sizes(sizes)
-  sizes <- as.integer(sizes)
+                           weights = NULL, bias = FALSE, normalize = FALSE) {
+  sizes <- check_sizes(sizes)
+  check_flag(bias)
+  check_flag(normalize)
   activation <- layer_activations(activation, sizes)
-  if (is.null(weights)) {
-    weights <- draw_weights(sizes)
+  policy <- new_network(sizes, activation, bias, normalize)
+  if (!is.null(weights)) {
+    check_weights_fit(weights, policy)
+    policy$weights <- weights
+    policy
   } else {
-    check_weights(weights, sizes)
+    policy_resample(policy)
   }
+}
+
+new_network <- function(sizes, activation, bias, normalize) {
   structure(
     list(
       sizes = sizes,
       activation = activation,
-      weights = weights,
+      weights = NULL,
+      bias = bias,
+      moments = if (normalize) no_moments(),
       observation_space = NULL,
       action_space = NULL,
       env_id = NULL
@@ -90,71 +113,39 @@ policy_network <- function(sizes = c(4, 2, 1), activation = c("tanh", "logistic"
   )
 }
 
+check_weights_fit <- function(weights, policy, call = rlang::caller_env()) {
+  if (anyNA(policy$sizes)) {
+    gym_abort(
+      c("`weights` are for given sizes, and `sizes` leaves some to the environment.",
+        i = "Give all sizes as numbers."),
+      class = "gym_error_argument", argument = "sizes", value = policy$sizes, call = call
+    )
+  }
+  check_weights(weights, policy$sizes, policy$bias, call = call)
+}
+
+
+# The first and the last may be `NA`: then they are the environment's own.
 check_sizes <- function(sizes, call = rlang::caller_env()) {
+  if (is.logical(sizes) && all(is.na(sizes))) {
+    sizes <- as.integer(sizes)
+  }
   if (!is.numeric(sizes) || length(sizes) < 2L) {
     abort_argument(sizes, "two or more whole numbers", "sizes", call)
   }
   for (i in seq_along(sizes)) {
-    check_count(sizes[[i]], arg = paste0("sizes[", i, "]"), call = call)
-  }
-}
-
-# The weights are drawn in the order of the tutorial: first the matrix of the hidden layer, then
-# the weights of the output.
-draw_weights <- function(sizes) {
-  Map(
-    function(inputs, outputs) {
-      matrix(stats::runif(inputs * outputs, -1, 1), nrow = outputs, ncol = inputs)
-    },
-    sizes[-length(sizes)],
-    sizes[-1L]
-  )
-}
-
-check_weights <- function(weights, sizes, name = "weights", call = rlang::caller_env()) {
-  wanted <- Map(c, sizes[-1L], sizes[-length(sizes)])
-  if (!is.list(weights) || length(weights) != length(wanted)) {
-    shapes <- vapply(wanted, paste, "", collapse = " x ")
-    must <- paste0("a list of ", length(wanted), " matrices (", paste(shapes, collapse = ", "), ")")
-    abort_argument(weights, must, name, call)
-  }
-  for (i in seq_along(wanted)) {
-    arg <- paste0(name, "[[", i, "]]")
-    layer <- weights[[i]]
-    if (!is.matrix(layer) || !is.numeric(layer)) {
-      abort_argument(layer, "a numeric matrix", arg, call)
-    }
-    if (!identical(dim(layer), wanted[[i]])) {
-      turned <- identical(rev(dim(layer)), wanted[[i]])
-      gym_abort(
-        c(
-          paste0("`", arg, "` must be a matrix of ", paste(wanted[[i]], collapse = " x "),
-                 " for these sizes, not of ", paste(dim(layer), collapse = " x "), "."),
-          i = if (turned) "`t()` turns it: a row is a neuron, a column one of what it takes."
-        ),
-        class = "gym_error_argument", argument = arg, value = layer, call = call
-      )
-    }
-    if (anyNA(layer)) {
-      abort_argument(layer, "without missing values", arg, call)
+    if (!(is.na(sizes[[i]]) && i %in% c(1L, length(sizes)))) {
+      check_count(sizes[[i]], arg = paste0("sizes[", i, "]"), call = call)
     }
   }
-}
-
-# The weights as one vector, layer after layer, each matrix column after column.
-weight_vector <- function(policy) unlist(lapply(policy$weights, as.vector))
-
-with_weights <- function(policy, weights) {
-  policy$weights <- utils::relist(weights, policy$weights)
-  policy
+  as.integer(sizes)
 }
 
 # From an observation to an action -------------------------------------------------
 
 #' @export
 act.gym_policy_network <- function(policy, observation, ...) {
-  # The weights may have been changed by hand.
-  check_weights(policy$weights, policy$sizes, "policy$weights")
+  check_network(policy)
   rows <- observation_rows(observation, policy$observation_space)
   outputs <- network_outputs(policy, rows$values)
   network_action(policy$action_space, outputs, policy, rows$one)
@@ -173,7 +164,9 @@ policy_rows.gym_policy_network <- function(policy, candidate) {
   shape <- policy$observation_space$shape
   if (length(shape) > 1L && prod(shape) == policy$sizes[[1L]]) {
     by_row <- aperm(array(seq_len(prod(shape)), rev(shape)))
-    policy$weights[[1L]] <- policy$weights[[1L]][, by_row, drop = FALSE]
+    bias <- if (isTRUE(policy$bias)) policy$sizes[[1L]] + 1L
+    policy$weights[[1L]] <- policy$weights[[1L]][, c(by_row, bias), drop = FALSE]
+    policy$moments <- reorder_moments(policy$moments, by_row)
     class(policy) <- c("gym_policy_by_column", class(policy))
   }
   policy
@@ -193,11 +186,16 @@ network_outputs <- function(policy, values, call = rlang::caller_env()) {
   if (ncol(signal) != policy$sizes[[1L]] || !is.numeric(signal)) {
     abort_observation(policy, values, call)
   }
+  signal <- normalized(signal, policy$moments)
   for (layer in seq_along(policy$weights)) {
+    signal <- with_bias(signal, policy)
     signal <- activate(tcrossprod(signal, policy$weights[[layer]]), policy$activation[[layer]])
   }
   signal
 }
+
+# What a layer takes: beside what comes in, with a bias, the constant 1.
+with_bias <- function(signal, policy) if (isTRUE(policy$bias)) cbind(signal, 1) else signal
 
 abort_observation <- function(policy, values, call) {
   given <- if (is.numeric(values)) {
@@ -226,69 +224,27 @@ network_inputs <- function(space, values, call = rlang::caller_env()) {
   inputs
 }
 
-network_action <- function(space, outputs, policy, one) {
-  if (inherits(space, "gym_space_box")) {
-    box_action(space, outputs, policy, one)
-  } else {
-    discrete_action(space, outputs, policy)
-  }
-}
-
-discrete_action <- function(space, outputs, policy) {
-  chosen <- if (ncol(outputs) > 1L) {
-    max.col(outputs, ties.method = "first") - 1L
-  } else if (is.null(space) || space$n > 1L) {
-    check_range(policy)
-    as.integer(round(unit_outputs(outputs[, 1L], output_activation(policy))))
-  } else {
-    integer(nrow(outputs))
-  }
-  if (is.null(space)) chosen else chosen + as.integer(space$start)
-}
-
-box_action <- function(space, outputs, policy, one) {
-  share <- unit_outputs(outputs, output_activation(policy))
-  rows <- nrow(outputs)
-  low <- rep(space$low, each = rows)
-  high <- rep(space$high, each = rows)
-  # The sum of two products, because high - low may be beyond the largest number. Rounding must not
-  # move a value past a bound, which the environment would refuse.
-  values <- pmin(pmax(low * (1 - share) + high * share, low), high)
-  if (space$dtype %in% integer_dtypes) {
-    values <- round(values)
-  }
-  shape <- if (one) space$shape else c(rows, space$shape)
-  if (length(shape) > 1L) aperm(array(t(values), rev(shape))) else as.vector(values)
-}
-
-output_activation <- function(policy) policy$activation[[length(policy$activation)]]
-
-check_range <- function(policy, call = rlang::caller_env()) {
-  activation <- output_activation(policy)
-  if (!activation %in% c("tanh", "logistic", "Gompertz")) {
-    gym_abort(
-      c(
-        paste0("The output's activation \"", activation, "\" has no upper end, so that the ",
-               "output cannot be rounded or scaled to an action."),
-        i = "\"logistic\" and \"tanh\" can."
-      ),
-      class = "gym_error_argument", argument = "activation", value = activation, call = call
-    )
-  }
-}
-
 # Drawing again, and printing ------------------------------------------------------
 
 #' @exportS3Method
 policy_resample.gym_policy_network <- function(policy, call = rlang::caller_env()) {
-  policy$weights <- draw_weights(policy$sizes)
+  if (anyNA(policy$sizes)) {
+    # What is drawn when the sizes are known follows from this number.
+    policy$weights_seed <- draw_seed()
+  } else {
+    policy$weights <- draw_weights(policy$sizes, policy$bias)
+  }
   policy
 }
 
 #' @export
 format.gym_policy_network <- function(x, ...) {
-  paste0(
-    "network ", paste(x$sizes, collapse = "-"), ", ", paste(x$activation, collapse = ", "),
-    ", ", count_of(sum(lengths(x$weights)), "weight")
+  weights <- if (!is.null(x$weights)) count_of(sum(lengths(x$weights)), "weight")
+  paste(
+    c(
+      paste("network", sizes_text(x$sizes)), x$activation, if (isTRUE(x$bias)) "bias",
+      if (!is.null(x$moments)) "normalized observations", weights
+    ),
+    collapse = ", "
   )
 }

@@ -183,9 +183,21 @@ policy_label <- function(policy) sub("(,| over).*", "", policy_text(policy))
 
 #' Fit a policy to an environment
 #'
-#' Aborts when the policy cannot play there.
-#' @return The policy, which now knows the environment's spaces.
-#' @noRd
+#' [rollout()], [train_agent()] and every search do this first: a policy learns what observations
+#' and actions there are, and a network whose sizes are the environment's own gets these, and its
+#' weights. A package that brings a policy of its own may write a method; without one a policy stays
+#' as it is.
+#'
+#' @param policy The policy.
+#' @param env The environment, as [gym_make()] makes it or [as_vector_env()] returns it.
+#' @param call Where an error says that it comes from, as in [rlang::abort()].
+#' @return The policy, fitted.
+#' @section Errors: `gym_error_argument` when the policy cannot play there.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1")
+#' policy_bind(policy_linear(), env)
+#' env$close()
 policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("policy_bind")
 
 #' @exportS3Method

@@ -1,4 +1,4 @@
-# The file of a search's checkpoint: it is read completely or not at all, and written completely or
+# The file of a checkpoint: it is read completely or not at all, and written completely or
 # not at all.
 
 # The version of the file's format. Files with another version are refused.
@@ -72,4 +72,55 @@ replace_file <- function(from, to) {
     Sys.sleep(0.05)
   }
   stop("\"", from, "\" cannot be renamed")
+}
+
+# Writing again and again --------------------------------------------------------------
+
+# After the file was written it is left as it is for nine times as long as that took: so writing
+# takes a tenth of the time at most.
+rest_per_writing <- 9
+
+#' Prepare to write a file from time to time
+#' @param checkpoint As [open_checkpoint()] returns it. Where there is no file yet it is written
+#'   now.
+#' @param state A function that returns what to write.
+#' @param what What is kept, `"search"` or `"training"`.
+#' @return A function that writes the file where `now` is `TRUE`, or it has rested for long enough.
+#' @noRd
+checkpoint_writer <- function(checkpoint, state, what, call) {
+  path <- checkpoint$path
+  if (is.null(checkpoint$saved)) {
+    tryCatch(
+      write_checkpoint(path, state()),
+      error = function(cnd) {
+        abort_checkpoint(path, "cannot be written", conditionMessage(cnd), call)
+      }
+    )
+  }
+  rest_until <- -Inf
+  failed <- FALSE
+  function(now = FALSE) {
+    began <- proc.time()[["elapsed"]]
+    if (!now && began < rest_until) {
+      return(invisible())
+    }
+    tryCatch(
+      write_checkpoint(path, state()),
+      error = function(cnd) {
+        # A full disk must not end what has played for hours.
+        if (!failed) warn_not_written(path, what, cnd)
+        failed <<- TRUE
+      }
+    )
+    ended <- proc.time()[["elapsed"]]
+    rest_until <<- ended + rest_per_writing * (ended - began)
+  }
+}
+
+warn_not_written <- function(path, what, cnd) {
+  rlang::warn(
+    c(paste0("The checkpoint \"", path, "\" cannot be written; the ", what, " goes on without."),
+      x = conditionMessage(cnd)),
+    class = "gym_warning_checkpoint"
+  )
 }

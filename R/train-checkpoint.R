@@ -1,15 +1,17 @@
 # A search keeps what it has played in a file, the checkpoint, from which it can go on after it was
 # ended.
 
-#' Prepare to keep a search in a file
+#' Prepare to keep a search or a training in a file
 #'
 #' @param path The file.
-#' @param settings As [search_settings()] returns them, with `env` and `seed`.
+#' @param arguments What fixes it, a list, in which the file must agree.
 #' @param resume Whether to go on with what the file has.
-#' @return A list: `path`, `arguments` (what fixes the search, in which the file must agree)
-#'   and `saved`, what the file has, `NULL` where there is none to go on with.
+#' @param what What is kept, `"search"` or `"training"`.
+#' @return A list: `path`, `arguments` and `saved`, what the file has, `NULL` where there is none to
+#'   go on with.
 #' @noRd
-open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_env()) {
+open_checkpoint <- function(path, arguments, resume, what = "search",
+                            call = rlang::caller_env()) {
   # The working directory may have changed when the next batch has ended.
   path <- normalizePath(path, mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
@@ -17,10 +19,12 @@ open_checkpoint <- function(path, env, settings, resume, call = rlang::caller_en
     abort_checkpoint(path, problem, call = call)
   }
   remove_parts(path)
-  arguments <- search_arguments(env, settings)
   saved <- if (resume) read_checkpoint(path, call)
   if (!is.null(saved)) {
-    check_same_search(path, saved$arguments, arguments, call)
+    if (!identical(saved$what, what)) {
+      abort_checkpoint(path, paste("is that of a", saved$what), call = call)
+    }
+    check_same_search(path, saved$arguments, arguments, what, call)
   }
   list(path = path, arguments = arguments, saved = saved)
 }
@@ -54,7 +58,7 @@ environment_traits <- function(env) {
 
 # The same search ------------------------------------------------------------------
 
-check_same_search <- function(path, there, here, call) {
+check_same_search <- function(path, there, here, what, call) {
   differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
   if (length(differ)) {
     lines <- vapply(differ, function(name) {
@@ -65,7 +69,7 @@ check_same_search <- function(path, there, here, call) {
         paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
       }
     }, "")
-    abort_checkpoint(path, "is that of another search", lines, call, argument = differ)
+    abort_checkpoint(path, paste("is that of another", what), lines, call, argument = differ)
   }
 }
 
@@ -80,6 +84,7 @@ argument_text <- function(name, value) {
       paste0(" with ", count_of(value$num_envs, "sub-environment"))
     }),
     policy = policy_text(value),
+    agent = format(value),
     if (is.numeric(value)) number_text(value) else describe_value(value)
   )
 }
@@ -107,8 +112,8 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
       paste0("The checkpoint \"", path, "\" ", problem, "."),
       if (length(lines)) stats::setNames(lines, rep("x", length(lines))),
       i = paste(
-        "Give another file as `checkpoint`; with `resume = FALSE` the search begins anew and",
-        "replaces what is there."
+        "Give another file as `checkpoint`; `resume = FALSE` begins anew and replaces what is",
+        "there."
       )
     ),
     class = c("gym_error_checkpoint", "gym_error_argument"),
@@ -170,10 +175,6 @@ finished_search <- function(saved, settings, client, path) {
 
 # Writing --------------------------------------------------------------------------
 
-# Where a batch is a single episode, the file is next written after nine times as long as writing it
-# took last: so writing takes a tenth of the time at most.
-rest_per_writing <- 9
-
 #' Keep a search in its file from now on
 #'
 #' The file is written anew after each batch of episodes. It grows, and where a batch is a single
@@ -184,53 +185,23 @@ rest_per_writing <- 9
 #' @param started When the search began, minus the time that it took before.
 #' @noRd
 keep_history <- function(history, template, checkpoint, vector_env, settings, started, call) {
-  write <- function() {
-    state <- list(
-      arguments = checkpoint$arguments, server = settings_of_server(vector_env, settings),
-      policy = settings$policy, template = template, seed = settings$seed,
-      history = saved_history(history), streams = saved_streams(history$streams),
-      elapsed = proc.time()[["elapsed"]] - started, finished = is_finished(history)
-    )
-    write_checkpoint(checkpoint$path, state)
-  }
-  if (is.null(checkpoint$saved)) {
-    tryCatch(
-      write(),
-      error = function(cnd) {
-        abort_checkpoint(checkpoint$path, "cannot be written", conditionMessage(cnd), call)
-      }
+  state <- function() {
+    list(
+      what = "search", arguments = checkpoint$arguments,
+      server = settings_of_server(vector_env, settings), policy = settings$policy,
+      template = template, seed = settings$seed, history = saved_history(history),
+      streams = saved_streams(history$streams), elapsed = proc.time()[["elapsed"]] - started,
+      finished = is_finished(history)
     )
   }
-  rest_until <- -Inf
-  failed <- FALSE
+  write <- checkpoint_writer(checkpoint, state, "search", call)
   history$keep <- function() {
-    began <- proc.time()[["elapsed"]]
-    if (vector_env$batch_size == 1L && began < rest_until && !is_finished(history)) {
-      return()
-    }
-    tryCatch(
-      write(),
-      error = function(cnd) {
-        # A full disk must not end a search that has played for hours.
-        if (!failed) warn_not_written(checkpoint$path, cnd)
-        failed <<- TRUE
-      }
-    )
-    ended <- proc.time()[["elapsed"]]
-    rest_until <<- ended + rest_per_writing * (ended - began)
+    write(now = vector_env$batch_size > 1L || is_finished(history))
   }
 }
 
 is_finished <- function(history) {
   history$ended || length(history$means) >= history$candidates
-}
-
-warn_not_written <- function(path, cnd) {
-  rlang::warn(
-    c(paste0("The checkpoint \"", path, "\" cannot be written; the search goes on without."),
-      x = conditionMessage(cnd)),
-    class = "gym_warning_checkpoint"
-  )
 }
 
 # The file is written between batches, when no episode is under way.

@@ -70,7 +70,7 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   }
   check_found(search)
   check_odd(size)
-  check_positive(span)
+  check_above_zero(span)
   check_count(episodes)
   check_seed(seed)
   check_flag(progress)
@@ -92,12 +92,6 @@ check_odd <- function(size, call = rlang::caller_env()) {
   check_count(size, min = 3, call = call)
   if (size %% 2 == 0) {
     abort_argument(size, "odd, so that the best policy lies in the middle", "size", call)
-  }
-}
-
-check_positive <- function(span, call = rlang::caller_env()) {
-  if (!is_number(span) || !is.finite(span) || span <= 0) {
-    abort_argument(span, "a number above 0", "span", call)
   }
 }
 

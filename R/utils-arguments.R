@@ -26,6 +26,13 @@ check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE,
   invisible(x)
 }
 
+check_above_zero <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!is_number(x) || !is.finite(x) || x <= 0) {
+    abort_argument(x, "a number above 0", arg, call)
+  }
+  invisible(x)
+}
+
 # A seed may be what set.seed() takes: any whole number that R's integers can hold.
 check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   check_count(x, min = -.Machine$integer.max, allow_null = TRUE, arg = arg, call = call)

@@ -78,7 +78,7 @@ test_that("activations are one of hidden layers and one of outputs, or one for e
 })
 
 test_that("sizes are two or more whole numbers", {
-  for (bad in list(4, c(4, 0), c(4, 2.5, 1), c(4, NA), "4-2-1", NULL)) {
+  for (bad in list(4, c(4, 0), c(4, 2.5, 1), c(4, NA, 1), "4-2-1", NULL, NA)) {
     expect_error(policy_network(bad), "sizes", class = "gym_error_argument")
   }
 })
@@ -174,10 +174,58 @@ test_that("a discrete observation is one input for each of its values", {
   expect_identical(act(policy, 2L), 0L)
 })
 
-test_that("an output that has no range cannot be rounded or scaled", {
+test_that("a single output without a range gives its sign", {
+  policy <- policy_network(c(1, 1), "identity", weights = list(matrix(2)))
+  expect_identical(act(policy, matrix(c(-1, 0, 1e-9), 3)), c(0L, 0L, 1L))
   skip_if_not_installed("sigmoid")
-  policy <- policy_network(activation = c("tanh", "ReLU"))
-  expect_error(act(policy, 1:4), "no upper end", class = "gym_error_argument")
+  policy <- policy_network(c(1, 1), "ReLU", weights = list(matrix(2)))
+  expect_identical(act(policy, matrix(c(-1, 0, 0.1), 3)), c(0L, 0L, 1L))
+})
+
+test_that("a bias is added to what each neuron sums up", {
+  weights <- list(rbind(c(1, 2, 0.5), c(0, -1, -0.25)), rbind(c(1, 1, 3)))
+  policy <- policy_network(c(2, 2, 1), c("tanh", "identity"), weights, bias = TRUE)
+  hidden <- tanh(c(1 * 3 + 2 * 4 + 0.5, -4 - 0.25))
+  expect_equal(predict(policy, c(3, 4), "output"), sum(hidden) + 3)
+  expect_identical(coef(policy), c(1, 0, 2, -1, 0.5, -0.25, 1, 1, 3))
+  expect_identical(lapply(policy_network(c(4, 2, 1), bias = TRUE)$weights, dim),
+                   list(c(2L, 5L), c(1L, 3L)))
+  expect_error(policy_network(c(2, 2, 1), weights = list(matrix(1, 2, 2), matrix(1, 1, 2)),
+                              bias = TRUE),
+               "must be a matrix of 2 x 3 for these sizes and a bias", class = "gym_error_argument")
+  expect_identical(format(policy), "network 2-2-1, tanh, identity, bias, 9 weights")
+})
+
+test_that("candidates with bias and normalized observations act as each by itself", {
+  env <- fake_environment(action_space = box_space(c(-1, -1), c(1, 1)))
+  policy <- policy_bind(policy_network(c(NA, 3, NA), c("tanh", "tanh"), bias = TRUE,
+                                       normalize = TRUE), env)
+  set.seed(1)
+  observed <- matrix(rnorm(40, 3, 2), 10)
+  policy$moments <- moments_of(observed)
+  weights <- matrix(rnorm(2 * length(coef(policy))), 2)
+  candidates <- policy_candidates(policy, weights)
+  which <- rep(1:2, 5)
+  together <- act_batch(policy_rows(candidates, which), observed, 10L, env)
+  each <- lapply(1:2, function(i) act(policy_subset(candidates, i), observed))
+  expect_equal(together[which == 1, ], each[[1]][which == 1, ])
+  expect_equal(together[which == 2, ], each[[2]][which == 2, ])
+})
+
+test_that("a linear policy is a network of one layer, of weights 0 at first", {
+  expect_identical(format(policy_linear()), "network *-*, identity")
+  expect_identical(format(policy_linear(bias = TRUE, normalize = TRUE)),
+                   "network *-*, identity, bias, normalized observations")
+  given <- policy_linear(weights = rbind(c(1, 2, 3)), bias = TRUE)
+  expect_identical(given$sizes, c(2L, 1L))
+  expect_equal(predict(given, c(10, 100), "output"), 213)
+  for (bad in list(1:3, "a", matrix("a"), matrix(0, 0, 3), matrix(NA_real_, 1, 2))) {
+    expect_error(policy_linear(weights = bad), "weights", class = "gym_error_argument")
+  }
+  expect_error(policy_linear(weights = matrix(1), bias = TRUE), class = "gym_error_argument")
+  expect_error(policy_linear(bias = 2), "`bias` must be", class = "gym_error_argument")
+  expect_error(policy_network(c(NA, 1), weights = list(matrix(1, 1, 4))), "Give all sizes",
+               class = "gym_error_argument")
 })
 
 test_that("an observation of the wrong length or type is refused with both numbers", {

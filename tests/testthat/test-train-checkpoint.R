@@ -8,28 +8,6 @@ quiet_search <- function(...) {
   suppressMessages(search_random(...), classes = "gym_message_resumed")
 }
 
-# Plays a search that writes after each batch, and keeps the file as each write left it.
-local_kept_files <- function(frame = parent.frame()) {
-  files <- new.env()
-  files$list <- list()
-  write <- write_checkpoint
-  local_functions(
-    write_checkpoint = function(path, state) {
-      write(path, state)
-      files$list <- c(files$list, list(readBin(path, "raw", file.size(path))))
-    },
-    rest_per_writing = 0,
-    frame = frame
-  )
-  files
-}
-
-local_checkpoint <- function(bytes = NULL, frame = parent.frame()) {
-  path <- withr::local_tempfile(fileext = ".rds", .local_envir = frame)
-  if (!is.null(bytes)) writeBin(bytes, path)
-  path
-}
-
 environments <- list(
   single = function() fake_environment(reward = first_action),
   sync = function() fake_vector_env(2, "sync", reward = first_action),

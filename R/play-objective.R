@@ -1,0 +1,94 @@
+#' The return of a policy as a function of its weights
+#'
+#' Makes a function for optimisers such as [stats::optim()], which look for the least value: of a
+#' vector of weights it plays the policy and gives minus its mean return. It plays the same episodes
+#' each time, so that equal weights have equal values.
+#'
+#' @inheritParams evaluate_policy
+#' @param policy The policy whose weights are the function's argument: a network, by default
+#'   [policy_linear()]. Moments of observations stay as they are.
+#' @param episodes How many episodes make a mean, a whole number of at least 1; the default is 10.
+#' @param seed A whole number that fixes the episodes. `NULL`, the default, draws one, once.
+#' @return A function of class `gym_objective`. Its argument `weights` is a numeric vector in the
+#'   order of [coef()][coef.gym_policy_network], or a matrix with the weights of a candidate in each
+#'   row, which are played side by side. It returns minus the mean return of each, a numeric vector.
+#'   Its attribute `policy` is the policy, fitted to the environment: `coef(attr(f, "policy"))` are
+#'   weights to begin with.
+#' @section Errors: As those of [rollout()]; from the function `gym_error_argument` when there are
+#'   not as many weights as the policy has.
+#' @seealso [train_agent()], [evaluate_policy()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' objective <- gym_objective("CartPole-v1", episodes = 5, seed = 1)
+#' objective(c(0, 0, 1, 1))
+#' objective(rbind(left = c(0, 0, -1, 0), right = c(0, 0, 1, 1)))
+#'
+#' set.seed(1)
+#' start <- coef(attr(objective, "policy"))
+#' found <- optim(start, objective, method = "SANN", control = list(maxit = 20))
+#' found$value
+#' policy <- attr(objective, "policy")
+#' coef(policy) <- found$par
+gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = NULL, ...,
+                          max_steps = NULL, num_envs = NULL, client = gym_client(),
+                          num_workers = NULL) {
+  call <- rlang::current_env()
+  check_environment(env)
+  check_count(episodes)
+  check_seed(seed)
+  if (!inherits(policy, "gym_policy_network")) {
+    abort_no_weights(policy, "policy", call)
+  }
+  seed <- seed %||% draw_seed()
+  in_env <- function(episodes, play) {
+    with_vector_env(env, episodes, play, max_steps, ..., num_envs = num_envs,
+                    num_workers = num_workers, client = client, call = call)
+  }
+  policy <- in_env(1, function(vector_env) policy_bind(policy, vector_env, call = call))
+  played <- same_episodes(seed, as.integer(episodes), max_steps)
+  objective <- function(weights) {
+    candidates <- policy_candidates(policy, if (is.matrix(weights)) weights else rbind(weights))
+    count <- nrow(candidates$weights)
+    -in_env(count * episodes, function(vector_env) played(vector_env, candidates, count))
+  }
+  structure(objective, policy = policy, class = c("gym_objective", "function"))
+}
+
+# Makes a function that plays the same episodes with each candidate, and returns the mean returns.
+# Nothing is drawn there: optim(method = "SANN") draws in C, and goes on with what drawing in the
+# function that it calls leaves behind, the same each time.
+same_episodes <- function(seed, episodes, max_steps) {
+  streams <- new_streams(seed)
+  seeds <- with_generator(streams$seeds, draw_environment_seeds(episodes))
+  kept <- saved_streams(streams)
+  play <- function(vector_env, candidates, which) {
+    history <- new_history(length(which), episodes, restore_streams(kept), common_seeds = TRUE)
+    taken <- 0L
+    history$draw_seeds <- function(n) {
+      taken <<- taken + n
+      seeds[taken - n + seq_len(n)]
+    }
+    play_batches(
+      vector_env, history, function(these) policy_subset(candidates, which[these]),
+      max_steps = max_steps %||% Inf
+    )
+    returns <- unlist(lapply(history$batches, function(batch) batch$return))
+    colMeans(matrix(returns, episodes))
+  }
+  function(vector_env, candidates, count) {
+    # Where all sub-environments share a seed, a candidate beside others would play other episodes.
+    if (vector_env$one_seed) {
+      vapply(seq_len(count), function(one) play(vector_env, candidates, one), 0)
+    } else {
+      play(vector_env, candidates, seq_len(count))
+    }
+  }
+}
+
+#' @export
+print.gym_objective <- function(x, ...) {
+  policy <- attr(x, "policy")
+  cat("<objective: minus the mean return of ", format(policy), " in ", policy$env_id, ">\n",
+      sep = "")
+  invisible(x)
+}

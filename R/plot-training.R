@@ -1,0 +1,110 @@
+#' Plot a training
+#'
+#' Shows how a training went over the steps of the environment: the range of the candidates' returns
+#' in each iteration as a band, their median as a line, the return of the agent's own policy, where
+#' it was looked at, as points, and the target as a dashed line. The final evaluation is the filled
+#' point at the end, with its interval.
+#'
+#' `autoplot()` draws the same with ggplot2, where that is installed.
+#'
+#' @param x,object A training, as [train_agent()] returns it.
+#' @param main The title; the default names the environment and the agent.
+#' @param xlab,ylab The axes' labels.
+#' @param ... Further arguments of [plot()][graphics::plot.default()], such as `ylim`.
+#' @return `x`, invisibly; `autoplot()` a ggplot.
+#' @section Errors: `gym_error_argument` when no iteration was played to its end.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' trained <- train_agent(agent_ars(), "CartPole-v1", iterations = 20, seed = 1)
+#' plot(trained)
+plot.gym_training <- function(x, main = NULL, xlab = "steps of the environment",
+                              ylab = "return (reward summed over an episode)", ...) {
+  data <- training_plot_data(x)
+  open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab), list(...))
+  history <- data$history
+  if (!is.null(data$target)) {
+    graphics::abline(h = data$target, col = okabe_ito$vermillion, lty = "dashed", lwd = 2)
+  }
+  graphics::polygon(
+    c(history$steps, rev(history$steps)), c(history$min_return, rev(history$max_return)),
+    col = grDevices::adjustcolor(okabe_ito$sky_blue, 0.35), border = NA
+  )
+  graphics::lines(history$steps, history$median_return, col = okabe_ito$blue, lwd = 2)
+  graphics::points(data$curve$steps, data$curve$mean_return, pch = 1L, col = okabe_ito$orange,
+                   lwd = 2)
+  final <- data$final
+  if (!is.null(final)) {
+    graphics::segments(final$steps, final$lower, final$steps, final$upper, lwd = 2,
+                       col = okabe_ito$orange)
+    graphics::points(final$steps, final$mean_return, pch = 16L, col = okabe_ito$orange, cex = 1.3)
+  }
+  graphics::title(main = main %||% training_title(x), line = 2.5)
+  training_legend(data)
+  invisible(x)
+}
+
+training_title <- function(x) {
+  paste0(sub(":.*", "", format(x$agent)), " in ", x$env_id)
+}
+
+#' Compute what a plot of a training shows
+#' @return A list: `history` (as the training's), `curve` (the evaluations but the final one, with
+#'   the column `steps`), `final` (the final one, `NULL` for none), `target` (`NULL` for none),
+#'   `xlim`, `ylim`.
+#' @noRd
+training_plot_data <- function(x, call = rlang::caller_env()) {
+  history <- x$history
+  if (is.null(history)) {
+    gym_abort(
+      "There is nothing to plot: the training ended before its first iteration did.",
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
+  }
+  evaluations <- x$evaluations
+  evaluations$steps <- history$steps[evaluations$iteration]
+  final <- evaluations[evaluations$kind == "final", ]
+  target <- if (!is.null(x$target) && is.finite(x$target)) x$target
+  list(
+    history = history, curve = evaluations[evaluations$kind != "final", ],
+    final = if (NROW(final)) final[nrow(final), ], target = target,
+    xlim = c(0, max(history$steps)),
+    ylim = range(history$min_return, history$max_return, evaluations$mean_return, target)
+  )
+}
+
+training_legend <- function(data) {
+  shown <- c(TRUE, TRUE, NROW(data$curve) > 0L || !is.null(data$final), !is.null(data$target))
+  legend_above(
+    labels = c("candidates", "their median", "the policy",
+               paste("target", number_text(data$target)))[shown],
+    col = c(okabe_ito$sky_blue, okabe_ito$blue, okabe_ito$orange, okabe_ito$vermillion)[shown],
+    pch = c(15L, NA, 1L, NA)[shown],
+    lty = c(NA, "solid", NA, "dashed")[shown]
+  )
+}
+
+# Drawn with ggplot2. It is registered when that is loaded, see autoplot.gym_rollout().
+#' @rdname plot.gym_training
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_training <- function(object, ...) {
+  data <- training_plot_data(object)
+  steps <- ggplot2::aes(x = .data$steps)
+  plot <- ggplot2::ggplot(data$history, steps) +
+    ggplot2::geom_ribbon(ggplot2::aes(ymin = .data$min_return, ymax = .data$max_return),
+                         fill = okabe_ito$sky_blue, alpha = 0.35) +
+    ggplot2::geom_line(ggplot2::aes(y = .data$median_return), colour = okabe_ito$blue,
+                       linewidth = 0.8) +
+    ggplot2::geom_point(ggplot2::aes(y = .data$mean_return), rbind(data$curve, data$final),
+                        colour = okabe_ito$orange, size = 2) +
+    ggplot2::labs(
+      title = training_title(object), x = "steps of the environment",
+      y = "return (reward summed over an episode)",
+      subtitle = "band: candidates; line: their median; points: the policy; dashed: target"
+    )
+  if (is.null(data$target)) {
+    plot
+  } else {
+    plot + ggplot2::geom_hline(yintercept = data$target, colour = okabe_ito$vermillion,
+                               linetype = "dashed", linewidth = 0.8)
+  }
+}

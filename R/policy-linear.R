@@ -1,0 +1,45 @@
+#' Decide by weighted sums of the observation
+#'
+#' Makes a network without hidden neurons, whose outputs are weighted sums of the observation's
+#' numbers. That is enough for many environments, MuJoCo's robots among them (Mania, Guy and Recht
+#' 2018; Rajeswaran et al. 2017). It has as many inputs and outputs as the environment that it
+#' plays, and its weights are 0 until a search finds others.
+#'
+#' An action is made of the outputs as [policy_network()] tells for outputs without a range: of
+#' several actions the one with the largest output, of two the second where the only output is above
+#' 0, and the numbers of a Box are the outputs, cut at its bounds.
+#'
+#' @inheritParams policy_network
+#' @param weights The weights, a matrix with one row for each output and one column for each number
+#'   of an observation, and with `bias = TRUE` one more for the constant. `NULL`, the default: all
+#'   are 0.
+#' @return A policy of class `gym_policy_network`, see [policy_network()], with the activation
+#'   `"identity"`. Its sizes are `NA` and its `weights` `NULL` until it is played, unless weights
+#'   were given.
+#' @section Errors: `gym_error_argument` when `weights` is no numeric matrix or has missing values.
+#' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
+#'   is competitive for reinforcement learning, NeurIPS 31.
+#'
+#'   A. Rajeswaran, K. Lowrey, E. Todorov and S. Kakade (2017), Towards generalization and
+#'   simplicity in continuous control, NeurIPS 30.
+#' @seealso [policy_network()]
+#' @export
+#' @examples
+#' policy_linear()
+#' follow <- policy_linear(weights = rbind(c(0, 0, 1, 1)))
+#' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
+policy_linear <- function(bias = FALSE, normalize = FALSE, weights = NULL) {
+  check_flag(bias)
+  check_flag(normalize)
+  sizes <- c(NA_integer_, NA_integer_)
+  if (!is.null(weights)) {
+    if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights) || ncol(weights) <= bias) {
+      abort_argument(weights, "a numeric matrix", "weights", rlang::current_env())
+    }
+    sizes <- c(ncol(weights) - bias, nrow(weights))
+    check_weights(list(weights), sizes, bias)
+  }
+  policy <- new_network(as.integer(sizes), "identity", bias, normalize)
+  policy["weights"] <- list(if (!is.null(weights)) list(weights))
+  policy
+}

@@ -1,0 +1,64 @@
+# Running moments of observations, by which a network's inputs are normalised: how many there were,
+# and of each number the mean and the sum of squared deviations from it (`squares`). `scale` is what
+# comes of these: 1 / standard deviation.
+#
+# Two sets are merged as Chan, Golub and LeVeque do (1979, "Updating formulae and a pairwise
+# algorithm for computing sample variances").
+
+# A number whose standard deviation is below this becomes 0, as in the code of Mania, Guy and Recht
+# (2018), https://github.com/modestyachts/ARS, ARS/filter.py.
+least_deviation <- 1e-7
+
+no_moments <- function() list(count = 0, mean = NULL, squares = NULL, scale = NULL)
+
+new_moments <- function(count, mean, squares) {
+  # Of a single observation there is no deviation; that code takes the square root of its square.
+  deviation <- if (count > 1) sqrt(squares / (count - 1)) else abs(mean)
+  list(
+    count = as.numeric(count), mean = mean, squares = squares,
+    scale = ifelse(deviation < least_deviation, 0, 1 / deviation)
+  )
+}
+
+#' Compute the moments of observations
+#' @param values A matrix with an observation in each row.
+#' @noRd
+moments_of <- function(values) {
+  n <- nrow(values)
+  mean <- .colMeans(values, n, ncol(values))
+  deviations <- values - rep(mean, each = n)
+  new_moments(n, mean, .colSums(deviations * deviations, n, ncol(values)))
+}
+
+# The order matters in the last bits.
+merge_moments <- function(x, y) {
+  if (is.null(x) || x$count == 0) {
+    return(y)
+  }
+  if (is.null(y) || y$count == 0) {
+    return(x)
+  }
+  count <- x$count + y$count
+  apart <- y$mean - x$mean
+  new_moments(
+    count,
+    x$mean + apart * (y$count / count),
+    x$squares + y$squares + apart * apart * (x$count * (y$count / count))
+  )
+}
+
+# Before the first moments are known, the observations themselves.
+normalized <- function(values, moments) {
+  if (is.null(moments$mean)) {
+    return(values)
+  }
+  n <- nrow(values)
+  (values - rep(moments$mean, each = n)) * rep(moments$scale, each = n)
+}
+
+reorder_moments <- function(moments, order) {
+  if (is.null(moments$mean)) {
+    return(moments)
+  }
+  new_moments(moments$count, moments$mean[order], moments$squares[order])
+}

@@ -1,0 +1,77 @@
+# The weights of a network: a matrix for each layer after the inputs, with a row for each neuron and
+# a column for each of what it takes; with a bias there is one column more, the last.
+
+# The shapes of the matrices.
+weight_shapes <- function(sizes, bias) {
+  Map(c, sizes[-1L], sizes[-length(sizes)] + isTRUE(bias))
+}
+
+# The weights are drawn in the order of the tutorial: first the matrix of the hidden layer, then
+# the weights of the output.
+draw_weights <- function(sizes, bias = FALSE) {
+  lapply(weight_shapes(sizes, bias), function(shape) {
+    matrix(stats::runif(prod(shape), -1, 1), shape[[1L]], shape[[2L]])
+  })
+}
+
+zero_weights <- function(sizes, bias) {
+  lapply(weight_shapes(sizes, bias), function(shape) matrix(0, shape[[1L]], shape[[2L]]))
+}
+
+# The weights may have been changed by hand. A network whose sizes are its environment's has none
+# before it is bound to one.
+check_network <- function(policy, call = rlang::caller_env()) {
+  if (is.null(policy$weights)) {
+    gym_abort(
+      c(paste0("The network does not know its sizes: ", sizes_text(policy$sizes), "."),
+        i = "`policy_bind(policy, env)` takes them from the environment."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+  check_weights(policy$weights, policy$sizes, policy$bias, "policy$weights", call)
+}
+
+check_weights <- function(weights, sizes, bias = FALSE, name = "weights",
+                          call = rlang::caller_env()) {
+  wanted <- weight_shapes(sizes, bias)
+  if (!is.list(weights) || length(weights) != length(wanted)) {
+    shapes <- vapply(wanted, paste, "", collapse = " x ")
+    must <- paste0("a list of ", length(wanted), " matrices (", paste(shapes, collapse = ", "), ")")
+    abort_argument(weights, must, name, call)
+  }
+  for (i in seq_along(wanted)) {
+    check_layer(weights[[i]], wanted[[i]], bias, paste0(name, "[[", i, "]]"), call)
+  }
+}
+
+check_layer <- function(layer, wanted, bias, arg, call) {
+  if (!is.matrix(layer) || !is.numeric(layer)) {
+    abort_argument(layer, "a numeric matrix", arg, call)
+  }
+  if (!identical(dim(layer), as.integer(wanted))) {
+    turned <- identical(rev(dim(layer)), as.integer(wanted))
+    gym_abort(
+      c(
+        paste0("`", arg, "` must be a matrix of ", paste(wanted, collapse = " x "),
+               " for these sizes", if (isTRUE(bias)) " and a bias", ", not of ",
+               paste(dim(layer), collapse = " x "), "."),
+        i = if (turned) "`t()` turns it: a row is a neuron, a column one of what it takes."
+      ),
+      class = "gym_error_argument", argument = arg, value = layer, call = call
+    )
+  }
+  if (anyNA(layer)) {
+    abort_argument(layer, "without missing values", arg, call)
+  }
+}
+
+# The weights as one vector, layer after layer, each matrix column after column.
+weight_vector <- function(policy) unlist(lapply(policy$weights, as.vector))
+
+with_weights <- function(policy, weights) {
+  policy$weights <- utils::relist(weights, policy$weights)
+  policy
+}
+
+# "4-2-1", and "*" for a size that is the environment's own.
+sizes_text <- function(sizes) paste(ifelse(is.na(sizes), "*", sizes), collapse = "-")

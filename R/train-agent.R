@@ -1,0 +1,166 @@
+#' Train an agent
+#'
+#' Asks the agent for candidates, plays each of them, and tells it what came of it, iteration after
+#' iteration, until the target is reached or the budget used up.
+#'
+#' # When training ends
+#'
+#' Every `eval_every` iterations the agent's own policy plays ten episodes, which make the learning
+#' curve. When these, or the candidates of an iteration, reach the target in the mean, the policy
+#' plays `eval_episodes` fresh ones, and these decide whether training ends. That may happen several
+#' times, and the time at which it ends is then one at which the policy was lucky. So at the end the
+#' policy plays `eval_episodes` further episodes, once, whose seeds nothing has seen before: their
+#' mean return is what the training has come to. Steps of evaluations are not counted as steps of
+#' the training.
+#'
+#' # Going on
+#'
+#' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
+#' so often that it takes a tenth of the time at most. The same call goes on from there, to the
+#' result to which an undisturbed training comes. `iterations` and `steps` may be others then.
+#'
+#' @param agent The agent, as [agent_ars()], [agent_cem()] or [agent_hill_climb()] make it, or one
+#'   of your own, see [agent_ask()].
+#' @param env The environment, as for [rollout()].
+#' @param policy The policy whose weights are to be found: a network, by default
+#'   [policy_linear()]. Most agents begin with the weights that it has.
+#' @param iterations,steps After how many iterations, or steps of the environment, to end, whole
+#'   numbers of at least 1. The iteration in which the steps are used up is played to its end. One
+#'   of the two must be given.
+#' @param episodes How many episodes each candidate plays in an iteration, a whole number of at
+#'   least 1; the default is 1.
+#' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
+#'   environment's own, where it has one; `Inf` goes on until the budget is used up.
+#' @param max_steps After how many steps to cut an episode short, as for [rollout()].
+#' @param eval_every After how many iterations the agent's policy is looked at, a whole number of at
+#'   least 1; the default is 10.
+#' @param eval_episodes How many episodes decide whether training ends, and make the final
+#'   evaluation, a whole number of at least 2; the default is 100.
+#' @param seed A whole number that fixes all that is drawn, as for [rollout()].
+#' @param callback `NULL`, the default, or a function that is called after each iteration with the
+#'   training so far, an object as `train_agent()` returns it. Training ends when it returns
+#'   `FALSE`.
+#' @param log `NULL`, the default, or a folder, which is made where it does not exist: each
+#'   iteration appends a row to `progress.csv` there, and `config.json` says what was trained.
+#' @param checkpoint `NULL`, the default, or the file to keep the training in, such as
+#'   `"training.rds"`.
+#' @param resume Go on with what the file has, if it is there? `TRUE`, the default, or `FALSE`,
+#'   which begins anew and replaces it.
+#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param num_envs,num_workers How many sub-environments to play in, and how many processes run
+#'   them, as for [rollout()].
+#' @param client The client of the server where an environment named by its id is made; the default
+#'   is the session's own, [gym_client()].
+#' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()] and
+#'   [predict()] know; a list with the elements
+#'   \describe{
+#'     \item{policy}{The agent's policy, with the weights that it has at the end.}
+#'     \item{agent}{The agent as it is at the end.}
+#'     \item{solved}{Whether a stopping evaluation has reached the target, a logical.}
+#'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps`
+#'       (those of the training so far, double), `min_return`, `median_return`, `mean_return`,
+#'       `max_return` (of the candidates' mean returns, double), `evaluation` (the mean return of
+#'       the agent's policy, `NA` where it was not looked at) and `elapsed` (seconds).}
+#'     \item{evaluations}{A data frame with a row for each evaluation: `iteration`, `kind`
+#'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
+#'       `mean_return` on.}
+#'     \item{final}{The last of these rows, the final evaluation. `NULL` where training was
+#'       interrupted.}
+#'     \item{target, env_id, seed}{As given, found or drawn.}
+#'     \item{steps, elapsed}{All steps of the training, and its seconds, doubles.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the iterations that
+#'       were finished.}
+#'   }
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a policy
+#'   that does not fit; `gym_error_checkpoint` for a file that cannot be gone on with. An error in
+#'   the middle has the class `gym_error_training`, too, and the iterations before it are the
+#'   element `result` of the condition.
+#' @seealso [evaluate_policy()], [rollout()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' trained <- train_agent(
+#'   agent_ars(directions = 8, top = 4, step_size = 0.02, noise = 0.05), "CartPole-v1",
+#'   iterations = 20, seed = 1
+#' )
+#' trained
+#' trained$final
+train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL, steps = NULL,
+                        episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
+                        eval_episodes = 100, seed = NULL, callback = NULL, log = NULL,
+                        checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
+                        num_envs = NULL, num_workers = NULL, client = gym_client()) {
+  call <- rlang::current_env()
+  settings <- list(
+    agent = agent, env = env, policy = policy, iterations = iterations, steps = steps,
+    episodes = episodes, target = target, max_steps = max_steps, eval_every = eval_every,
+    eval_episodes = eval_episodes, seed = seed, callback = callback
+  )
+  check_training(settings, call)
+  check_flag(progress)
+  check_flag(resume)
+  check_string(log, allow_null = TRUE)
+  check_string(checkpoint, allow_null = TRUE)
+  arguments <- training_arguments(settings)
+  file <- if (!is.null(checkpoint)) {
+    open_checkpoint(checkpoint, arguments, resume, "training", call)
+  }
+  settings$seed <- file$saved$seed %||% seed %||% draw_seed()
+  play <- function(vector_env) {
+    settings["target"] <- list(target %||% vector_env$spec$reward_threshold)
+    settings$env_id <- environment_label(vector_env)
+    bound <- policy_bind(policy, vector_env, call = call)
+    state <- new_training(agent_start(agent, bound), settings)
+    state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
+    state$log <- training_log(log, settings, call)
+    run_training(state, vector_env, settings, progress, call)
+  }
+  with_vector_env(env, eval_episodes, play, max_steps, num_envs = num_envs,
+                  num_workers = num_workers, client = client, call = call)
+}
+
+check_training <- function(settings, call) {
+  with(settings, {
+    check_agent(agent, call)
+    check_environment(env, call = call)
+    check_policy(policy, call = call)
+    check_count(iterations, allow_null = TRUE, call = call)
+    check_number(steps, min = 1, allow_null = TRUE, call = call)
+    check_count(episodes, call = call)
+    check_number(target, allow_null = TRUE, call = call)
+    check_count(max_steps, allow_null = TRUE, call = call)
+    check_count(eval_every, call = call)
+    check_count(eval_episodes, min = 2, call = call)
+    check_seed(seed, call = call)
+  })
+  if (is.null(settings$iterations) && is.null(settings$steps)) {
+    gym_abort(
+      "Training needs a budget: give `iterations`, or `steps` of the environment.",
+      class = "gym_error_argument", argument = "iterations", call = call
+    )
+  }
+  if (!is.null(settings$callback) && !is.function(settings$callback)) {
+    abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
+  }
+}
+
+check_agent <- function(agent, call) {
+  if (is.function(agent)) {
+    gym_abort(
+      c("`agent` must be an agent, not a function.",
+        i = "Did you forget the parentheses, as in `agent_ars()`?"),
+      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    )
+  }
+  if (!inherits(agent, "gym_agent")) {
+    abort_argument(agent, "an agent, as `agent_ars()` makes it", "agent", call)
+  }
+}
+
+# What must be the same in two runs of one training. The budget may be another.
+training_arguments <- function(settings) {
+  numbers <- c("episodes", "target", "max_steps", "eval_every", "eval_episodes", "seed")
+  c(
+    list(env = environment_traits(settings$env), agent = settings$agent, policy = settings$policy),
+    lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
+  )
+}

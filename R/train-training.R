@@ -1,0 +1,97 @@
+# The result of a training: class gym_training.
+
+training_result <- function(state, settings, interrupted = FALSE) {
+  structure(
+    list(
+      policy = agent_policy(state$agent),
+      agent = state$agent,
+      solved = state$solved,
+      history = rows_table(state$history),
+      evaluations = rows_table(state$evaluations),
+      final = state$final,
+      target = settings$target,
+      env_id = settings$env_id,
+      seed = settings$seed,
+      steps = state$steps,
+      elapsed = proc.time()[["elapsed"]] - state$started,
+      interrupted = interrupted
+    ),
+    class = "gym_training"
+  )
+}
+
+# Rows, which are lists or data frames, as one data frame.
+rows_table <- function(rows) {
+  if (length(rows)) {
+    columns <- lapply(stats::setNames(nm = names(rows[[1L]])), function(name) {
+      unlist(lapply(rows, `[[`, name))
+    })
+    as.data.frame(columns)
+  }
+}
+
+#' @export
+as.data.frame.gym_training <- function(x, row.names = NULL, optional = FALSE, ...) x$history
+
+#' @export
+print.gym_training <- function(x, ...) {
+  cat(training_lines(x), sep = "\n")
+  invisible(x)
+}
+
+training_lines <- function(x) {
+  outcome <- if (x$interrupted) "Interrupted after" else if (x$solved) "Solved after" else "Played"
+  target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
+  c(
+    paste0("Training in ", x$env_id, " by ", format(x$agent)),
+    paste0("Policy: ", policy_text(x$policy)),
+    paste0(
+      outcome, " ", count_of(max(0L, x$history$iteration), "iteration"), ", ",
+      count_of(x$steps, "step"), " in ", seconds_text(x$elapsed), target
+    ),
+    if (!is.null(x$final)) {
+      paste0("Mean return in ", count_of(x$final$episodes, "fresh episode"), ": ",
+             evaluation_text(x$final))
+    }
+  )
+}
+
+evaluation_text <- function(row) {
+  paste0(number_text(row$mean_return), se_text(row$se), ", 95% interval from ",
+         number_text(row$lower), " to ", number_text(row$upper))
+}
+
+#' @export
+predict.gym_training <- function(object, newdata, type = c("action", "output"), ...) {
+  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  predict_policy(object$policy, newdata, type)
+}
+
+#' @export
+summary.gym_training <- function(object, ...) {
+  structure(list(training = object), class = "summary.gym_training")
+}
+
+#' @export
+print.summary.gym_training <- function(x, ...) {
+  training <- x$training
+  cat(training_lines(training)[1:3], sep = "\n")
+  if (is.null(training$history)) {
+    return(invisible(x))
+  }
+  stopping <- training$evaluations[training$evaluations$kind == "stopping", ]
+  last <- training$history[nrow(training$history), ]
+  several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
+  cat(
+    "",
+    paste0("The candidates of the last iteration: mean return ", number_text(last$mean_return),
+           ", from ", number_text(last$min_return), " to ", number_text(last$max_return)),
+    if (length(stopping$iteration)) {
+      paste0("Stopping evaluation", several, ": ",
+             evaluation_text(stopping[nrow(stopping), ]))
+    },
+    if (!is.null(training$final)) paste0("Final evaluation: ", evaluation_text(training$final)),
+    sep = "\n"
+  )
+  invisible(x)
+}

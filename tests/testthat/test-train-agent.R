@@ -1,0 +1,311 @@
+# What counts of a training, without how long it took.
+what_counts <- function(training) {
+  training$history$elapsed <- NULL
+  training[setdiff(names(training), "elapsed")]
+}
+
+quiet_training <- function(..., env = fake_environment(reward = first_action), seed = 1) {
+  suppressMessages(train_agent(..., env = env, seed = seed, eval_episodes = 4, eval_every = 3),
+                   classes = "gym_message_resumed")
+}
+
+some_agents <- function() {
+  list(
+    ars = agent_ars(directions = 3, top = 2, step_size = 0.5, noise = 1), cem = agent_cem(6, 2),
+    hill = agent_hill_climb(noise = 1)
+  )
+}
+
+test_that("a training has a row for each iteration, and one for each evaluation", {
+  env <- fake_environment(reward = first_action)
+  trained <- quiet_training(agent_ars(directions = 3), iterations = 7, target = Inf, env = env)
+  expect_s3_class(trained, "gym_training")
+  expect_identical(trained$history$iteration, 1:7)
+  # Six candidates of one episode with three steps.
+  expect_identical(trained$history$steps, 18 * 1:7)
+  expect_identical(trained$steps, 126)
+  expect_identical(trained$evaluations$kind, c("curve", "curve", "final"))
+  expect_identical(trained$evaluations$iteration, c(3L, 6L, 7L))
+  expect_identical(trained$evaluations$episodes, rep(4L, 3))
+  expect_identical(trained$history$evaluation[c(3, 6, 7)], trained$evaluations$mean_return)
+  expect_true(all(is.na(trained$history$evaluation[-c(3, 6, 7)])))
+  expect_identical(trained$final, trained$evaluations[3, ], ignore_attr = TRUE)
+  expect_false(trained$solved)
+  expect_identical(as.data.frame(trained), trained$history)
+  expect_length(env$seeds, 6 * 7 + 4 * 3)
+  # Of each step of the training the observation that was acted on.
+  expect_identical(trained$policy$moments$count, 126)
+})
+
+test_that("evaluations change nothing of the training, and play episodes of their own", {
+  env <- fake_environment(reward = first_action)
+  play <- function(eval_every, env = fake_environment(reward = first_action)) {
+    train_agent(agent_ars(), env, iterations = 6, target = Inf, seed = 3, eval_episodes = 5,
+                eval_every = eval_every)
+  }
+  often <- play(1, env)
+  seldom <- play(50)
+  columns <- c("steps", "min_return", "median_return", "mean_return", "max_return")
+  expect_identical(often$history[columns], seldom$history[columns])
+  expect_identical(often$policy, seldom$policy)
+  parts <- cut(env$seeds, c(0, 2^30, 2^30 + 2^29, 2^31))
+  expect_identical(as.vector(table(parts)), c(16L * 6L, 5L * 6L, 5L))
+  expect_identical(which(parts == levels(parts)[[3]]), 127:131)
+})
+
+test_that("fresh episodes decide whether a training ends, and further ones what it has come to", {
+  lucky <- function(seed, step, action) if (seed <= 2^30) 10 else 1
+  trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,
+                            env = fake_environment(reward = lucky))
+  expect_false(trained$solved)
+  expect_identical(trained$evaluations$kind, c(rep("stopping", 4), "final"))
+  expect_identical(trained$evaluations$mean_return, rep(3, 5))
+  at_last <- function(seed, step, action) if (seed <= 2^30 + 2^29) 10 else 1
+  trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,
+                            env = fake_environment(reward = at_last))
+  expect_true(trained$solved)
+  expect_identical(trained$history$iteration, 1L)
+  expect_identical(trained$evaluations$mean_return, c(30, 3))
+  expect_output(print(trained), "Solved after 1 iteration, 3 steps in .* \\(target 20\\)")
+  expect_output(print(trained), "Mean return in 4 fresh episodes: 3 ")
+})
+
+test_that("the environment's own threshold is the target", {
+  env <- function() fake_environment(reward_threshold = 3)
+  expect_true(quiet_training(agent_cem(), iterations = 2, env = env())$solved)
+  expect_null(quiet_training(agent_cem(), iterations = 2)$target)
+  expect_false(quiet_training(agent_cem(), iterations = 2, target = 4, env = env())$solved)
+})
+
+test_that("a training ends when its steps are used up, or its callback says so", {
+  trained <- quiet_training(agent_cem(6), steps = 40, target = Inf)
+  expect_identical(trained$steps, 54)
+  seen <- list()
+  callback <- function(training) {
+    seen[[length(seen) + 1L]] <<- training
+    nrow(training$history) < 3
+  }
+  trained <- quiet_training(agent_cem(6), iterations = 9, target = Inf, callback = callback)
+  expect_identical(nrow(trained$history), 3L)
+  expect_length(seen, 3)
+  expect_s3_class(seen[[2]], "gym_training")
+  expect_identical(seen[[3]]$policy, trained$policy)
+  expect_false(is.null(trained$final))
+})
+
+test_that("a training goes on from the file of any iteration to an undisturbed one's result", {
+  make <- list(
+    function() fake_environment(reward = first_action),
+    function() fake_vector_env(2, "sync", reward = first_action),
+    function() fake_vector_env(7, "vector_entry_point", reward = first_action)
+  )
+  for (agent in some_agents()) {
+    for (env in make) {
+      play <- function(checkpoint = NULL) {
+        quiet_training(agent, iterations = 5, target = Inf, checkpoint = checkpoint, env = env())
+      }
+      undisturbed <- what_counts(play())
+      kept <- local_kept_files()
+      expect_identical(what_counts(play(local_checkpoint())), undisturbed)
+      expect_length(kept$list, 7)
+      for (bytes in kept$list) {
+        expect_identical(what_counts(play(local_checkpoint(bytes))), undisturbed)
+      }
+    }
+  }
+})
+
+test_that("a larger budget goes on where a smaller one has ended", {
+  play <- function(iterations, checkpoint) {
+    quiet_training(agent_ars(), iterations = iterations, target = Inf, checkpoint = checkpoint)
+  }
+  path <- local_checkpoint()
+  play(3, path)
+  expect_message(
+    train_agent(agent_ars(), fake_environment(reward = first_action), iterations = 3, target = Inf,
+                seed = 1, eval_episodes = 4, eval_every = 3, checkpoint = path),
+    "had ended", class = "gym_message_resumed"
+  )
+  more <- play(6, path)
+  at_once <- play(6, NULL)
+  expect_identical(more$history$mean_return, at_once$history$mean_return)
+  expect_identical(coef(more$policy), coef(at_once$policy))
+  expect_identical(more$evaluations$kind, c("curve", "final", "curve", "final"))
+})
+
+test_that("a file of something else is refused", {
+  path <- local_checkpoint()
+  quiet_training(agent_ars(), iterations = 2, checkpoint = path)
+  refused <- function(message, ...) {
+    expect_error(quiet_training(..., iterations = 2, checkpoint = path), message, fixed = TRUE,
+                 class = "gym_error_checkpoint")
+  }
+  refused("0.05 there, and CEM: population 40", agent_cem())
+  refused("noise 0.05 there, and ARS V2-t: directions 8, top 4, step_size 0.02, noise 0.1 here",
+          agent_ars(noise = 0.1))
+  refused("`env` is Fake-v0 there, and Other-v0 here.", agent_ars(),
+          env = fake_environment(id = "Other-v0"))
+  refused("`seed` is 1 there, and 2 here.", agent_ars(), seed = 2)
+  refused("`episodes` is 1 there, and 3 here.", agent_ars(), episodes = 3)
+  expect_error(
+    search_random(fake_environment(), checkpoint = path), "is that of a training", fixed = TRUE,
+    class = "gym_error_checkpoint"
+  )
+})
+
+test_that("an interrupt or an error leaves the iterations before it", {
+  stopping <- function(stop_it) {
+    env <- fake_environment(reward = first_action)
+    step <- env$step
+    env$step <- function(action) if (length(env$seeds) == 15L) stop_it() else step(action)
+    env
+  }
+  play <- function(env) quiet_training(agent_cem(6), iterations = 5, target = Inf, env = env)
+  expect_message(trained <- play(stopping(rlang::interrupt)), "interrupted after 2 iterations",
+                 class = "gym_message_interrupted")
+  expect_true(trained$interrupted)
+  expect_null(trained$final)
+  undisturbed <- play(fake_environment(reward = first_action))
+  expect_identical(trained$history$mean_return, undisturbed$history$mean_return[1:2])
+  expect_output(print(trained), "Interrupted after 2 iterations")
+  cnd <- expect_error(play(stopping(function() gym_abort("lost"))), "after 2 iterations",
+                      class = "gym_error_training")
+  expect_identical(cnd$result$history$mean_return, undisturbed$history$mean_return[1:2])
+})
+
+test_that("a return that is no number names the candidate and keeps what was trained", {
+  reward <- function(seed, step, action) if (length(env$seeds) == 15L) Inf else 1
+  env <- fake_environment(reward = reward)
+  cnd <- expect_error(quiet_training(agent_cem(6), iterations = 5, target = Inf, env = env),
+                      class = "gym_error_training")
+  expect_match(conditionMessage(cnd$parent), "candidate 3 of 6 is Inf")
+  expect_identical(nrow(cnd$result$history), 2L)
+})
+
+test_that("an agent that returns nonsense is refused, and what it returned shown", {
+  agent_of <- function(ask, tell = function(agent, results) agent) {
+    .S3method("agent_ask", "odd", ask)
+    .S3method("agent_tell", "odd", tell)
+    structure(list(), class = c("odd", "gym_agent"))
+  }
+  refused <- function(agent, message) {
+    cnd <- expect_error(quiet_training(agent, iterations = 2), class = "gym_error_training")
+    expect_match(conditionMessage(cnd$parent), message, fixed = TRUE)
+    expect_s3_class(cnd, "gym_error_agent")
+  }
+  refused(agent_of(function(agent) 1:4), "must return a numeric matrix with 4 columns")
+  refused(agent_of(function(agent) matrix(0, 2, 3)), "not an array of 2 x 3")
+  refused(agent_of(function(agent) matrix(NA_real_, 2, 4)), "finite numbers")
+  refused(agent_of(function(agent) matrix(0, 2, 4), function(agent, results) NULL),
+          "`agent_tell()` must return an agent, not NULL")
+})
+
+test_that("an agent of one's own trains, and goes on from its file", {
+  .S3method("agent_ask", "walk", function(agent) {
+    w <- coef(agent_policy(agent))
+    rbind(w + rnorm(length(w), sd = agent$size))
+  })
+  .S3method("agent_tell", "walk", function(agent, results) {
+    agent <- NextMethod()
+    if (results$returns >= agent$best) {
+      agent$best <- results$returns
+      coef(agent$policy) <- results$weights[1, ]
+    }
+    agent
+  })
+  walk <- structure(list(size = 0.1, best = -Inf), class = c("walk", "gym_agent"))
+  play <- function(checkpoint = NULL) {
+    quiet_training(walk, iterations = 5, target = Inf, checkpoint = checkpoint,
+                   policy = policy_linear(normalize = TRUE))
+  }
+  undisturbed <- what_counts(play())
+  expect_identical(undisturbed$policy$moments$count, 15)
+  kept <- local_kept_files()
+  play(local_checkpoint())
+  for (bytes in kept$list) {
+    expect_identical(what_counts(play(local_checkpoint(bytes))), undisturbed)
+  }
+  expect_output(print(undisturbed$agent), "<agent: walk>", fixed = TRUE)
+})
+
+test_that("the log has a row for each iteration, also where a training went on", {
+  folder <- withr::local_tempdir()
+  path <- local_checkpoint()
+  play <- function(iterations) {
+    quiet_training(agent_ars(), iterations = iterations, target = Inf, log = file.path(folder, "a"),
+                   checkpoint = path)
+  }
+  play(2)
+  trained <- play(4)
+  log <- utils::read.csv(file.path(folder, "a", "progress.csv"), check.names = FALSE)
+  expect_identical(log[["time/iterations"]], 1:4)
+  expect_equal(log[["rollout/ep_rew_mean"]], trained$history$mean_return)
+  expect_equal(log[["time/total_timesteps"]], trained$history$steps)
+  expect_equal(log[["rollout/ep_len_mean"]], rep(3, 4))
+  expect_identical(is.na(log[["eval/mean_reward"]]), c(TRUE, TRUE, FALSE, TRUE))
+  config <- jsonlite::read_json(file.path(folder, "a", "config.json"))
+  expect_identical(config$env, "Fake-v0")
+  expect_identical(config$seed, 1L)
+  expect_match(config$agent, "^ARS V2-t")
+  # Without a checkpoint the table begins anew.
+  quiet_training(agent_ars(), iterations = 1, log = file.path(folder, "a"))
+  expect_identical(nrow(utils::read.csv(file.path(folder, "a", "progress.csv"))), 1L)
+  file.create(file.path(folder, "file"))
+  expect_error(quiet_training(agent_ars(), iterations = 1, log = file.path(folder, "file", "a")),
+               "`log` must be a folder", class = "gym_error_argument")
+})
+
+test_that("arguments that are wrong are refused before anything is made", {
+  refused <- function(..., name) {
+    cnd <- expect_error(train_agent(..., env = "CartPole-v1", client = no_client()),
+                        class = "gym_error_argument")
+    expect_identical(cnd$argument, name)
+  }
+  refused(agent_ars, iterations = 1, name = "agent")
+  refused("ars", iterations = 1, name = "agent")
+  refused(agent_ars(), name = "iterations")
+  refused(agent_ars(), iterations = 0, name = "iterations")
+  refused(agent_ars(), steps = 0.5, name = "steps")
+  refused(agent_ars(), iterations = 1, episodes = 0, name = "episodes")
+  refused(agent_ars(), iterations = 1, target = "high", name = "target")
+  refused(agent_ars(), iterations = 1, eval_every = 0, name = "eval_every")
+  refused(agent_ars(), iterations = 1, eval_episodes = 1, name = "eval_episodes")
+  refused(agent_ars(), iterations = 1, callback = 3, name = "callback")
+  refused(agent_ars(), iterations = 1, seed = 0.5, name = "seed")
+  refused(agent_ars(), iterations = 1, policy = "linear", name = "policy")
+})
+
+test_that("a training predicts, and sums up its evaluations", {
+  at_last <- function(seed, step, action) if (seed <= 2^30 + 2^29) 10 else 1
+  trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,
+                            env = fake_environment(reward = at_last))
+  expect_identical(predict(trained, rbind(1:4)), act(trained$policy, rbind(1:4)))
+  lines <- capture.output(print(summary(trained)))
+  expect_match(lines, "candidates .*: mean return 30, from 30 to 30", all = FALSE)
+  expect_match(lines, "^Stopping evaluation: 30 ", all = FALSE)
+  expect_match(lines, "^Final evaluation: 3 ", all = FALSE)
+})
+
+test_that("the progress bar shows iterations, or steps where these are the budget", {
+  shown <- list()
+  local_functions(progress_bar = function(total, unit, ...) {
+    function(finished, note) shown[[length(shown) + 1L]] <<- list(total, unit, finished, note)
+  })
+  quiet_training(agent_cem(6), iterations = 2, target = Inf, progress = TRUE)
+  expect_identical(shown[[2]][1:3], list(2, "Iteration", 2L))
+  expect_match(shown[[2]][[4]], "median .*, best .*, .* steps/s, ")
+  quiet_training(agent_cem(6), steps = 30, target = Inf, progress = TRUE)
+  expect_identical(shown[[4]][1:3], list(30, "Step", 30))
+})
+
+test_that("CartPole is solved, from the same seed in the same way", {
+  client <- test_client()
+  play <- function() {
+    train_agent(agent_ars(directions = 8, top = 4, step_size = 0.02, noise = 0.05), "CartPole-v1",
+                iterations = 40, seed = 1, num_envs = 16, client = client)
+  }
+  trained <- play()
+  expect_true(trained$solved)
+  expect_gt(trained$final$mean_return, 450)
+  expect_identical(what_counts(play()), what_counts(trained))
+})
