@@ -70,7 +70,7 @@ agent_start.gym_agent_ars <- function(agent, policy) {
 
 #' @export
 agent_ask.gym_agent_ars <- function(agent) {
-  weights <- coef(agent$policy)
+  weights <- stats::coef(agent$policy)
   count <- length(weights)
   directions <- matrix(stats::rnorm(agent$directions * count), agent$directions, count)
   # Along and against the first direction, along and against the second, and so on.
@@ -89,7 +89,7 @@ agent_tell.gym_agent_ars <- function(agent, results) {
   if (deviation > 0) {
     directions <- attr(results$weights, "directions")[used, , drop = FALSE]
     gradient <- colSums(directions * (returns[, 1L] - returns[, 2L])) / (agent$top * deviation)
-    coef(agent$policy) <- coef(agent$policy) + agent$step_size * gradient
+    coef(agent$policy) <- stats::coef(agent$policy) + agent$step_size * gradient
   }
   agent
 }

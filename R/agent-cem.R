@@ -46,13 +46,13 @@ agent_cem <- function(population = 40, elite = max(1, population %/% 5), noise =
 #' @export
 agent_start.gym_agent_cem <- function(agent, policy) {
   agent <- NextMethod()
-  agent$deviation <- rep(agent$noise, length(coef(policy)))
+  agent$deviation <- rep(agent$noise, length(stats::coef(policy)))
   agent
 }
 
 #' @export
 agent_ask.gym_agent_cem <- function(agent) {
-  mean <- coef(agent$policy)
+  mean <- stats::coef(agent$policy)
   left <- max(0, 1 - agent$iteration / agent$extra_iterations)
   deviation <- sqrt(agent$deviation^2 + agent$extra_noise^2 * left)
   n <- agent$population

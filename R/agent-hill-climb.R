@@ -29,7 +29,7 @@ agent_hill_climb <- function(noise = 0.1, candidates = 1) {
 
 #' @export
 agent_ask.gym_agent_hill_climb <- function(agent) {
-  weights <- coef(agent$policy)
+  weights <- stats::coef(agent$policy)
   n <- agent$candidates
   away <- matrix(stats::runif(n * length(weights), -agent$noise, agent$noise), n)
   rep(weights, each = n) + away

@@ -119,19 +119,19 @@ train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL,
 }
 
 check_training <- function(settings, call) {
-  with(settings, {
-    check_agent(agent, call)
-    check_environment(env, call = call)
-    check_policy(policy, call = call)
-    check_count(iterations, allow_null = TRUE, call = call)
-    check_number(steps, min = 1, allow_null = TRUE, call = call)
-    check_count(episodes, call = call)
-    check_number(target, allow_null = TRUE, call = call)
-    check_count(max_steps, allow_null = TRUE, call = call)
-    check_count(eval_every, call = call)
-    check_count(eval_episodes, min = 2, call = call)
-    check_seed(seed, call = call)
-  })
+  check_agent(settings$agent, call)
+  check_environment(settings$env, "env", call)
+  check_policy(settings$policy, "policy", call)
+  check_number(settings$steps, min = 1, allow_null = TRUE, arg = "steps", call = call)
+  check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
+  check_seed(settings$seed, "seed", call)
+  for (name in c("iterations", "max_steps")) {
+    check_count(settings[[name]], allow_null = TRUE, arg = name, call = call)
+  }
+  for (name in c("episodes", "eval_every")) {
+    check_count(settings[[name]], arg = name, call = call)
+  }
+  check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
   if (is.null(settings$iterations) && is.null(settings$steps)) {
     gym_abort(
       "Training needs a budget: give `iterations`, or `steps` of the environment.",

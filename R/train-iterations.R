@@ -94,7 +94,7 @@ train_iteration <- function(state, vector_env, settings, call) {
 }
 
 check_asked <- function(asked, policy, agent, call) {
-  count <- length(coef(policy))
+  count <- length(stats::coef(policy))
   if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
     must <- paste("a numeric matrix with", count_of(count, "column"))
     abort_agent(asked, "agent_ask()", must, call)
