@@ -31,7 +31,15 @@
 #' @param shift What is subtracted from the reward of each step in training, a number: where an
 #'   environment rewards mere survival, as Hopper does by 1, the paper takes that away. The default
 #'   is 0.
-#' @return An agent of class `gym_agent_ars`.
+#' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
+#'   a row for, the settings that are not given are taken from there, with a message.
+#' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
+#' @param iterations,steps,target The budget and the target, as for [train_agent()]; `NULL`, the
+#'   default, takes the preset's.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
+#'   environment's own, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_ars()` an agent of class `gym_agent_ars`; `search_ars()` makes that agent, trains it
+#'   and returns what [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31. Code:
@@ -41,6 +49,8 @@
 #' @examples
 #' agent_ars()
 #' agent_ars(directions = 32, top = 4, step_size = 0.02, noise = 0.03)
+#' @examplesIf gym:::can_start_server()
+#' search_ars("CartPole-v1", seed = 1)
 agent_ars <- function(directions = 8, top = max(1, directions %/% 2), step_size = 0.02,
                       noise = 0.05, version = "V2-t", shift = 0) {
   check_count(directions)
@@ -101,4 +111,16 @@ format.gym_agent_ars <- function(x, ...) {
     c(x[c("directions", if (endsWith(x$version, "-t")) "top", "step_size", "noise")],
       if (x$shift != 0) x["shift"])
   )
+}
+
+#' @rdname agent_ars
+#' @export
+search_ars <- function(env = "CartPole-v1", policy = NULL, directions = NULL, top = NULL,
+                       step_size = NULL, noise = NULL, version = NULL, shift = NULL,
+                       iterations = NULL, steps = NULL, target = NULL, ...) {
+  given <- list(
+    policy = policy, directions = directions, top = top, step_size = step_size, noise = noise,
+    version = version, shift = shift, iterations = iterations, steps = steps, target = target
+  )
+  search_by("ars", agent_ars, given, env, ...)
 }

@@ -17,7 +17,15 @@
 #'   at least 0.
 #' @param extra_iterations After how many iterations the extra noise has become 0, a whole number of
 #'   at least 1; its variance decreases by the same amount in each.
-#' @return An agent of class `gym_agent_cem`.
+#' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
+#'   a row for, the settings that are not given are taken from there, with a message.
+#' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
+#' @param iterations,steps,target The budget and the target, as for [train_agent()]; `NULL`, the
+#'   default, takes the preset's.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
+#'   environment's own, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains it
+#'   and returns what [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @references I. Szita and A. Lorincz (2006), Learning Tetris using the noisy cross-entropy method,
 #'   Neural Computation 18(12), 2936-2941.
@@ -26,6 +34,8 @@
 #' @examples
 #' agent_cem()
 #' agent_cem(population = 100, elite = 10)
+#' @examplesIf gym:::can_start_server()
+#' search_cem("CartPole-v1", policy_network(), iterations = 20, seed = 1)
 agent_cem <- function(population = 40, elite = max(1, population %/% 5), noise = 1,
                       extra_noise = 1, extra_iterations = 20) {
   check_count(population, min = 2)
@@ -75,4 +85,17 @@ agent_tell.gym_agent_cem <- function(agent, results) {
 #' @export
 format.gym_agent_cem <- function(x, ...) {
   agent_text("CEM", x[c("population", "elite", "noise", "extra_noise", "extra_iterations")])
+}
+
+#' @rdname agent_cem
+#' @export
+search_cem <- function(env = "CartPole-v1", policy = NULL, population = NULL, elite = NULL,
+                       noise = NULL, extra_noise = NULL, extra_iterations = NULL,
+                       iterations = NULL, steps = NULL, target = NULL, ...) {
+  given <- list(
+    policy = policy, population = population, elite = elite, noise = noise,
+    extra_noise = extra_noise, extra_iterations = extra_iterations, iterations = iterations,
+    steps = steps, target = target
+  )
+  search_by("cem", agent_cem, given, env, ...)
 }

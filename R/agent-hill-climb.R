@@ -7,7 +7,14 @@
 #' @param noise How far from the best weights a candidate may be in each weight, a number above 0.
 #' @param candidates How many candidates are played in an iteration, a whole number of at least 1;
 #'   the default is 1.
-#' @return An agent of class `gym_agent_hill_climb`. Its policy has the best weights so far.
+#' @param env The environment, as for [train_agent()].
+#' @param policy The policy, as for [train_agent()].
+#' @param iterations,steps,target The budget and the target, as for [train_agent()].
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
+#'   environment's own, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_hill_climb()` an agent of class `gym_agent_hill_climb`, whose policy has the best
+#'   weights so far; `search_hill_climb()` makes that agent, trains it and returns what
+#'   [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @references K. Frans (2016), Simple reinforcement learning methods to learn CartPole,
 #'   <https://kvfrans.com/simple-algoritms-for-solving-cartpole/>.
@@ -16,6 +23,8 @@
 #' @examples
 #' agent_hill_climb()
 #' agent_hill_climb(noise = 0.5, candidates = 8)
+#' @examplesIf gym:::can_start_server()
+#' search_hill_climb("CartPole-v1", candidates = 8, iterations = 20, seed = 1)
 agent_hill_climb <- function(noise = 0.1, candidates = 1) {
   check_above_zero(noise)
   check_count(candidates)
@@ -49,4 +58,15 @@ agent_tell.gym_agent_hill_climb <- function(agent, results) {
 #' @export
 format.gym_agent_hill_climb <- function(x, ...) {
   agent_text("hill climbing", c(x["noise"], if (x$candidates > 1L) x["candidates"]))
+}
+
+#' @rdname agent_hill_climb
+#' @export
+search_hill_climb <- function(env = "CartPole-v1", policy = policy_linear(), noise = 0.1,
+                              candidates = 1, iterations = NULL, steps = NULL, target = NULL,
+                              ...) {
+  train_agent(
+    agent_hill_climb(noise, candidates), env, policy, iterations = iterations, steps = steps,
+    target = target, ...
+  )
 }

@@ -89,24 +89,6 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
   in_env(play, max_steps)
 }
 
-check_seeds <- function(seeds, call = rlang::caller_env()) {
-  if (!is.numeric(seeds) || !length(seeds)) {
-    abort_argument(seeds, "one or more whole numbers", "seeds", call)
-  }
-  for (i in seq_along(seeds)) {
-    check_count(seeds[[i]], min = -.Machine$integer.max, arg = paste0("seeds[", i, "]"),
-                call = call)
-  }
-  if (anyDuplicated(seeds)) {
-    twice <- seeds[[anyDuplicated(seeds)]]
-    gym_abort(
-      paste0("`seeds` must differ, as equal ones give equal searches, but ", twice,
-             " is there more than once."),
-      class = "gym_error_argument", argument = "seeds", value = seeds, call = call
-    )
-  }
-}
-
 check_target <- function(settings, call) {
   if (is.null(settings$target)) {
     gym_abort(

@@ -131,7 +131,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
     ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
-  env <- server_env$new(client, instance_id, c(noted_wrappers(env_id), wrappers))
+  env <- server_env$new(client, instance_id, c(noted_wrappers(env_id), wrappers), kwargs)
   env
 }
 
@@ -169,7 +169,7 @@ server_env <- R6Class(
     num_workers = NULL,
     autoreset_mode = NULL,
     spec = NULL,
-    initialize = function(client, instance_id, wrappers = list()) {
+    initialize = function(client, instance_id, wrappers = list(), kwargs = list()) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
       private$connected <- client
@@ -180,6 +180,7 @@ server_env <- R6Class(
       }
       self$spec <- private$instance$spec
       self$spec$wrappers <- wrapper_names(wrappers)
+      self$spec$kwargs <- kwargs
     },
     reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
       private$check_open()

@@ -41,10 +41,25 @@ client_state <- function(client) {
       state$instances <- new.env(parent = emptyenv())
       state$creation_keys <- new_idempotency_keys()
       state$to_close <- character()
+      state$versions <- NULL
       state$layouts <- new.env(parent = emptyenv())
       state$pid <- Sys.getpid()
       state$session <- the_session
     })
   }
   state
+}
+
+# The versions of the server, its Python and its Gymnasium, a named list; `NULL` where it has no
+# such route, or there is no client. They are asked for once.
+server_versions <- function(client) {
+  if (is.null(client)) {
+    return(NULL)
+  }
+  state <- client_state(client)
+  if (is.null(state$versions)) {
+    health <- tryCatch(get_answer(client, "/v1/health/"), gym_error = function(cnd) NULL)
+    state$versions <- list(health$versions)
+  }
+  state$versions[[1L]]
 }

@@ -50,6 +50,7 @@ evaluate_policy <- function(env, policy, episodes = 100, seed = NULL, ..., max_s
   structure(
     evaluate_episodes(played$episodes, played$policy, level), level = level,
     env_id = played$env_id, policy = played$policy, seed = played$seed,
+    provenance = played$provenance,
     class = c("gym_evaluation", "data.frame")
   )
 }

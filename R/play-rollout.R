@@ -96,6 +96,7 @@
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same result.}
 #'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the batches of episodes
 #'       that were finished.}
+#'     \item{provenance}{What [provenance()] tells.}
 #'   }
 #'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
 #'   the episodes.
@@ -200,8 +201,11 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
   }
   policy <- policy_bind(policy, vector_env, call = vector_env$call)
   history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
+  origin <- new_provenance(vector_env, list(seed = seed))
+  began <- proc.time()[["elapsed"]]
   result <- function(interrupted = FALSE) {
-    new_rollout(history, policy, vector_env, seed, steps, next_observation, interrupted)
+    origin$elapsed <- proc.time()[["elapsed"]] - began
+    new_rollout(history, policy, vector_env, origin, steps, next_observation, interrupted)
   }
   total <- candidates * episodes
   show <- if (progress) progress_bar(total, "Episode") else function(ended) NULL
@@ -228,7 +232,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
   result(interrupted)
 }
 
-new_rollout <- function(history, policy, vector_env, seed, steps, next_observation, interrupted) {
+new_rollout <- function(history, policy, vector_env, origin, steps, next_observation, interrupted) {
   several <- !is.null(count_candidates(policy))
   episodes <- episodes_table(history$batches, several)
   fps <- vector_env$spec$render_fps
@@ -246,8 +250,9 @@ new_rollout <- function(history, policy, vector_env, seed, steps, next_observati
       policy = policy,
       env_id = environment_label(vector_env),
       num_envs = if (vector_env$one_seed) vector_env$num_envs,
-      seed = seed,
-      interrupted = interrupted
+      seed = origin$seed,
+      interrupted = interrupted,
+      provenance = origin
     ),
     class = "gym_rollout"
   )

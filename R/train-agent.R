@@ -37,6 +37,12 @@
 #' @param eval_episodes How many episodes decide whether training ends, and make the final
 #'   evaluation, a whole number of at least 2; the default is 100.
 #' @param seed A whole number that fixes all that is drawn, as for [rollout()].
+#' @param seeds `NULL`, the default, or different whole numbers: then the agent is trained anew with
+#'   each of them, and all trainings are returned. Each is the one that `train_agent(seed = )` gives
+#'   with that seed. `checkpoint = "training.rds"` becomes a file for each, such as
+#'   `"training-7.rds"`, and `log` has a folder for each, such as `seed-7`.
+#' @param ... The environment's own arguments, by name, such as `continuous = TRUE` for
+#'   LunarLander, where it is named by its id.
 #' @param callback `NULL`, the default, or a function that is called after each iteration with the
 #'   training so far, an object as `train_agent()` returns it. Training ends when it returns
 #'   `FALSE`.
@@ -51,8 +57,9 @@
 #'   them, as for [rollout()].
 #' @param client The client of the server where an environment named by its id is made; the default
 #'   is the session's own, [gym_client()].
-#' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()] and
-#'   [predict()] know; a list with the elements
+#' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()],
+#'   [plot()][plot.gym_training()], [predict()], [coef()], [animate()] and [provenance()] know; with
+#'   `seeds` one of class [gym_trainings]. A training is a list with the elements
 #'   \describe{
 #'     \item{policy}{The agent's policy, with the weights that it has at the end.}
 #'     \item{agent}{The agent as it is at the end.}
@@ -67,6 +74,9 @@
 #'     \item{final}{The last of these rows, the final evaluation. `NULL` where training was
 #'       interrupted.}
 #'     \item{target, env_id, seed}{As given, found or drawn.}
+#'     \item{env}{The environment as given: its id, or the object.}
+#'     \item{kwargs}{The environment's own arguments, a named list.}
+#'     \item{provenance}{What [provenance()] tells.}
 #'     \item{steps, elapsed}{All steps of the training, and its seconds, doubles.}
 #'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the iterations that
 #'       were finished.}
@@ -86,36 +96,66 @@
 #' trained$final
 train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL, steps = NULL,
                         episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
-                        eval_episodes = 100, seed = NULL, callback = NULL, log = NULL,
-                        checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
-                        num_envs = NULL, num_workers = NULL, client = gym_client()) {
+                        eval_episodes = 100, seed = NULL, seeds = NULL, ..., callback = NULL,
+                        log = NULL, checkpoint = NULL, resume = TRUE,
+                        progress = rlang::is_interactive(), num_envs = NULL, num_workers = NULL,
+                        client = gym_client()) {
   call <- rlang::current_env()
   settings <- list(
-    agent = agent, env = env, policy = policy, iterations = iterations, steps = steps,
-    episodes = episodes, target = target, max_steps = max_steps, eval_every = eval_every,
-    eval_episodes = eval_episodes, seed = seed, callback = callback
+    agent = agent, env = env, kwargs = list(...), policy = policy, iterations = iterations,
+    steps = steps, episodes = episodes, target = target, max_steps = max_steps,
+    eval_every = eval_every, eval_episodes = eval_episodes, seed = seed, callback = callback
   )
   check_training(settings, call)
   check_flag(progress)
   check_flag(resume)
   check_string(log, allow_null = TRUE)
   check_string(checkpoint, allow_null = TRUE)
-  arguments <- training_arguments(settings)
-  file <- if (!is.null(checkpoint)) {
-    open_checkpoint(checkpoint, arguments, resume, "training", call)
+  if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
+  in_env <- function(use, max_steps = NULL) {
+    with_vector_env(env, eval_episodes, use, max_steps, ..., num_envs = num_envs,
+                    num_workers = num_workers, client = client, call = call)
   }
-  settings$seed <- file$saved$seed %||% seed %||% draw_seed()
-  play <- function(vector_env) {
-    settings["target"] <- list(target %||% vector_env$spec$reward_threshold)
-    settings$env_id <- environment_label(vector_env)
-    bound <- policy_bind(policy, vector_env, call = call)
-    state <- new_training(agent_start(agent, bound), settings)
-    state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
-    state$log <- training_log(log, settings, call)
-    run_training(state, vector_env, settings, progress, call)
+  files <- list(checkpoint = checkpoint, log = log, resume = resume)
+  if (is.null(seeds)) {
+    file <- training_file(settings, files, call)
+    in_env(function(vector_env) {
+      train_in(vector_env, settings, file, log, progress, call)
+    }, max_steps)
+  } else {
+    train_seeds(in_env, settings, seeds, files, progress, call)
   }
-  with_vector_env(env, eval_episodes, play, max_steps, num_envs = num_envs,
-                  num_workers = num_workers, client = client, call = call)
+}
+
+# Reads the checkpoint of a training, where it is to have one.
+training_file <- function(settings, files, call) {
+  if (!is.null(files$checkpoint)) {
+    open_checkpoint(files$checkpoint, training_arguments(settings), files$resume, "training", call)
+  }
+}
+
+#' Train in an environment that was made
+#' @param file As [training_file()] returns it.
+#' @noRd
+train_in <- function(vector_env, settings, file, log, progress, call) {
+  settings$seed <- file$saved$seed %||% settings$seed %||% draw_seed()
+  settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
+  settings$env_id <- environment_label(vector_env)
+  settings$provenance <- new_provenance(vector_env, settings)
+  bound <- bind_with_seed(settings$policy, vector_env, settings$seed, call)
+  state <- new_training(agent_start(settings$agent, bound), settings)
+  state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
+  state$log <- training_log(log, settings, call)
+  run_training(state, vector_env, settings, progress, call)
+}
+
+# Weights that are drawn when the environment's sizes are known follow from the training's seed: a
+# policy that draws them is drawn anew.
+bind_with_seed <- function(policy, vector_env, seed, call) {
+  if (!is.null(policy$weights_seed)) {
+    policy$weights_seed <- seed
+  }
+  policy_bind(policy, vector_env, call = call)
 }
 
 check_training <- function(settings, call) {
@@ -160,7 +200,22 @@ check_agent <- function(agent, call) {
 training_arguments <- function(settings) {
   numbers <- c("episodes", "target", "max_steps", "eval_every", "eval_episodes", "seed")
   c(
-    list(env = environment_traits(settings$env), agent = settings$agent, policy = settings$policy),
+    list(
+      env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
+      agent = comparable_agent(settings$agent), policy = comparable_policy(settings$policy)
+    ),
     lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
+}
+
+# Where its settings come from makes no difference.
+comparable_agent <- function(agent) {
+  agent$preset <- NULL
+  agent
+}
+
+# The seed of weights that are not drawn yet is the training's own.
+comparable_policy <- function(policy) {
+  policy$weights_seed <- NULL
+  policy
 }

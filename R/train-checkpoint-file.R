@@ -2,7 +2,7 @@
 # not at all.
 
 # The version of the file's format. Files with another version are refused.
-checkpoint_format <- 4L
+checkpoint_format <- 5L
 
 #' Read the file of a search
 #' @return What [keep_history()] wrote, `NULL` where there is no file.

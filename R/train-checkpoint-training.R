@@ -22,6 +22,7 @@ training_checkpoint <- function(state, checkpoint, settings, vector_env, call) {
   write <- checkpoint_writer(checkpoint, function() {
     list(
       what = "training", arguments = checkpoint$arguments, server = server, seed = settings$seed,
+      provenance = settings$provenance,
       training = mget(kept_of_training, state), streams = saved_streams(state$streams),
       evaluation_streams = saved_streams(state$evaluation_streams),
       elapsed = proc.time()[["elapsed"]] - state$started
@@ -38,6 +39,7 @@ resume_training <- function(state, saved, settings, path) {
   if (!state$ended && !is_used_up(state, settings)) {
     # The budget is a larger one now.
     state$final <- NULL
+    state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
   }
   if (is.null(state$final)) {
     inform_resumed("Going on from {.path {path}}, after {state$iteration} iteration{?s}.")

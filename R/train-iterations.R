@@ -155,9 +155,14 @@ training_ends <- function(state, vector_env, settings) {
 #' @noRd
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   policy <- agent_policy(state$agent)
+  # The final evaluation draws from copies: a training that goes on with a larger budget evaluates as
+  # one that had it from the start.
+  final <- kind == "final"
+  streams <- state$evaluation_streams
+  if (final) streams <- restore_streams(saved_streams(streams))
   half <- last_training_seed / 2
-  before <- last_training_seed + if (kind == "final") half - 1 else 0
-  history <- new_history(1L, episodes, state$evaluation_streams)
+  before <- last_training_seed + if (final) half - 1 else 0
+  history <- new_history(1L, episodes, streams)
   history$draw_seeds <- function(n) as.integer(before + sample.int(half - 1, n, replace = TRUE))
   play_batches(
     vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf
@@ -166,7 +171,7 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
   row.names(row) <- NULL
   state$evaluations[[length(state$evaluations) + 1L]] <- row
-  if (state$iteration > 0L) {
+  if (state$iteration > 0L && !final) {
     state$history[[state$iteration]]$evaluation <- row$mean_return
   }
   row

@@ -11,10 +11,14 @@ training_result <- function(state, settings, interrupted = FALSE) {
       final = state$final,
       target = settings$target,
       env_id = settings$env_id,
+      env = settings$env,
+      kwargs = settings$kwargs,
       seed = settings$seed,
       steps = state$steps,
       elapsed = proc.time()[["elapsed"]] - state$started,
-      interrupted = interrupted
+      interrupted = interrupted,
+      max_steps = settings$max_steps,
+      provenance = settings$provenance
     ),
     class = "gym_training"
   )
@@ -65,6 +69,12 @@ evaluation_text <- function(row) {
 predict.gym_training <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
   predict_policy(object$policy, newdata, type)
+}
+
+#' @export
+coef.gym_training <- function(object, ...) {
+  check_dots_empty(...)
+  stats::coef(object$policy)
 }
 
 #' @export

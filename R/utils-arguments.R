@@ -38,6 +38,24 @@ check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()
   check_count(x, min = -.Machine$integer.max, allow_null = TRUE, arg = arg, call = call)
 }
 
+check_seeds <- function(seeds, call = rlang::caller_env()) {
+  if (!is.numeric(seeds) || !length(seeds)) {
+    abort_argument(seeds, "one or more whole numbers", "seeds", call)
+  }
+  for (i in seq_along(seeds)) {
+    check_count(seeds[[i]], min = -.Machine$integer.max, arg = paste0("seeds[", i, "]"),
+                call = call)
+  }
+  if (anyDuplicated(seeds)) {
+    twice <- seeds[[anyDuplicated(seeds)]]
+    gym_abort(
+      paste0("`seeds` must differ, as equal ones give equal results, but ", twice,
+             " is there more than once."),
+      class = "gym_error_argument", argument = "seeds", value = seeds, call = call
+    )
+  }
+}
+
 check_flag <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (!rlang::is_bool(x)) {
     abort_argument(x, "TRUE or FALSE", arg, call)

@@ -1,0 +1,102 @@
+# Settings that solve an environment, written down beside each other, and the functions that make an
+# agent and train it in one call.
+
+#' Settings that solve environments
+#'
+#' [search_ars()] and [search_cem()] take these settings where the environment is named by its id
+#' and has a row here, and say so. Arguments that are given take the place of the preset's.
+#'
+#' @param env_id The id of an environment, a string, for its presets alone; `NULL`, the default, for
+#'   all.
+#' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the
+#'   environment's own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or
+#'   `"cem"`), the agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such
+#'   one), of the policy `hidden` (how many hidden neurons a network has, `NA` for a linear policy)
+#'   and `bias` (a logical), of the training `episodes`, `steps` (its budget) and `target` (the mean
+#'   return at which it stops, which lies above the one that the environment counts as solved, so
+#'   that the final evaluation reaches that), and where they come from: `origin` is `"paper"`, with
+#'   the `source`, or `"ours"`.
+#' @section Errors: `gym_error_argument` when `env_id` is no string.
+#' @export
+#' @examples
+#' agent_presets()[c("env_id", "agent", "directions", "step_size", "noise", "origin")]
+agent_presets <- function(env_id = NULL) {
+  check_string(env_id, allow_null = TRUE)
+  file <- system.file("extdata", "agent-presets.csv", package = "gym", mustWork = TRUE)
+  presets <- utils::read.csv(file, stringsAsFactors = FALSE)
+  for (name in c("kwargs", "source")) {
+    presets[[name]][is.na(presets[[name]])] <- ""
+  }
+  presets <- presets[is.null(env_id) | presets$env_id == env_id, ]
+  row.names(presets) <- NULL
+  presets
+}
+
+# The preset of an agent for an environment with these arguments, a list; `NULL` where there is none.
+find_preset <- function(agent, env, kwargs) {
+  if (!is.character(env)) {
+    return(NULL)
+  }
+  presets <- agent_presets(env)
+  presets <- presets[presets$agent == agent, ]
+  for (row in seq_len(nrow(presets))) {
+    preset <- as.list(presets[row, ])
+    own <- if (nzchar(preset$kwargs)) jsonlite::fromJSON(preset$kwargs, FALSE) else list()
+    if (identical(sorted_by_name(own), sorted_by_name(kwargs))) {
+      return(Filter(function(value) !is.na(value) && !identical(value, ""), preset))
+    }
+  }
+  NULL
+}
+
+# An empty list may have names or none.
+sorted_by_name <- function(values) if (length(values)) values[order(names(values))] else list()
+
+#' Make an agent and train it
+#'
+#' @param agent The agent's name, as in the presets.
+#' @param make The function that makes it.
+#' @param given What the user has given, a list: the agent's arguments, `policy`, and arguments of
+#'   the training.
+#' @param env,... As for [train_agent()].
+#' @noRd
+search_by <- function(agent, make, given, env, ..., call = rlang::caller_env()) {
+  check_environment(env, "env", call)
+  dots <- list(...)
+  of_training <- names(dots) %in% names(formals(train_agent))
+  preset <- find_preset(agent, env, dots[!of_training])
+  given <- given[lengths(given) > 0L]
+  own <- intersect(names(formals(make)), names(given))
+  arguments <- preset[intersect(names(formals(make)), names(preset))]
+  arguments[own] <- given[own]
+  made <- rlang::exec(make, !!!arguments)
+  training <- c(given[setdiff(names(given), own)], dots[of_training])
+  if (!is.null(preset)) {
+    # A budget of the user's own is the only one.
+    budget <- any(c("iterations", "steps") %in% names(training))
+    from_preset <- preset[setdiff(c("episodes", "target", if (!budget) "steps"), names(training))]
+    training[names(from_preset)] <- from_preset
+    training$policy <- training$policy %||% preset_policy(preset)
+    inform_of_preset(preset, env)
+  }
+  made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
+  rlang::exec(train_agent, made, env, !!!training, !!!dots[!of_training])
+}
+
+preset_policy <- function(preset) {
+  if (is.null(preset$hidden)) {
+    policy_linear(bias = preset$bias)
+  } else {
+    policy_network(
+      c(NA, preset$hidden, NA), c("tanh", "identity"), bias = preset$bias, normalize = FALSE
+    )
+  }
+}
+
+inform_of_preset <- function(preset, env) {
+  origin <- if (preset$origin == "paper") paste0("paper: ", preset$source) else "ours"
+  cli::cli_inform(
+    c(i = "Taking the preset for {env} ({origin}), see {.code agent_presets(\"{env}\")}."),
+    class = "gym_message_preset"
+  )
+}

@@ -1,0 +1,153 @@
+#' Trainings with several seeds
+#'
+#' One training says little about an agent: another seed may fail. `train_agent(seeds = )` trains
+#' anew with each of many seeds and returns all of them, failures included.
+#'
+#' How often the target is reached is judged by the final evaluations, of episodes that no training
+#' has seen: a training counts as solved where its final mean return has reached the target. The
+#' interval of that share is Wilson's, which makes sense also where all or none have.
+#'
+#' @param x,object Trainings, as `train_agent(seeds = )` returns them.
+#' @param row.names,optional,... Not used.
+#' @return An object of class `gym_trainings`, a list with the elements
+#'   \describe{
+#'     \item{trainings}{A list of the trainings, objects of class `gym_training`, named by their
+#'       seeds.}
+#'     \item{env_id, target}{The environment's id, a string, and the target, a number or `NULL`.}
+#'     \item{elapsed}{The seconds that all took, a double.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. The last of the trainings may then
+#'       have ended early.}
+#'   }
+#'   `as.data.frame()` gives a row for each seed: `seed` (integer), `solved` (logical: has the final
+#'   evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`, `se`,
+#'   `lower`, `upper` (of the final evaluation, doubles), `elapsed` (seconds, a double),
+#'   `interrupted` (logical).
+#'
+#'   `coef()` gives the weights of the policies, a matrix with a row for each seed.
+#'
+#'   `summary()` gives an object of class `summary.gym_trainings`, a list of `trainings`, `solved`
+#'   and `finished` (how many, integers), `lower` and `upper` (the 95% interval of the share that
+#'   solves, doubles), `returns` and `steps` (quartiles and mean of the final mean returns and of
+#'   the steps of the training, named numeric vectors of length 6).
+#' @references E. B. Wilson (1927), Probable inference, the law of succession, and statistical
+#'   inference, Journal of the American Statistical Association 22, 209-212.
+#' @seealso [train_agent()], [plot()][plot.gym_trainings()]
+#' @name gym_trainings
+#' @examplesIf gym:::can_start_server()
+#' trained <- train_agent(agent_ars(), "CartPole-v1", iterations = 20, seeds = 1:3)
+#' trained
+#' as.data.frame(trained)
+#' trained$trainings[["2"]]
+NULL
+
+new_trainings <- function(trainings, settings, elapsed, interrupted) {
+  first <- if (length(trainings)) trainings[[1L]]
+  origin <- first$provenance
+  origin$seed <- vapply(trainings, function(training) as.numeric(training$seed), 0)
+  structure(
+    list(
+      trainings = stats::setNames(trainings, format(origin$seed, scientific = FALSE, trim = TRUE)),
+      agent = settings$agent, env_id = first$env_id, target = first$target, elapsed = elapsed,
+      interrupted = interrupted, provenance = if (!is.null(first)) origin
+    ),
+    class = "gym_trainings"
+  )
+}
+
+#' @rdname gym_trainings
+#' @export
+as.data.frame.gym_trainings <- function(x, row.names = NULL, optional = FALSE, ...) {
+  final <- function(training, name) as.numeric(training$final[[name]] %||% NA_real_)
+  column <- function(f, type) unname(vapply(x$trainings, f, type))
+  of_final <- function(name) column(function(training) final(training, name), 0)
+  mean_return <- of_final("mean_return")
+  data.frame(
+    seed = column(function(training) as.integer(training$seed), 0L),
+    solved = vapply(mean_return, reaches, NA, target = x$target),
+    iterations = column(function(training) NROW(training$history), 0L),
+    steps = column(function(training) training$steps, 0),
+    mean_return = mean_return, se = of_final("se"), lower = of_final("lower"),
+    upper = of_final("upper"),
+    elapsed = column(function(training) training$elapsed, 0),
+    interrupted = column(function(training) training$interrupted, NA)
+  )
+}
+
+#' @rdname gym_trainings
+#' @export
+coef.gym_trainings <- function(object, ...) {
+  check_dots_empty(...)
+  do.call(rbind, lapply(object$trainings, function(training) stats::coef(training$policy)))
+}
+
+#' @rdname gym_trainings
+#' @export
+summary.gym_trainings <- function(object, ...) {
+  table <- as.data.frame(object)
+  done <- table[!table$interrupted, ]
+  interval <- wilson_interval(sum(done$solved), nrow(done))
+  structure(
+    list(
+      trainings = object, solved = sum(done$solved), finished = nrow(done),
+      lower = interval[[1L]], upper = interval[[2L]], returns = quartiles(done$mean_return),
+      steps = quartiles(done$steps)
+    ),
+    class = "summary.gym_trainings"
+  )
+}
+
+#' The interval of a share, by Wilson's score
+#' @noRd
+wilson_interval <- function(successes, n, level = 0.95) {
+  if (n == 0) {
+    return(c(NA_real_, NA_real_))
+  }
+  z <- stats::qnorm((1 + level) / 2)
+  share <- successes / n
+  middle <- (share + z^2 / (2 * n)) / (1 + z^2 / n)
+  half <- z / (1 + z^2 / n) * sqrt(share * (1 - share) / n + z^2 / (4 * n^2))
+  # At 0 and 1 rounding leaves the bound a hair beside them.
+  c(if (successes == 0) 0 else middle - half, if (successes == n) 1 else middle + half)
+}
+
+#' @export
+print.gym_trainings <- function(x, ...) {
+  cat(trainings_lines(x), sep = "\n")
+  invisible(x)
+}
+
+trainings_lines <- function(x) {
+  table <- as.data.frame(x)
+  if (!nrow(table)) {
+    return("Ended before the first training was finished")
+  }
+  done <- table[!table$interrupted, ]
+  returns <- done$mean_return
+  c(
+    paste0("Training in ", x$env_id, " by ", format(x$agent)),
+    paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
+    if (length(returns) && !is.null(x$target)) {
+      interval <- wilson_interval(sum(done$solved), nrow(done))
+      paste0("Solved with ", sum(done$solved), " of ", count_of(nrow(done), "seed"), " (target ",
+             number_text(x$target), ", 95% interval from ", percent_text(interval[[1L]]), " to ",
+             percent_text(interval[[2L]]), ")")
+    },
+    if (length(returns)) {
+      paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
+             number_text(min(returns)), " to ", number_text(max(returns)))
+    },
+    paste0(if (x$interrupted) "Interrupted after " else "Played ",
+           count_of(nrow(table), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
+           seconds_text(x$elapsed))
+  )
+}
+
+#' @export
+print.summary.gym_trainings <- function(x, ...) {
+  print(x$trainings)
+  if (x$finished > 0L) {
+    cat("\n")
+    print(signif(rbind(`mean return` = x$returns, steps = x$steps), 4L))
+  }
+  invisible(x)
+}

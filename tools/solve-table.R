@@ -1,0 +1,80 @@
+# Makes the table of solved environments, inst/extdata/solve-table.csv (a row for each training) and
+# solve-curves.csv (the evaluations of each): trains every environment of tools/solve/jobs.R with
+# the settings of agent_presets(), with seeds that no setting was tried on.
+#
+#   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
+#
+# It takes hours. What the tables have already is not trained again, so that it may be stopped at
+# any time; a row that is to be made anew is deleted from both first.
+source("tools/solve/jobs.R")
+
+given <- strsplit(commandArgs(trailingOnly = TRUE), "=", fixed = TRUE)
+option <- function(name, default) {
+  found <- Filter(function(one) one[[1L]] == name, given)
+  if (length(found)) found[[1L]][[2L]] else default
+}
+processes <- as.integer(option("processes", "2"))
+only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
+
+table_file <- "inst/extdata/solve-table.csv"
+curve_file <- "inst/extdata/solve-curves.csv"
+key <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
+read_rows <- function(file) {
+  if (file.exists(file)) {
+    utils::read.csv(file, na.strings = "NA", colClasses = c(kwargs = "character"))
+  }
+}
+
+# Adds rows in the order of the jobs and seeds.
+add_rows <- function(file, rows) {
+  all <- rbind(read_rows(file), rows)
+  of_job <- match(paste(all$env_id, all$kwargs), paste(solve_jobs$env_id, solve_jobs$kwargs))
+  all <- all[order(of_job, all$seed, method = "radix"), ]
+  utils::write.csv(all, file, row.names = FALSE)
+}
+
+todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
+  job <- solve_jobs[row, ]
+  data.frame(
+    row = row, env_id = job$env_id, kwargs = job$kwargs,
+    seed = first_seed + seq_len(job$seeds) - 1L
+  )
+}))
+todo <- todo[todo$env_id %in% only & !key(todo) %in% key(read_rows(table_file)), ]
+cat(nrow(todo), "trainings to come\n")
+
+start <- function(one) {
+  file <- tempfile(fileext = ".rds")
+  process <- processx::process$new(
+    file.path(R.home("bin"), "Rscript"),
+    c("--no-init-file", "tools/solve/train.R", one$row, one$seed, file), stderr = "|",
+    cleanup_tree = TRUE
+  )
+  list(process = process, file = file, one = one)
+}
+
+finish <- function(running) {
+  name <- key(running$one)
+  if (!file.exists(running$file)) {
+    stop(name, " failed: ", paste(running$process$read_all_error_lines(), collapse = "\n"))
+  }
+  made <- readRDS(running$file)
+  add_rows(table_file, made$table)
+  add_rows(curve_file, made$curve)
+  cat(sprintf(
+    "%s: %.1f after %.0f steps, %.0f s\n", name, made$table$mean_return, made$table$steps,
+    made$table$seconds
+  ))
+}
+
+running <- list()
+while (nrow(todo) || length(running)) {
+  while (nrow(todo) && length(running) < processes) {
+    running <- c(running, list(start(todo[1L, ])))
+    todo <- todo[-1L, ]
+  }
+  Sys.sleep(0.5)
+  ended <- !vapply(running, function(one) one$process$is_alive(), NA)
+  for (one in running[ended]) finish(one)
+  running <- running[!ended]
+}

@@ -1,0 +1,22 @@
+# What the table of solved environments has: the target that is reported, where it comes from, and
+# how many seeds are trained. The settings are the presets of the package (agent_presets()).
+
+solve_jobs <- utils::read.csv(text = "
+env_id,kwargs,agent,target,target_source,seeds
+CartPole-v1,,ars,475,registered,20
+Acrobot-v1,,ars,-100,registered,20
+MountainCarContinuous-v0,,ars,90,registered,20
+LunarLander-v3,continuous,ars,200,registered,20
+LunarLander-v3,,ars,200,registered,20
+Swimmer-v5,,ars,325,paper (registered 360),20
+HalfCheetah-v5,,ars,3430,paper (registered 4800),10
+Pendulum-v1,,cem,-200,ours,10
+Hopper-v5,,ars,3120,paper (registered 3800),1
+BipedalWalker-v3,,ars,300,registered,1
+", strip.white = TRUE, na.strings = "NA", colClasses = c(kwargs = "character"))
+
+# Settings were tried on the seeds 1 to 99; those reported begin here.
+first_seed <- 1001L
+
+# The environment's own arguments of a job, by their names in the table.
+job_kwargs <- function(name) if (nzchar(name)) stats::setNames(list(TRUE), name) else list()
