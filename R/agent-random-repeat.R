@@ -128,7 +128,8 @@ play_searches <- function(with_env, template, settings, seeds, progress, call) {
     ),
     error = function(cnd) {
       result <- new_searches(rows, settings, started, interrupted = FALSE)
-      abort_search(cnd$parent %||% cnd, result, call, count_of(length(rows), "seed"))
+      abort_with_result(cnd$parent %||% cnd, "The search", result,
+                        count_of(length(rows), "seed"), "gym_error_search", call)
     }
   )
   new_searches(rows, settings, started, interrupted)
@@ -139,7 +140,8 @@ play_seed <- function(with_env, template, settings, seed, call) {
   settings$seed <- seed
   withCallingHandlers(
     with_env(function(vector_env) {
-      play_search(vector_env, template, settings, progress = FALSE, call)
+      agent <- agent_start(agent_random(), template)
+      play_search(agent, vector_env, settings, progress = FALSE, call)
     }),
     gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd),
     gym_message_remembers = function(cnd) rlang::cnd_muffle(cnd)

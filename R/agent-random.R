@@ -1,3 +1,57 @@
+# The agent of the post: weights at random.
+
+#' Draw weights at random
+#'
+#' Each candidate has weights that are drawn anew, as [policy_network()] draws them, and the best so
+#' far are the agent's: what the tutorial *Artificial Intelligence in R (I)* (2018) does. Nothing is
+#' learned from one iteration for the next, so that it is what other agents are measured against.
+#' [search_random()] plays this agent by the tutorial's own rule; with [train_agent()] it is trained
+#' and evaluated as the others.
+#'
+#' @param candidates How many candidates are played in an iteration, a whole number of at least 1.
+#' @return An agent of class `gym_agent_random`. Its policy has the best weights so far.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be.
+#' @seealso [search_random()], [agent_ars()], [agent_cem()], [agent_hill_climb()]
+#' @export
+#' @examples
+#' agent_random()
+#' @examplesIf gym:::can_start_server()
+#' train_agent(agent_random(), "CartPole-v1", policy_network(), iterations = 10, seed = 1)
+agent_random <- function(candidates = 8) {
+  check_count(candidates)
+  structure(
+    list(
+      candidates = as.integer(candidates), played = 0L, best = NA_integer_, best_return = -Inf,
+      policy = NULL
+    ),
+    class = c("gym_agent_random", "gym_agent")
+  )
+}
+
+#' @export
+agent_ask.gym_agent_random <- function(agent) {
+  draw <- function(i) weight_vector(policy_resample(agent$policy))
+  do.call(rbind, lapply(seq_len(agent$candidates), draw))
+}
+
+#' @export
+agent_tell.gym_agent_random <- function(agent, results) {
+  agent <- NextMethod()
+  best <- which.max(results$returns)
+  if (results$returns[[best]] > agent$best_return) {
+    agent$best <- agent$played + best
+    agent$best_return <- results$returns[[best]]
+    coef(agent$policy) <- results$weights[best, ]
+  }
+  agent$played <- agent$played + length(results$returns)
+  agent
+}
+
+#' @export
+format.gym_agent_random <- function(x, ...) {
+  agent_text("random search", x["candidates"])
+}
+
 #' Search for a policy at random
 #'
 #' Plays the agent of the tutorial *Artificial Intelligence in R (I)* (2018): each round draws
@@ -64,6 +118,8 @@
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same search.}
+#'     \item{history, agent, steps}{As those of a training, see [train_agent()]: a search is one, too,
+#'       in which each round is an iteration with one candidate.}
 #'     \item{elapsed}{The seconds that it took, a double.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }
@@ -107,7 +163,8 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   play <- function(vector_env) {
     settings <- settings_in(vector_env, settings)
     bound <- policy_bind(settings$policy, vector_env, call = call)
-    play_search(vector_env, bound, settings, progress, call, file)
+    agent <- agent_start(agent_random(), bound)
+    play_search(agent, vector_env, settings, progress, call, file)
   }
   with_vector_env(env, as.numeric(rounds) * episodes, play, max_steps, client = client)
 }

@@ -14,7 +14,8 @@
 #'   server, a named list of strings; `NULL` for an environment in R), `env_id` (a string), `kwargs`
 #'   (the environment's own arguments, a named list), `wrappers` (strings), `num_envs`, `seed` (whole
 #'   numbers), `preset` (a list, `NULL` where none was taken), `started` (a date with time) and
-#'   `elapsed` (seconds, a double; `NA` where it was not taken).
+#'   `elapsed` (seconds, a double). Rollouts and evaluations have no times, `NULL` and `NA`, so that
+#'   two with the same seed are identical.
 #' @section Errors: `gym_error_argument` for something that has no provenance,
 #'   `gym_error_checkpoint` for a file that is no checkpoint.
 #' @export
@@ -72,7 +73,7 @@ format.gym_provenance <- function(x, ...) {
     seed = if (length(x$seed)) paste(format(x$seed, scientific = FALSE, trim = TRUE),
                                      collapse = ", "),
     preset = if (!is.null(x$preset)) x$preset$origin,
-    started = format(x$started, "%Y-%m-%d %H:%M:%S %Z"),
+    started = if (!is.null(x$started)) format(x$started, "%Y-%m-%d %H:%M:%S %Z"),
     elapsed = if (!is.na(x$elapsed)) seconds_text(x$elapsed)
   )
   paste(format(paste0(names(lines), ":")), lines)

@@ -201,10 +201,8 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
   }
   policy <- policy_bind(policy, vector_env, call = vector_env$call)
   history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
-  origin <- new_provenance(vector_env, list(seed = seed))
-  began <- proc.time()[["elapsed"]]
+  origin <- new_provenance(vector_env, list(seed = seed), started = NULL)
   result <- function(interrupted = FALSE) {
-    origin$elapsed <- proc.time()[["elapsed"]] - began
     new_rollout(history, policy, vector_env, origin, steps, next_observation, interrupted)
   }
   total <- candidates * episodes

@@ -54,11 +54,12 @@ inform_of_memory <- function(vector_env, env) {
 #' Play until the end or an interrupt
 #'
 #' @param play Code that plays.
-#' @param text A message for an interrupt, for cli, with `{finished}` and `{total}`.
-#' @param count_finished A function that returns how many of the `total` are finished.
+#' @param text A message for an interrupt, for cli, with `{finished}` and, where it is given,
+#'   `{total}`.
+#' @param count_finished A function that returns how many are finished, or a text that says it.
 #' @return Whether there was an interrupt, logical.
 #' @noRd
-until_interrupted <- function(play, text, count_finished, total) {
+until_interrupted <- function(play, text, count_finished, total = NULL) {
   tryCatch(
     {
       play

@@ -101,10 +101,14 @@ train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL,
                         progress = rlang::is_interactive(), num_envs = NULL, num_workers = NULL,
                         client = gym_client()) {
   call <- rlang::current_env()
-  settings <- list(
-    agent = agent, env = env, kwargs = list(...), policy = policy, iterations = iterations,
-    steps = steps, episodes = episodes, target = target, max_steps = max_steps,
-    eval_every = eval_every, eval_episodes = eval_episodes, seed = seed, callback = callback
+  settings <- structure(
+    list(
+      what = "training", agent = agent, env = env, kwargs = list(...), policy = policy,
+      iterations = iterations, steps = steps, episodes = episodes, target = target,
+      max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes, seed = seed,
+      callback = callback
+    ),
+    class = "gym_training_settings"
   )
   check_training(settings, call)
   check_flag(progress)

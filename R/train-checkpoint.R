@@ -123,15 +123,6 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
 
 # Resuming -------------------------------------------------------------------------
 
-#' Go on with a search from its file
-#' @noRd
-resume_history <- function(history, saved, vector_env, settings, path, call) {
-  check_same_server(path, saved$server, settings_of_server(vector_env, settings), call)
-  restore_history(history, saved)
-  finished <- length(history$means)
-  inform_resumed("Going on from {.path {path}}, with {finished} of {settings$rounds} round{?s}.")
-}
-
 # Settings that the server decides, beside the arguments.
 settings_of_server <- function(vector_env, settings) {
   list(
@@ -140,77 +131,7 @@ settings_of_server <- function(vector_env, settings) {
   )
 }
 
-#' Put the history of a search back to where its file has it
-#' @param history As [new_candidate_history()] returns it.
-#' @return The history, with what was played.
-#' @noRd
-restore_history <- function(history, saved) {
-  list2env(saved$history, history)
-  history$streams <- restore_streams(saved$streams)
-  history$on_finished(length(history$means), history$best$mean)
-  history
-}
-
 # Says that a part of the result comes from an earlier run.
 inform_resumed <- function(text, .envir = parent.frame()) {
   cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
-}
-
-#' Make the result of a search whose file says that it had ended
-#' @noRd
-finished_search <- function(saved, settings, client, path) {
-  inform_resumed(
-    "This search had ended: {.path {path}} has its result. {.code resume = FALSE} plays it anew."
-  )
-  settings[names(saved$server)] <- saved$server
-  settings["client"] <- list(client)
-  settings$policy <- saved$policy
-  settings$seed <- saved$seed
-  history <- new_candidate_history(
-    settings$rounds, settings$episodes, settings$target, NULL, function(...) NULL
-  )
-  restore_history(history, saved)
-  new_search(history, saved$template, settings, proc.time()[["elapsed"]] - saved$elapsed)
-}
-
-# Writing --------------------------------------------------------------------------
-
-#' Keep a search in its file from now on
-#'
-#' The file is written anew after each batch of episodes. It grows, and where a batch is a single
-#' episode, writing might take longer than playing: then it is not written after each batch, and
-#' the episodes since the last time would be played again.
-#' @param history As [new_candidate_history()] returns it.
-#' @param template The policy of which candidates are drawn, bound to the environment.
-#' @param started When the search began, minus the time that it took before.
-#' @noRd
-keep_history <- function(history, template, checkpoint, vector_env, settings, started, call) {
-  state <- function() {
-    list(
-      what = "search", arguments = checkpoint$arguments,
-      server = settings_of_server(vector_env, settings), policy = settings$policy,
-      template = template, seed = settings$seed, history = saved_history(history),
-      streams = saved_streams(history$streams), elapsed = proc.time()[["elapsed"]] - started,
-      finished = is_finished(history)
-    )
-  }
-  write <- checkpoint_writer(checkpoint, state, "search", call)
-  history$keep <- function() {
-    write(now = vector_env$batch_size > 1L || is_finished(history))
-  }
-}
-
-is_finished <- function(history) {
-  history$ended || length(history$means) >= history$candidates
-}
-
-# The file is written between batches, when no episode is under way.
-saved_history <- function(history) {
-  columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
-               "truncated")
-  together <- lapply(stats::setNames(nm = columns), function(name) {
-    unlist(lapply(history$batches, function(batch) batch[[name]]))
-  })
-  kept <- c("played_batches", "means", "unfinished", "best", "weights", "ended", "seeds")
-  c(mget(kept, history), list(batches = list(together)))
 }

@@ -1,76 +1,112 @@
-# The iterations of a training: ask the agent, play its candidates, tell it what came of it.
+# The one loop that plays agents: ask the agent, play its candidates, tell it what came of it.
+#
+# When it ends, what is looked at in between and what it returns are a rule, of which there are two:
+# settings of class "gym_training_settings" evaluate the agent's policy (train-evaluation.R), those
+# of class "gym_search_settings" keep the rule of the post, in which the first candidate that reaches
+# the target ends the search (train-search-rule.R).
 
-# Seeds of episodes: those of training are up to this number, those of evaluations above it; of
-# these the final evaluation has the upper half. So an evaluation plays no episode that the training
-# has seen, and the final one none that any has.
-last_training_seed <- 2^30
-
-# How many episodes make a point of the learning curve.
-curve_episodes <- 10L
-
-# What changes while an agent is trained. Between iterations the first of these are all that is
-# needed to go on.
+#' Make what changes while an agent is trained
+#'
+#' @param agent The agent, as [agent_start()] returns it.
+#' @return An environment. Between iterations what `kept_of_training` names, with the streams, is
+#'   all that is needed to go on.
+#' @noRd
 new_training <- function(agent, settings) {
   generator <- new_generator(settings$seed)
   rlang::env(
     agent = agent, iteration = 0L, steps = 0, history = list(), evaluations = list(),
-    final = NULL, solved = FALSE, ended = FALSE,
+    episodes = list(), final = NULL, solved = FALSE, ended = FALSE,
     streams = new_streams(settings$seed),
     # Evaluations draw from streams of their own, so that training does not depend on them.
     evaluation_streams = new_streams(with_generator(generator, draw_seed())),
-    started = proc.time()[["elapsed"]]
+    started = proc.time()[["elapsed"]],
+    report = function(history) NULL, log = function(state) NULL,
+    checkpoint = function(last = FALSE) NULL
   )
 }
 
+# The rule of a training ------------------------------------------------------------
+
+# What the two kinds of settings have methods of.
+
+# Has the budget been used up?
+is_used_up <- function(settings, state) UseMethod("is_used_up")
+
+# The agent that is asked next.
+agent_to_ask <- function(settings, state, vector_env) UseMethod("agent_to_ask")
+
+# A function that draws the seeds of n episodes.
+seed_drawer <- function(settings) UseMethod("seed_drawer")
+
+# After an iteration: does training end?
+training_ends <- function(settings, state, vector_env) UseMethod("training_ends")
+
+# When it has ended.
+finish_training <- function(settings, state, vector_env) UseMethod("finish_training")
+
+# What is returned.
+training_result <- function(settings, state, interrupted = FALSE) UseMethod("training_result")
+
+# A progress bar: a function of the training that is called after each iteration. While one is
+# played `state$report` is called with its history.
+training_progress <- function(settings, state, progress, frame = parent.frame()) {
+  UseMethod("training_progress")
+}
+
+# What an error and, with `of_all`, an interrupt say: how much was played.
+played_text <- function(settings, state, of_all = FALSE) UseMethod("played_text")
+
+# The loop --------------------------------------------------------------------------
+
+#' Train until the end, an interrupt or an error, which carries what was played
+#' @param state As [new_training()] returns it.
+#' @param call The user's call.
+#' @return As [training_result()].
+#' @noRd
 run_training <- function(state, vector_env, settings, progress, call) {
-  show <- training_progress(settings, progress)
+  show <- training_progress(settings, state, progress)
   play <- function() {
-    while (!state$ended && !is_used_up(state, settings)) {
+    while (!state$ended && !is_used_up(settings, state)) {
       train_iteration(state, vector_env, settings, call)
-      state$ended <- training_ends(state, vector_env, settings)
+      state$ended <- training_ends(settings, state, vector_env)
       state$log(state)
       show(state)
       state$checkpoint()
     }
-    if (is.null(state$final)) {
-      state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
-      state$checkpoint(last = TRUE)
-    }
+    finish_training(settings, state, vector_env)
   }
+  what <- settings$what
   interrupted <- tryCatch(
     until_interrupted(
-      play(),
-      "The training was interrupted after {finished} iteration{?s}; it returns what it has.",
-      function() state$iteration
+      play(), paste("The", what, "was interrupted after {finished}; it returns what it has."),
+      function() played_text(settings, state, of_all = TRUE)
     ),
     error = function(cnd) {
       abort_with_result(
-        cnd, "The training", training_result(state, settings),
-        count_of(state$iteration, "iteration"), "gym_error_training", call,
+        cnd, paste("The", what), training_result(settings, state), played_text(settings, state),
+        paste0("gym_error_", what), call,
         if (!is.null(state$path)) {
           paste0("The same call goes on from \"", state$path, "\" when what is wrong is fixed.")
         }
       )
     }
   )
-  training_result(state, settings, interrupted)
-}
-
-is_used_up <- function(state, settings) {
-  state$iteration >= (settings$iterations %||% Inf) || state$steps >= (settings$steps %||% Inf)
+  training_result(settings, state, interrupted)
 }
 
 train_iteration <- function(state, vector_env, settings, call) {
-  agent <- state$agent
+  agent <- agent_to_ask(settings, state, vector_env)
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   policy <- agent_policy(agent)
   check_asked(asked, policy, agent, call)
   candidates <- policy_candidates(policy, asked)
   history <- new_history(nrow(asked), settings$episodes, state$streams)
-  history$draw_seeds <- function(n) sample.int(last_training_seed, n, replace = TRUE)
+  history$draw_seeds <- seed_drawer(settings)
   play_batches(
     vector_env, history, function(which) policy_subset(candidates, which),
-    max_steps = settings$max_steps %||% Inf, keep_moments = !is.null(policy$moments)
+    report = function(ended) state$report(history$played_episodes + ended),
+    max_steps = settings$max_steps %||% Inf, target = settings$last_target,
+    keep_moments = !is.null(policy$moments)
   )
   results <- candidate_results(history, asked, call)
   agent <- agent_tell(agent, results)
@@ -83,6 +119,10 @@ train_iteration <- function(state, vector_env, settings, call) {
     state$agent <- agent
     state$iteration <- state$iteration + 1L
     state$steps <- steps
+    state$results <- results
+    if (isTRUE(settings$keep_episodes)) {
+      state$episodes[[state$iteration]] <- episodes_table(history$batches, several = TRUE)
+    }
     state$history[[state$iteration]] <- list(
       iteration = state$iteration, steps = steps,
       min_return = min(results$returns), median_return = stats::median(results$returns),
@@ -111,7 +151,7 @@ abort_agent <- function(value, method, must, call) {
   )
 }
 
-# What an agent is told of its candidates.
+# What an agent is told of its candidates. Those after one that has ended the search were not played.
 candidate_results <- function(history, asked, call) {
   each <- function(name) {
     values <- unlist(lapply(history$batches, function(batch) batch[[name]]))
@@ -126,80 +166,13 @@ candidate_results <- function(history, asked, call) {
       class = "gym_error_agent", candidate = wrong, weights = asked[wrong, ], call = call
     )
   }
+  if (length(returns) < nrow(asked)) {
+    asked <- asked[seq_along(returns), , drop = FALSE]
+  }
   list(
     weights = asked, returns = returns, lengths = each("length"),
     moments = Reduce(merge_moments, lapply(history$batches, function(batch) batch$moments))
   )
 }
 
-# Ending -------------------------------------------------------------------------------
-
-training_ends <- function(state, vector_env, settings) {
-  reached <- reaches(state$history[[state$iteration]]$mean_return, settings$target)
-  if (!reached && state$iteration %% settings$eval_every == 0) {
-    episodes <- min(curve_episodes, settings$eval_episodes)
-    curve <- evaluate_agent(state, vector_env, settings, "curve", episodes)
-    reached <- reaches(curve$mean_return, settings$target)
-  }
-  if (reached) {
-    stopping <- evaluate_agent(state, vector_env, settings, "stopping", settings$eval_episodes)
-    state$solved <- reaches(stopping$mean_return, settings$target)
-  }
-  callback <- settings$callback
-  state$solved || !is.null(callback) && isFALSE(callback(training_result(state, settings)))
-}
-
-#' Play the agent's policy in fresh episodes
-#' @param kind What for: `"curve"`, `"stopping"` or `"final"`.
-#' @return A row of the training's evaluations.
-#' @noRd
-evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
-  policy <- agent_policy(state$agent)
-  # The final evaluation draws from copies: a training that goes on with a larger budget evaluates as
-  # one that had it from the start.
-  final <- kind == "final"
-  streams <- state$evaluation_streams
-  if (final) streams <- restore_streams(saved_streams(streams))
-  half <- last_training_seed / 2
-  before <- last_training_seed + if (final) half - 1 else 0
-  history <- new_history(1L, episodes, streams)
-  history$draw_seeds <- function(n) as.integer(before + sample.int(half - 1, n, replace = TRUE))
-  play_batches(
-    vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf
-  )
-  played <- evaluate_episodes(episodes_table(history$batches), policy)
-  row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
-  row.names(row) <- NULL
-  state$evaluations[[length(state$evaluations) + 1L]] <- row
-  if (state$iteration > 0L && !final) {
-    state$history[[state$iteration]]$evaluation <- row$mean_return
-  }
-  row
-}
-
-# Showing ------------------------------------------------------------------------------
-
-# A function that is called after each iteration.
-training_progress <- function(settings, progress, frame = parent.frame()) {
-  if (!progress) {
-    return(function(state) NULL)
-  }
-  by_steps <- is.null(settings$iterations)
-  bar <- progress_bar(
-    settings$iterations %||% settings$steps, if (by_steps) "Step" else "Iteration", frame = frame
-  )
-  function(state) {
-    row <- state$history[[state$iteration]]
-    evaluated <- if (length(state$evaluations)) {
-      state$evaluations[[length(state$evaluations)]]$mean_return
-    }
-    bar(
-      if (by_steps) min(state$steps, settings$steps) else state$iteration,
-      paste0(
-        "median ", number_text(row$median_return), ", best ", number_text(row$max_return),
-        if (!is.null(evaluated)) paste0(", evaluation ", number_text(evaluated)),
-        ", ", number_text(row$steps / max(row$elapsed, 1e-3)), " steps/s, "
-      )
-    )
-  }
-}
+reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)

@@ -157,21 +157,23 @@ play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
   started <- proc.time()[["elapsed"]]
   points <- nrow(plane$grid)
   show <- if (progress) progress_bar(points, "Network") else function(finished) NULL
-  history <- new_candidate_history(
-    points, episodes, target = NULL, streams, function(finished, best) show(finished),
-    common_seeds = TRUE
-  )
+  history <- new_history(points, episodes, streams, common_seeds = TRUE)
+  finished <- function() history$played_episodes %/% episodes
   interrupted <- until_interrupted(
     play_batches(
       vector_env, history, function(candidates) policy_subset(plane$policy, candidates),
-      after = enter_returns, max_steps = search$max_steps %||% Inf
+      report = function(ended) show((history$played_episodes + ended) %/% episodes),
+      max_steps = search$max_steps %||% Inf
     ),
     "Interrupted after {finished} of {total} network{?s}; the rest of the landscape is empty.",
-    function() length(history$means), points
+    finished, points
   )
-  finished <- seq_along(history$means)
+  returns <- unlist(lapply(history$batches, function(batch) batch$return))
+  whole <- seq_len(finished())
   plane$grid$mean_return <- NA_real_
-  plane$grid$mean_return[finished] <- history$means
+  plane$grid$mean_return[whole] <- colMeans(
+    matrix(returns[seq_len(length(whole) * episodes)], episodes)
+  )
   structure(
     list(
       grid = plane$grid, best = plane$grid$mean_return[[(points + 1L) / 2L]],

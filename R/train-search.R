@@ -1,21 +1,23 @@
 # The result of a search, whatever its method: class gym_search.
 
-#' Make a result of a search
+#' Make the result of a search
 #'
-#' @param history Its candidates, as [new_candidate_history()] keeps them. Those that have finished
-#'   count.
-#' @param template The policy of which they were drawn, bound to the environment.
+#' @param state What was played, as [new_training()] makes it. Rounds that have finished count.
 #' @noRd
-new_search <- function(history, template, settings, started, interrupted = FALSE) {
-  episodes <- search_episodes_table(history)
-  best <- history$best
+search_result <- function(settings, state, interrupted = FALSE) {
+  agent <- state$agent
+  episodes <- rounds_episodes(state$episodes)
+  rounds <- rounds_table(episodes, settings$episodes)
+  found <- agent$played > 0L
   structure(
     list(
-      policy = if (!is.null(best)) with_weights(template, best$weights),
-      solved = !is.null(best) && reaches(best$mean, settings$target),
-      round = if (is.null(best)) NA_integer_ else as.integer(best$candidate),
-      rounds = rounds_table(history, episodes),
+      policy = if (found) agent_policy(agent),
+      solved = found && reaches(agent$best_return, settings$target),
+      round = if (found) agent$best else NA_integer_,
+      rounds = rounds,
       episodes = episodes,
+      history = rounds_history(rounds, settings$episodes),
+      agent = agent,
       target = settings$target,
       env_id = settings$env_id,
       env = settings$env,
@@ -25,24 +27,44 @@ new_search <- function(history, template, settings, started, interrupted = FALSE
       max_rounds = settings$rounds,
       max_steps = settings$max_steps,
       seed = settings$seed,
-      elapsed = proc.time()[["elapsed"]] - started,
-      interrupted = interrupted
+      steps = sum(as.numeric(rounds$steps)),
+      elapsed = proc.time()[["elapsed"]] - state$started,
+      interrupted = interrupted,
+      provenance = settings$provenance
     ),
-    class = "gym_search"
+    class = c("gym_search", "gym_training")
   )
 }
 
-search_episodes_table <- function(history) {
-  episodes <- episodes_table(history$batches, several = TRUE)
+# The episodes of all iterations; their rounds count on from one iteration to the next.
+rounds_episodes <- function(iterations) {
+  before <- 0L
+  for (i in seq_along(iterations)) {
+    iterations[[i]]$candidate <- iterations[[i]]$candidate + before
+    before <- max(iterations[[i]]$candidate)
+  }
+  episodes <- do.call(rbind, c(list(episodes_table(list(), several = TRUE)), iterations))
   names(episodes)[[1L]] <- "round"
-  episodes[seq_len(length(history$means) * history$episodes), ]
+  episodes
 }
 
-rounds_table <- function(history, episodes) {
-  rounds <- length(history$means)
-  steps <- colSums(matrix(episodes$length, ncol = rounds))
+rounds_table <- function(episodes, each) {
+  rounds <- nrow(episodes) %/% each
+  of_rounds <- function(values) matrix(values, ncol = rounds)
   data.frame(
-    round = seq_len(rounds), mean_return = history$means, steps = as.integer(steps)
+    round = seq_len(rounds), mean_return = colMeans(of_rounds(episodes$return)),
+    steps = as.integer(colSums(of_rounds(episodes$length)))
+  )
+}
+
+# As that of a training: a round is an iteration with one candidate, whose time was not taken.
+rounds_history <- function(rounds, each) {
+  mean <- rounds$mean_return
+  data.frame(
+    iteration = rounds$round, steps = cumsum(as.numeric(rounds$steps)), min_return = mean,
+    median_return = mean, mean_return = mean, max_return = mean,
+    mean_length = rounds$steps / each, evaluation = rep(NA_real_, length(mean)),
+    elapsed = rep(NA_real_, length(mean))
   )
 }
 

@@ -1,6 +1,7 @@
 # The result of a training: class gym_training.
 
-training_result <- function(state, settings, interrupted = FALSE) {
+#' @exportS3Method
+training_result.gym_training_settings <- function(settings, state, interrupted = FALSE) {
   structure(
     list(
       policy = agent_policy(state$agent),

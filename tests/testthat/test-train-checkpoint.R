@@ -1,6 +1,6 @@
 # What counts of a search, without how long it took, where, and what nobody played.
 figures <- function(search) {
-  search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
+  search[setdiff(names(search), c("elapsed", "client", "env", "template", "provenance"))]
 }
 
 # A search that goes on from a file says so.
@@ -231,7 +231,7 @@ test_that("the file stays small: of the policies those are kept that are needed"
   quiet_search(fake_environment(), policy_network(c(4, 100, 1)), rounds = 40, episodes = 1,
                 target = Inf, checkpoint = path)
   # 500 weights are 4 kB, and there were 40 networks.
-  expect_lt(file.size(path), 40000)
+  expect_lt(file.size(path), 50000)
 })
 
 test_that("a relative path is that of the folder at the start", {
@@ -291,7 +291,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   path <- local_checkpoint()
   expect_no_condition(play(path), class = "gym_message_resumed")
   expect_message(play(path), "had ended", class = "gym_message_resumed")
-  half <- local_checkpoint(kept$list[[5]])
+  half <- local_checkpoint(kept$list[[3]])
   expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
 })
 
