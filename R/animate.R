@@ -1,8 +1,8 @@
 #' Make a moving picture of an episode
 #'
 #' Writes an episode as an animated GIF file: of a rollout one that was played with
-#' `frames = TRUE`, of a search or a policy a fresh one, which is played for it. Printed in an
-#' interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
+#' `frames = TRUE`, of a search, a training or a policy a fresh one, which is played for it. Printed
+#' in an interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
 #' names another function that opens it, or `FALSE`), and a document of knitr has it on the page,
 #' one made by LaTeX its [filmstrip][plot.gym_rollout()].
 #'
@@ -10,7 +10,7 @@
 #' browsers take a delay of less than two for a slow one of ten: so there are at most 50
 #' pictures a second, of faster environments only every second frame, or fewer still.
 #'
-#' @param x A rollout, a search, or a policy as for [rollout()].
+#' @param x A rollout, a search, a training, or a policy as for [rollout()].
 #' @param file The file to write, its name ends in `.gif`. `NULL`, the default, is one among the
 #'   session's temporary files.
 #' @param fps How many steps of the environment make a second, a number; `NULL`, the default,
@@ -48,7 +48,7 @@ animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 
 #' @export
 animate.default <- function(x, file = NULL, fps = NULL, ...) {
-  abort_argument(x, "a rollout, a search or a policy", "x", rlang::current_env())
+  abort_argument(x, "a rollout, a search, a training or a policy", "x", rlang::current_env())
 }
 
 #' @rdname animate
@@ -70,6 +70,19 @@ animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, wid
     x$policy, file, fps, env = x$env %||% x$env_id, seed = seed, max_steps = x$max_steps,
     width = width, every = every, client = x$client
   )
+}
+
+#' @rdname animate
+#' @export
+animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
+                                 every = NULL, client = gym_client()) {
+  check_dots_empty(...)
+  check_animation(file, fps, width, every)
+  played <- rlang::exec(
+    rollout, x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client,
+    frames = TRUE, !!!x$kwargs
+  )
+  new_animation(episode_frames(played), file, fps, width, every)
 }
 
 #' @rdname animate
@@ -105,6 +118,7 @@ register_with_gganimate <- function() {
 register_animate <- function(home) {
   registerS3method("animate", "gym_rollout", animate.gym_rollout, envir = home)
   registerS3method("animate", "gym_search", animate.gym_search, envir = home)
+  registerS3method("animate", "gym_training", animate.gym_training, envir = home)
   registerS3method("animate", "gym_policy", animate.gym_policy, envir = home)
 }
 

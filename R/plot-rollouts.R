@@ -20,7 +20,9 @@ given_rollouts <- function(dots, written, call = rlang::caller_env()) {
     )
   }
   check_have_episodes(dots[are], call)
-  labels <- rollout_labels(dots[are], names[are], as.list(written)[-1L][are])
+  labels <- argument_labels(
+    dots[are], names[are], as.list(written)[-1L][are], function(x) policy_label(x$policy)
+  )
   list(rollouts = stats::setNames(dots[are], labels), others = dots[!are])
 }
 
@@ -37,15 +39,15 @@ check_have_episodes <- function(rollouts, call) {
   }
 }
 
-# Those without a name are called as their variable, or after their policy.
-rollout_labels <- function(rollouts, names, expressions) {
-  labels <- vapply(seq_along(rollouts), function(i) {
+# Those without a name are called as their variable, or by `label_of`.
+argument_labels <- function(values, names, expressions, label_of) {
+  labels <- vapply(seq_along(values), function(i) {
     if (nzchar(names[[i]])) {
       names[[i]]
     } else if (is.name(expressions[[i]])) {
       as.character(expressions[[i]])
     } else {
-      policy_label(rollouts[[i]]$policy)
+      label_of(values[[i]])
     }
   }, "")
   make.unique(labels, " ")

@@ -5,22 +5,43 @@
 #' it was looked at, as points, and the target as a dashed line. The final evaluation is the filled
 #' point at the end, with its interval.
 #'
+#' Several trainings that are given together are compared as [plot.gym_trainings()] draws them.
+#'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
-#' @param x,object A training, as [train_agent()] returns it.
+#' @param x,object A training, as [train_agent()] returns it. It may have another name, that of its
+#'   line, as in `plot(ARS = first, CEM = second)`.
 #' @param main The title; the default names the environment and the agent.
 #' @param xlab,ylab The axes' labels.
-#' @param ... Further arguments of [plot()][graphics::plot.default()], such as `ylim`.
+#' @param ... Further trainings to compare, with the names of their lines or without; and further
+#'   arguments of [plot()][graphics::plot.default()], such as `ylim`, which `autoplot()` does not take.
 #' @return `x`, invisibly; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when no iteration was played to its end.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' trained <- train_agent(agent_ars(), "CartPole-v1", iterations = 20, seed = 1)
 #' plot(trained)
-plot.gym_training <- function(x, main = NULL, xlab = "steps of the environment",
-                              ylab = "return (reward summed over an episode)", ...) {
+plot.gym_training <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL) {
+  given <- if (missing(x)) {
+    given_trainings(list(...), substitute(list(...)))
+  } else {
+    given_trainings(list(x, ...), substitute(list(x, ...)))
+  }
+  if (length(given$trainings) > 1L) {
+    draw_trainings(given, main, xlab, ylab)
+  } else {
+    draw_training(given$trainings[[1L]], main, xlab, ylab, given$others)
+  }
+  invisible(given$trainings[[1L]])
+}
+
+draw_training <- function(x, main, xlab, ylab, chosen) {
   data <- training_plot_data(x)
-  open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab), list(...))
+  open_plot(
+    list(x = data$xlim, y = data$ylim, xlab = xlab %||% training_steps_label,
+         ylab = ylab %||% returns_label),
+    chosen
+  )
   history <- data$history
   if (!is.null(data$target)) {
     graphics::abline(h = data$target, col = okabe_ito$vermillion, lty = "dashed", lwd = 2)
@@ -38,13 +59,8 @@ plot.gym_training <- function(x, main = NULL, xlab = "steps of the environment",
                        col = okabe_ito$orange)
     graphics::points(final$steps, final$mean_return, pch = 16L, col = okabe_ito$orange, cex = 1.3)
   }
-  graphics::title(main = main %||% training_title(x), line = 2.5)
+  title_above(main %||% trainings_title(list(x)))
   training_legend(data)
-  invisible(x)
-}
-
-training_title <- function(x) {
-  paste0(sub(":.*", "", format(x$agent)), " in ", x$env_id)
 }
 
 #' Compute what a plot of a training shows
@@ -87,6 +103,20 @@ training_legend <- function(data) {
 #' @rdname plot.gym_training
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_training <- function(object, ...) {
+  given <- if (missing(object)) {
+    given_trainings(list(...), substitute(list(...)))
+  } else {
+    given_trainings(list(object, ...), substitute(list(object, ...)))
+  }
+  rlang::exec(check_dots_empty, !!!given$others)
+  if (length(given$trainings) > 1L) {
+    autoplot_trainings(given$trainings)
+  } else {
+    autoplot_training(given$trainings[[1L]])
+  }
+}
+
+autoplot_training <- function(object) {
   data <- training_plot_data(object)
   steps <- ggplot2::aes(x = .data$steps)
   plot <- ggplot2::ggplot(data$history, steps) +
@@ -97,8 +127,7 @@ autoplot.gym_training <- function(object, ...) {
     ggplot2::geom_point(ggplot2::aes(y = .data$mean_return), rbind(data$curve, data$final),
                         colour = okabe_ito$orange, size = 2) +
     ggplot2::labs(
-      title = training_title(object), x = "steps of the environment",
-      y = "return (reward summed over an episode)",
+      title = trainings_title(list(object)), x = training_steps_label, y = returns_label,
       subtitle = "band: candidates; line: their median; points: the policy; dashed: target"
     )
   if (is.null(data$target)) {

@@ -15,8 +15,10 @@
 #'     \item{weights}{What `agent_ask()` returned.}
 #'     \item{returns}{Their mean returns, a numeric vector with an element for each candidate.}
 #'     \item{lengths}{The mean lengths of their episodes, in steps, a numeric vector.}
-#'     \item{moments}{The moments of all observations in these episodes, where the policy has
-#'       `normalize = TRUE`; else `NULL`.}
+#'     \item{moments}{The moments of all observations in these episodes, where the agent needs them;
+#'       else `NULL`.}
+#'     \item{trajectories}{Each step of these episodes, where the agent needs them: a data frame as
+#'       `rollout(steps = TRUE, next_observation = TRUE)` has it for several policies.}
 #'   }
 #' @return
 #' * `agent_start()`: the agent as it is before its first iteration. The method of `"gym_agent"`
@@ -27,6 +29,9 @@
 #' * `agent_tell()`: the agent, wiser. The method of `"gym_agent"` merges the moments of the
 #'   observations into those of `agent$policy`; a method begins with `agent <- NextMethod()` where
 #'   observations may be normalised.
+#' * `agent_needs()`: what the agent needs of the playing, strings: `"returns"`, which it always
+#'   gets, `"moments"` and `"trajectories"`. The method of `"gym_agent"` returns `"returns"`, and
+#'   `"moments"` where its policy has `normalize = TRUE`.
 #' * `agent_policy()`: the policy with the agent's current weights, which need not be those of the
 #'   best candidate. The method of `"gym_agent"` returns `agent$policy`.
 #' @export
@@ -60,6 +65,15 @@ agent_tell <- function(agent, results) UseMethod("agent_tell")
 #' @rdname agent_start
 #' @export
 agent_policy <- function(agent) UseMethod("agent_policy")
+
+#' @rdname agent_start
+#' @export
+agent_needs <- function(agent) UseMethod("agent_needs")
+
+#' @export
+agent_needs.gym_agent <- function(agent) {
+  c("returns", if (!is.null(agent_policy(agent)$moments)) "moments")
+}
 
 #' @export
 agent_start.gym_agent <- function(agent, policy) {

@@ -99,6 +99,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   policy <- agent_policy(agent)
   check_asked(asked, policy, agent, call)
+  needs <- check_needs(agent_needs(agent), call)
   candidates <- policy_candidates(policy, asked)
   history <- new_history(nrow(asked), settings$episodes, state$streams)
   history$draw_seeds <- seed_drawer(settings)
@@ -106,9 +107,13 @@ train_iteration <- function(state, vector_env, settings, call) {
     vector_env, history, function(which) policy_subset(candidates, which),
     report = function(ended) state$report(history$played_episodes + ended),
     max_steps = settings$max_steps %||% Inf, target = settings$last_target,
-    keep_moments = !is.null(policy$moments)
+    keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
+    keep_next = "trajectories" %in% needs
   )
   results <- candidate_results(history, asked, call)
+  if ("trajectories" %in% needs) {
+    results$trajectories <- played_trajectories(history, vector_env)
+  }
   agent <- agent_tell(agent, results)
   if (!inherits(agent, "gym_agent")) {
     abort_agent(agent, "agent_tell()", "an agent", call)
@@ -149,6 +154,21 @@ abort_agent <- function(value, method, must, call) {
     paste0("`", method, "` must return ", must, ", not ", describe_argument(value), "."),
     class = "gym_error_agent", value = value, call = call
   )
+}
+
+check_needs <- function(needs, call) {
+  known <- c("returns", "moments", "trajectories")
+  if (!is.character(needs) || !all(needs %in% known)) {
+    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
+    abort_agent(needs, "agent_needs()", must, call)
+  }
+  needs
+}
+
+# The steps of all candidates, as a rollout of them has them.
+played_trajectories <- function(history, vector_env) {
+  episodes <- episodes_table(history$batches, several = TRUE)
+  steps_table(history$batches, episodes, vector_env, several = TRUE, next_observation = TRUE)
 }
 
 # What an agent is told of its candidates. Those after one that has ended the search were not played.

@@ -102,7 +102,7 @@ test_that("what cannot be animated says why, before anything is played", {
   skip_if_not_installed("magick")
   plain <- rollout("CartPole-v1", policy_random(), seed = 1, client = test_client())
   expect_error(animate(plain), "frames = TRUE", class = "gym_error_argument")
-  expect_error(animate(3), "a rollout, a search or a policy", class = "gym_error_argument")
+  expect_error(animate(3), "a rollout, a search, a training or a policy", class = "gym_error_argument")
   bad <- function(..., message) {
     expect_error(animate(policy_random(), ..., env = "CartPole-v1", client = no_client()), message,
                  class = "gym_error_argument")
