@@ -73,9 +73,22 @@ agent_ars <- function(directions = 8, top = max(1, directions %/% 2), step_size 
 agent_start.gym_agent_ars <- function(agent, policy) {
   agent <- NextMethod()
   if (startsWith(agent$version, "V2")) {
+    check_can_normalize(agent, policy)
     agent$policy$moments <- policy$moments %||% no_moments()
   }
   agent
+}
+
+check_can_normalize <- function(agent, policy) {
+  if (inherits(policy$observation_space, "gym_space_discrete")) {
+    plain <- sub("V2", "V1", agent$version)
+    gym_abort(
+      c(paste0("ARS ", agent$version, " normalizes observations, and those of ", policy$env_id,
+               " are ", format(policy$observation_space), "."),
+        i = paste0("`version = \"", plain, "\"` takes them as they are.")),
+      class = "gym_error_argument", argument = "version", value = agent$version, call = NULL
+    )
+  }
 }
 
 #' @export

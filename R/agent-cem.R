@@ -57,6 +57,7 @@ agent_cem <- function(population = 40, elite = max(1, population %/% 5), noise =
 agent_start.gym_agent_cem <- function(agent, policy) {
   agent <- NextMethod()
   agent$deviation <- rep(agent$noise, length(stats::coef(policy)))
+  agent$iteration <- 0L
   agent
 }
 

@@ -37,6 +37,13 @@ agent_hill_climb <- function(noise = 0.1, candidates = 1) {
 }
 
 #' @export
+agent_start.gym_agent_hill_climb <- function(agent, policy) {
+  agent <- NextMethod()
+  agent$best_return <- -Inf
+  agent
+}
+
+#' @export
 agent_ask.gym_agent_hill_climb <- function(agent) {
   weights <- stats::coef(agent$policy)
   n <- agent$candidates

@@ -27,7 +27,9 @@ agent_presets <- function(env_id = NULL) {
   for (name in c("kwargs", "source")) {
     presets[[name]][is.na(presets[[name]])] <- ""
   }
-  presets <- presets[is.null(env_id) | presets$env_id == env_id, ]
+  if (!is.null(env_id)) {
+    presets <- presets[presets$env_id == env_id, ]
+  }
   row.names(presets) <- NULL
   presets
 }

@@ -111,12 +111,14 @@ play_searches <- function(with_env, template, settings, seeds, progress, call) {
   started <- proc.time()[["elapsed"]]
   show <- if (progress) progress_bar(length(seeds), "Search", "0 solved, ") else function(...) NULL
   rows <- list()
+  origin <- NULL
   play <- function() {
     for (seed in seeds) {
       search <- play_seed(with_env, template, settings, seed, call)
       if (search$interrupted) {
         rlang::interrupt()
       }
+      origin <<- origin %||% search$provenance
       rows <<- c(rows, list(search_row(search)))
       show(length(rows), paste0(sum(vapply(rows, function(row) row$solved, NA)), " solved, "))
     }
@@ -127,12 +129,12 @@ play_searches <- function(with_env, template, settings, seeds, progress, call) {
       function() length(rows), length(seeds)
     ),
     error = function(cnd) {
-      result <- new_searches(rows, settings, started, interrupted = FALSE)
+      result <- new_searches(rows, settings, started, interrupted = FALSE, origin)
       abort_with_result(cnd$parent %||% cnd, "The search", result,
                         count_of(length(rows), "seed"), "gym_error_search", call)
     }
   )
-  new_searches(rows, settings, started, interrupted)
+  new_searches(rows, settings, started, interrupted, origin)
 }
 
 # An interrupt of one search ends all of them. Messages come once, for all.
@@ -157,20 +159,24 @@ search_row <- function(search) {
   )
 }
 
-new_searches <- function(rows, settings, started, interrupted) {
+new_searches <- function(rows, settings, started, interrupted, origin = NULL) {
   none <- data.frame(
     seed = integer(), solved = logical(), round = integer(), rounds = integer(),
     mean_return = numeric(), steps = integer(), elapsed = numeric()
   )
   searches <- do.call(rbind, c(list(none), rows))
   chance <- round_chance(searches)
+  if (!is.null(origin)) {
+    origin$seed <- as.numeric(searches$seed)
+  }
   structure(
     list(
       searches = searches, chance = chance$chance, se = chance$se,
       env_id = settings$env_id, target = settings$target, template = settings$policy,
       max_rounds = settings$rounds, episodes = settings$episodes,
       max_steps = settings$max_steps,
-      elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted
+      elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted,
+      provenance = origin
     ),
     class = "gym_searches"
   )

@@ -29,6 +29,15 @@ agent_random <- function(candidates = 8) {
 }
 
 #' @export
+agent_start.gym_agent_random <- function(agent, policy) {
+  agent <- NextMethod()
+  agent$played <- 0L
+  agent$best <- NA_integer_
+  agent$best_return <- -Inf
+  agent
+}
+
+#' @export
 agent_ask.gym_agent_random <- function(agent) {
   draw <- function(i) weight_vector(policy_resample(agent$policy))
   do.call(rbind, lapply(seq_len(agent$candidates), draw))

@@ -4,7 +4,8 @@
 #'
 #' The layers stand at x = 0, 1, ..., the neurons between y = 0 and 1.
 #' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`,
-#'   `y`, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
+#'   `y`, `bias`, whether it is the constant 1 whose weights are the biases, and then the last of
+#'   its layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
 #'   left out), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
 #'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`, which stands at `label_x`,
 #'   `label_y`), `layers` (data frame `x`, `label`).
@@ -14,12 +15,14 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   check_count(most, min = 3, arg = "neurons", call = call)
   check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
   layers <- length(policy$sizes)
-  each <- lapply(seq_len(layers), function(layer) place_neurons(policy$sizes[[layer]], layer, most))
+  sizes <- policy$sizes + c(rep(as.integer(isTRUE(policy$bias)), layers - 1L), 0L)
+  each <- lapply(seq_len(layers), function(layer) place_neurons(sizes[[layer]], layer, most))
   neurons <- do.call(rbind, lapply(each, function(placed) placed$neurons))
+  neurons$bias <- neurons$neuron > policy$sizes[neurons$layer]
   neurons$label <- ""
   first <- neurons$layer == 1L
   last <- neurons$layer == layers
-  neurons$label[first] <- input_labels(policy)[neurons$neuron[first]]
+  neurons$label[first] <- c(input_labels(policy), "bias")[neurons$neuron[first]]
   neurons$label[last] <- output_labels(policy)[neurons$neuron[last]]
   list(
     neurons = neurons,
@@ -44,7 +47,7 @@ place_neurons <- function(size, layer, most) {
 place_weights <- function(policy, neurons, digits) {
   each <- lapply(seq_along(policy$weights), function(layer) {
     from <- neurons[neurons$layer == layer, ]
-    to <- neurons[neurons$layer == layer + 1L, ]
+    to <- neurons[neurons$layer == layer + 1L & !neurons$bias, ]
     pairs <- expand.grid(to = seq_len(nrow(to)), from = seq_len(nrow(from)))
     number <- cbind(to$neuron[pairs$to], from$neuron[pairs$from])
     data.frame(

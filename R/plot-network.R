@@ -2,8 +2,8 @@
 #'
 #' Draws the diagram of a network: its layers from left to right, neurons as circles,
 #' weights as lines that are the wider the further from 0, blue where they are positive,
-#' vermillion and dashed where they are negative. Few weights are written on the
-#' lines as numbers; of a layer with many neurons some are left out, which dots show.
+#' vermillion and dashed where they are negative. Biases are the weights of a circle with a 1, the
+#' last of its layer. Few weights are written on the lines as numbers; of a layer with many neurons some are left out, which dots show.
 #'
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
 #' policy knows its environment: because it was played there, or because it is given as `env`.
@@ -126,6 +126,10 @@ draw_neurons <- function(data, room) {
   crowded <- max(table(neurons$x)) * 0.35 > graphics::par("pin")[[2L]]
   graphics::points(neurons$x, neurons$y, pch = 21L, cex = if (crowded) 1.8 else 3, bg = "white",
                    lwd = 1.5)
+  constant <- neurons[neurons$bias, ]
+  if (nrow(constant)) {
+    graphics::text(constant$x, constant$y, "1", cex = if (crowded) 0.5 else 0.8)
+  }
   draw_dots(data$dots)
   away <- neuron_away() / room$gap
   last <- max(neurons$x)
@@ -180,6 +184,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
                         label.padding = ggplot2::unit(0.12, "lines")) +
     ggplot2::geom_point(shape = 21, size = if (max(table(neurons$x)) > 8L) 5 else 9,
                         fill = "white") +
+    ggplot2::geom_text(ggplot2::aes(label = "1"), neurons[neurons$bias, ], size = 3) +
     ggplot2::geom_text(ggplot2::aes(label = "..."), data$dots, angle = 90) +
     ggplot2::geom_text(ggplot2::aes(.data$beside, label = .data$label, hjust = .data$side),
                        size = 3.2) +

@@ -76,7 +76,7 @@ training_plot_data <- function(x, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
-  evaluations <- x$evaluations
+  evaluations <- x$evaluations %||% no_evaluations
   evaluations$steps <- history$steps[evaluations$iteration]
   final <- evaluations[evaluations$kind == "final", ]
   target <- if (!is.null(x$target) && is.finite(x$target)) x$target
@@ -87,6 +87,8 @@ training_plot_data <- function(x, call = rlang::caller_env()) {
     ylim = range(history$min_return, history$max_return, evaluations$mean_return, target)
   )
 }
+
+no_evaluations <- data.frame(iteration = integer(), kind = character(), mean_return = numeric())
 
 training_legend <- function(data) {
   shown <- c(TRUE, TRUE, NROW(data$curve) > 0L || !is.null(data$final), !is.null(data$target))

@@ -122,7 +122,7 @@ trainings_curve <- function(x, label, call) {
 
 # The evaluations of a training; of several at one place the last, which had the most episodes.
 evaluation_curve <- function(training) {
-  evaluations <- training$evaluations
+  evaluations <- training$evaluations %||% no_evaluations
   steps <- training$history$steps[evaluations$iteration]
   last <- !duplicated(steps, fromLast = TRUE)
   data.frame(steps = steps[last], mean_return = evaluations$mean_return[last])

@@ -117,8 +117,9 @@ train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL,
   check_string(checkpoint, allow_null = TRUE)
   if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
   in_env <- function(use, max_steps = NULL) {
-    with_vector_env(env, eval_episodes, use, max_steps, ..., num_envs = num_envs,
-                    num_workers = num_workers, client = client, call = call)
+    # However few episodes an evaluation has, candidates are played side by side.
+    with_vector_env(env, max(eval_episodes, least_sub_envs), use, max_steps, ...,
+                    num_envs = num_envs, num_workers = num_workers, client = client, call = call)
   }
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
   if (is.null(seeds)) {
@@ -130,6 +131,8 @@ train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL,
     train_seeds(in_env, settings, seeds, files, progress, call)
   }
 }
+
+least_sub_envs <- 100
 
 # Reads the checkpoint of a training, where it is to have one.
 training_file <- function(settings, files, call) {
@@ -149,7 +152,7 @@ train_in <- function(vector_env, settings, file, log, progress, call) {
   bound <- bind_with_seed(settings$policy, vector_env, settings$seed, call)
   state <- new_training(agent_start(settings$agent, bound), settings)
   state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
-  state$log <- training_log(log, settings, call)
+  state$log <- training_log(log, settings, state$iteration, call)
   run_training(state, vector_env, settings, progress, call)
 }
 

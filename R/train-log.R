@@ -23,33 +23,99 @@ log_row <- function(state) {
 }
 
 #' Prepare to log a training
+#' @param iteration After which iteration the training goes on. Later rows, of iterations that a
+#'   checkpoint did not have, are taken out.
 #' @return A function that is called after each iteration.
 #' @noRd
-training_log <- function(folder, settings, call) {
+training_log <- function(folder, settings, iteration, call) {
   if (is.null(folder)) {
     return(function(state) NULL)
   }
   folder <- normalizePath(folder, mustWork = FALSE)
-  if (!dir.exists(folder) && !suppressWarnings(dir.create(folder, recursive = TRUE))) {
-    abort_argument(folder, "a folder that can be made", "log", call)
-  }
-  config <- list(
-    agent = format(settings$agent), env = settings$env_id, policy = policy_text(settings$policy),
-    iterations = settings$iterations, steps = settings$steps, episodes = settings$episodes,
-    target = settings$target, max_steps = settings$max_steps, eval_every = settings$eval_every,
-    eval_episodes = settings$eval_episodes, seed = settings$seed
-  )
-  writeLines(
-    jsonlite::toJSON(config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA),
-    file.path(folder, "config.json")
-  )
   table <- file.path(folder, "progress.csv")
+  tryCatch(
+    {
+      dir.create(folder, showWarnings = FALSE, recursive = TRUE)
+      write_config(file.path(folder, "config.json"), settings)
+      keep_iterations(table, iteration)
+    },
+    error = function(cnd) abort_log(folder, cnd, call),
+    warning = function(cnd) abort_log(folder, cnd, call)
+  )
+  failed <- FALSE
   function(state) {
-    first <- !file.exists(table) || state$iteration == 1L
-    # Numbers with as many digits as they need, and nothing for what was not evaluated.
-    utils::write.table(
-      log_row(state), table, append = !first, sep = ",", na = "", row.names = FALSE,
-      col.names = first, qmethod = "double"
+    # A full disk must not end what has trained for hours.
+    tryCatch(
+      append_row(table, log_row(state)),
+      error = function(cnd) {
+        if (!failed) warn_not_logged(table, cnd)
+        failed <<- TRUE
+      }
     )
   }
+}
+
+abort_log <- function(folder, cnd, call) {
+  gym_abort(
+    c(paste0("The log cannot be written to \"", folder, "\"."), x = conditionMessage(cnd),
+      i = "Give another folder as `log`."),
+    class = "gym_error_argument", argument = "log", value = folder, call = call
+  )
+}
+
+warn_not_logged <- function(table, cnd) {
+  rlang::warn(
+    c(paste0("The log \"", table, "\" cannot be written; the training goes on without."),
+      x = conditionMessage(cnd)),
+    class = "gym_warning_log"
+  )
+}
+
+write_config <- function(file, settings) {
+  numbers <- c("iterations", "steps", "episodes", "target", "max_steps", "eval_every",
+               "eval_episodes", "seed")
+  config <- c(
+    list(agent = format(settings$agent), env = settings$env_id, kwargs = empty_as_object(settings$kwargs),
+         policy = policy_text(settings$policy)),
+    unclass(settings)[numbers],
+    list(provenance = plain_provenance(settings$provenance))
+  )
+  writeLines(
+    jsonlite::toJSON(config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA,
+                     force = TRUE),
+    file
+  )
+}
+
+# In JSON an empty list would be an array.
+empty_as_object <- function(values) if (length(values)) values else rlang::set_names(list())
+
+plain_provenance <- function(from) {
+  from <- unclass(from)
+  from$started <- format(from$started, "%Y-%m-%dT%H:%M:%S%z")
+  from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
+}
+
+keep_iterations <- function(table, iteration) {
+  if (!file.exists(table)) {
+    return(invisible())
+  }
+  lines <- readLines(table)
+  # The first column counts iterations; the first line has the columns' names.
+  of_lines <- suppressWarnings(as.numeric(sub(",.*", "", lines)))
+  kept <- lines[is.na(of_lines) | of_lines <= iteration]
+  if (iteration == 0L) unlink(table) else writeLines(kept, table)
+}
+
+append_row <- function(table, row) {
+  first <- !file.exists(table)
+  # Numbers with as many digits as they need, and nothing for what was not evaluated.
+  withCallingHandlers(
+    utils::write.table(
+      row, table, append = !first, sep = ",", na = "", row.names = FALSE, col.names = first,
+      qmethod = "double"
+    ),
+    # The warning says more than the error that follows.
+    warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE)
+  )
 }

@@ -176,3 +176,20 @@ test_that("agents print their settings", {
   expect_output(print(agent_cem()), "CEM: population 40, elite 8, noise 1", fixed = TRUE)
   expect_output(print(agent_hill_climb()), "<agent: hill climbing: noise 0.1>", fixed = TRUE)
 })
+
+test_that("random search keeps the best weights, and of equal ones the first", {
+  set.seed(1)
+  agent <- agent_start(agent_random(3), policy_bind(policy_network(c(4, 2)), box_env()))
+  seen <- list()
+  for (returns in list(c(1, 5, 5), c(2, 5, 4), c(6, 7, 1))) {
+    asked <- agent_ask(agent)
+    expect_identical(dim(asked), c(3L, 8L))
+    expect_true(all(abs(asked) <= 1))
+    seen <- c(seen, list(asked))
+    agent <- agent_tell(agent, list(weights = asked, returns = returns))
+    if (length(seen) < 3) expect_identical(coef(agent_policy(agent)), seen[[1]][2, ])
+  }
+  expect_identical(coef(agent_policy(agent)), seen[[3]][2, ])
+  expect_identical(agent$best, 8L)
+  expect_identical(agent$played, 9L)
+})

@@ -98,11 +98,24 @@ test_that("a search plays its policy in a fresh episode, and so do policies", {
   )
 })
 
+test_that("a training plays its policy in its environment, with the arguments of that", {
+  skip_if_not_installed("magick")
+  client <- test_client()
+  trained <- train_agent(agent_ars(1, version = "V1"), "FrozenLake-v1", is_slippery = FALSE,
+                         iterations = 1, max_steps = 4, eval_episodes = 2, seed = 1, num_envs = 2,
+                         client = client)
+  animation <- animate(trained, seed = 3, width = 60, client = client)
+  fresh <- rollout("FrozenLake-v1", trained$policy, max_steps = 4, seed = 3, frames = TRUE,
+                   client = client, is_slippery = FALSE)
+  expect_identical(animation$stills, pick_stills(fresh$frames[[1]], 8))
+})
+
 test_that("what cannot be animated says why, before anything is played", {
   skip_if_not_installed("magick")
   plain <- rollout("CartPole-v1", policy_random(), seed = 1, client = test_client())
   expect_error(animate(plain), "frames = TRUE", class = "gym_error_argument")
-  expect_error(animate(3), "a rollout, a search, a training or a policy", class = "gym_error_argument")
+  expect_error(animate(3), "a rollout, a search, a training or a policy",
+               class = "gym_error_argument")
   bad <- function(..., message) {
     expect_error(animate(policy_random(), ..., env = "CartPole-v1", client = no_client()), message,
                  class = "gym_error_argument")

@@ -164,3 +164,22 @@ test_that("an environment named by its id is made for its names and closed", {
   plot(small_network(), "CartPole-v1", client = client)
   expect_length(env_list_all(client), 0)
 })
+
+test_that("biases are the weights of a constant, the last of its layer", {
+  policy <- policy_network(c(3, 2, 1), bias = TRUE, weights = list(
+    rbind(c(1, 2, 3, 0.5), c(4, 5, 6, -0.5)), rbind(c(7, 8, 0.25))
+  ))
+  data <- network_plot_data(policy)
+  expect_identical(as.vector(table(data$neurons$layer)), c(4L, 3L, 1L))
+  expect_identical(data$neurons$neuron[data$neurons$bias], c(4L, 3L))
+  expect_identical(data$neurons$label[4], "bias")
+  expect_identical(nrow(data$weights), 11L)
+  expect_identical(sort(data$weights$weight), sort(unlist(policy$weights)))
+  of_bias <- data$weights[data$weights$layer == 1 & data$weights$from == 4, ]
+  expect_identical(of_bias$weight, c(0.5, -0.5))
+  expect_identical(of_bias$y, rep(data$neurons$y[4], 2))
+  local_device()
+  expect_leaves_session_alone(plot(policy))
+  skip_if_not_installed("ggplot2")
+  expect_s3_class(ggplot2::ggplot_build(ggplot2::autoplot(policy)), "ggplot_built")
+})

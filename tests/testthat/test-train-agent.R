@@ -253,7 +253,93 @@ test_that("the log has a row for each iteration, also where a training went on",
   expect_identical(nrow(utils::read.csv(file.path(folder, "a", "progress.csv"))), 1L)
   file.create(file.path(folder, "file"))
   expect_error(quiet_training(agent_ars(), iterations = 1, log = file.path(folder, "file", "a")),
-               "`log` must be a folder", class = "gym_error_argument")
+               "cannot be written", class = "gym_error_argument")
+})
+
+test_that("a log that went further than the checkpoint is taken back to it", {
+  folder <- withr::local_tempdir()
+  kept <- local_kept_files()
+  play <- function(path) {
+    quiet_training(agent_ars(), iterations = 4, target = Inf, log = folder, checkpoint = path)
+  }
+  play(local_checkpoint())
+  whole <- utils::read.csv(file.path(folder, "progress.csv"))
+  play(local_checkpoint(kept$list[[3]]))
+  again <- utils::read.csv(file.path(folder, "progress.csv"))
+  columns <- setdiff(names(whole), c("time.time_elapsed", "time.fps"))
+  expect_identical(again[columns], whole[columns])
+})
+
+test_that("a log that cannot be written in the middle warns once and ends nothing", {
+  folder <- withr::local_tempdir()
+  calls <- 0L
+  callback <- function(training) {
+    calls <<- calls + 1L
+    if (calls == 2L) unlink(folder, recursive = TRUE)
+    TRUE
+  }
+  warnings <- testthat::capture_warnings(
+    trained <- quiet_training(agent_ars(), iterations = 5, target = Inf, log = folder,
+                              callback = callback)
+  )
+  expect_length(warnings, 1)
+  expect_match(warnings, "goes on without")
+  expect_identical(nrow(trained$history), 5L)
+})
+
+test_that("an agent that was trained before begins anew", {
+  for (agent in c(some_agents(), list(agent_random(4)))) {
+    first <- quiet_training(agent, iterations = 5, target = Inf)
+    again <- quiet_training(first$agent, iterations = 5, target = Inf)
+    expect_identical(again$history$mean_return, first$history$mean_return)
+    expect_identical(coef(again), coef(first))
+  }
+})
+
+test_that("weights that are drawn for the environment's sizes follow from the training's seed", {
+  play <- function(seed) {
+    quiet_training(agent_hill_climb(), policy = policy_network(c(NA, 2, 1)), iterations = 1,
+                   seed = seed, target = Inf)
+  }
+  expect_identical(coef(play(1)), coef(play(1)))
+  expect_false(identical(coef(play(1)), coef(play(2))))
+  path <- local_checkpoint()
+  go <- function() {
+    quiet_training(agent_hill_climb(), policy = policy_network(c(NA, 2, 1)), iterations = 1,
+                   target = Inf, checkpoint = path)
+  }
+  expect_identical(coef(go()), coef(go()))
+})
+
+test_that("observations that are numbers of a range are not normalized", {
+  env <- fake_environment(observation_space = discrete_space(4))
+  expect_error(quiet_training(agent_ars(), iterations = 1, env = env), "`version = \"V1-t\"`",
+               fixed = TRUE, class = "gym_error_argument")
+  trained <- quiet_training(agent_ars(version = "V1-t"), iterations = 1, env = env)
+  expect_null(trained$policy$moments)
+})
+
+test_that("an agent is told the trajectories that it needs, step by step", {
+  told <- NULL
+  .S3method("agent_needs", "curious", function(agent) c("returns", "trajectories"))
+  .S3method("agent_ask", "curious", function(agent) matrix(c(-1, 1), 2, 4))
+  .S3method("agent_tell", "curious", function(agent, results) {
+    told <<- results
+    agent
+  })
+  curious <- structure(list(), class = c("curious", "gym_agent"))
+  env <- fake_environment(reward = first_action)
+  trained <- quiet_training(curious, iterations = 1, episodes = 2, env = env)
+  steps <- told$trajectories
+  expect_null(told$moments)
+  # Two candidates with two episodes of three steps.
+  expect_identical(steps$candidate, rep(1:2, each = 6))
+  expect_identical(steps$episode, rep(rep(1:2, each = 3), 2))
+  expect_identical(steps$step, rep(1:3, 4))
+  expect_equal(as.vector(tapply(steps$reward, steps$candidate, sum)) / 2, told$returns)
+  expect_identical(steps$next_obs_1[1:2], steps$obs_1[2:3])
+  .S3method("agent_needs", "curious", function(agent) "gradients")
+  expect_error(quiet_training(curious, iterations = 1), class = "gym_error_agent")
 })
 
 test_that("arguments that are wrong are refused before anything is made", {
@@ -274,6 +360,8 @@ test_that("arguments that are wrong are refused before anything is made", {
   refused(agent_ars(), iterations = 1, callback = 3, name = "callback")
   refused(agent_ars(), iterations = 1, seed = 0.5, name = "seed")
   refused(agent_ars(), iterations = 1, policy = "linear", name = "policy")
+  expect_error(train_agent(agent_ars(), "CartPole-v1", iterations = 1, is_round = TRUE,
+                           client = test_client()), "is_round", class = "gym_error_http")
 })
 
 test_that("a training predicts, and sums up its evaluations", {

@@ -1,0 +1,73 @@
+test_that("every preset makes its agent, and says where it comes from", {
+  presets <- agent_presets()
+  expect_true(all(presets$agent %in% c("ars", "cem")))
+  expect_identical(anyDuplicated(presets[c("env_id", "kwargs", "agent")]), 0L)
+  expect_true(all(nzchar(presets$source[presets$origin == "paper"])))
+  expect_true(all(presets$origin %in% c("paper", "ours")))
+  for (row in seq_len(nrow(presets))) {
+    preset <- as.list(presets[row, ])
+    make <- list(ars = agent_ars, cem = agent_cem)[[preset$agent]]
+    settings <- preset[intersect(names(formals(make)), names(preset))]
+    agent <- do.call(make, settings[!is.na(settings)])
+    expect_s3_class(agent, "gym_agent")
+    given <- unlist(settings[!is.na(settings) & names(settings) != "version"])
+    expect_equal(unlist(agent[names(given)]), given)
+  }
+  swimmer <- agent_presets("Swimmer-v5")
+  expect_identical(unique(swimmer$env_id), "Swimmer-v5")
+  expect_identical(nrow(agent_presets("None-v0")), 0L)
+  expect_error(agent_presets(3), class = "gym_error_argument")
+})
+
+test_that("a preset belongs to an id with the same arguments", {
+  expect_identical(find_preset("ars", "LunarLander-v3", list())$bias, TRUE)
+  continuous <- find_preset("ars", "LunarLander-v3", list(continuous = TRUE))
+  expect_identical(continuous$kwargs, "{\"continuous\":true}")
+  expect_null(find_preset("ars", "LunarLander-v3", list(continuous = FALSE)))
+  expect_null(find_preset("ars", "LunarLander-v3", list(continuous = TRUE, gravity = -5)))
+  expect_null(find_preset("cem", "CartPole-v1", list()))
+  expect_null(find_preset("ars", fake_environment(id = "CartPole-v1"), list()))
+})
+
+test_that("a search takes its preset, says so, and lets arguments go before it", {
+  client <- test_client()
+  expect_message(
+    trained <- search_ars("CartPole-v1", steps = 500, eval_episodes = 2, seed = 1, client = client),
+    "preset for CartPole-v1 .*ours", class = "gym_message_preset"
+  )
+  preset <- find_preset("ars", "CartPole-v1", list())
+  by_hand <- train_agent(
+    agent_ars(preset$directions, preset$top, preset$step_size, preset$noise, preset$version),
+    "CartPole-v1", policy_linear(bias = preset$bias), steps = 500, target = preset$target,
+    eval_episodes = 2, seed = 1, client = client
+  )
+  expect_identical(trained$history$mean_return, by_hand$history$mean_return)
+  expect_identical(trained$target, preset$target)
+  expect_identical(provenance(trained)$preset$origin, "ours")
+  expect_null(provenance(by_hand)$preset)
+  own <- suppressMessages(
+    search_ars("CartPole-v1", policy_linear(bias = TRUE), directions = 3, top = 1, noise = 0.4,
+               target = 5, iterations = 1, eval_episodes = 2, seed = 1, client = client)
+  )
+  expect_identical(own$agent[c("directions", "top", "noise", "step_size")],
+                   list(directions = 3L, top = 1L, noise = 0.4, step_size = preset$step_size))
+  expect_length(coef(own), 5)
+  expect_identical(own$target, 5)
+})
+
+test_that("without a preset agents have their own defaults, and training needs a budget", {
+  env <- fake_environment(reward = first_action)
+  expect_no_message(trained <- search_ars(env, directions = 3, iterations = 2, eval_episodes = 2,
+                                          seed = 1))
+  expect_identical(trained$agent$step_size, agent_ars()$step_size)
+  cem <- search_cem(env, policy_network(c(4, 2, 1)), population = 6, iterations = 2,
+                    eval_episodes = 2, seed = 1)
+  expect_identical(cem$agent$population, 6L)
+  hill <- search_hill_climb(env, noise = 0.3, candidates = 4, iterations = 2, eval_episodes = 2,
+                            seed = 1)
+  expect_identical(hill$agent$noise, 0.3)
+  for (search in list(search_ars, search_cem, search_hill_climb)) {
+    expect_error(search(env), "needs a budget", class = "gym_error_argument")
+  }
+  expect_error(search_ars(env, directions = 0, iterations = 1), class = "gym_error_argument")
+})

@@ -1,0 +1,87 @@
+# A training as it would be, with these evaluations.
+training_of <- function(steps, returns, target = 5, agent = agent_ars(), ...) {
+  evaluations <- data.frame(
+    iteration = seq_along(steps), kind = c(rep("curve", length(steps) - 1L), "final"),
+    mean_return = returns, ...
+  )
+  structure(
+    list(history = data.frame(steps = steps), evaluations = evaluations, agent = agent,
+         target = target, env_id = "Fake-v0"),
+    class = "gym_training"
+  )
+}
+
+trainings_of <- function(...) {
+  trainings <- list(...)
+  structure(
+    list(trainings = trainings, agent = trainings[[1]]$agent, target = trainings[[1]]$target,
+         env_id = "Fake-v0"),
+    class = "gym_trainings"
+  )
+}
+
+test_that("a band is the middle half of the seeds, its line their median", {
+  trained <- trainings_of(
+    training_of(c(10, 20, 30), c(0, 1, 2)), training_of(c(10, 20, 40), c(4, 5, 6)),
+    training_of(c(5, 20), c(7, 10)), training_of(c(10, 20), c(8, 8)),
+    training_of(c(10, 40), c(9, 9))
+  )
+  data <- trainings_plot_data(list(ARS = trained))
+  curve <- data$curves
+  # From where all were evaluated once; one that ended stays where it came to.
+  expect_identical(range(curve$steps), c(10, 40))
+  expect_equal(unlist(curve[1, c("median", "lower", "upper")]),
+               c(median = 8, lower = 4, upper = 8))
+  at_last <- sort(c(2, 6, 10, 8, 9))
+  expect_equal(unlist(curve[nrow(curve), c("median", "lower", "upper")]),
+               c(median = at_last[[3]], lower = at_last[[2]], upper = at_last[[4]]))
+  expect_identical(data$target, 5)
+  expect_identical(data$title, "ARS V2-t in Fake-v0, 5 seeds")
+})
+
+test_that("between evaluations a curve is straight, of several at one place the last counts", {
+  evaluated_twice <- training_of(c(10, 10, 20), c(99, 1, 3))
+  curve <- trainings_plot_data(list(a = trainings_of(evaluated_twice, evaluated_twice)))$curves
+  expect_equal(curve$median, 1 + (curve$steps - 10) / 10 * 2)
+})
+
+test_that("trainings that are given together are compared, by their names", {
+  ars <- trainings_of(training_of(c(10, 20), c(1, 2)), training_of(c(10, 20), c(3, 4)))
+  cem <- training_of(c(10, 30), c(1, 6), agent = agent_cem())
+  given <- given_trainings(list(A = ars, cem), quote(list(A = ars, cem)))
+  expect_named(given$trainings, c("A", "cem"))
+  data <- trainings_plot_data(given$trainings)
+  expect_identical(unique(data$curves$label), c("A", "cem"))
+  expect_identical(data$curves$median[data$curves$label == "cem"], c(1, 6))
+  expect_named(data$colours, c("A", "cem"))
+  # Different targets are no line.
+  expect_null(trainings_plot_data(list(a = ars, b = training_of(1:2, 1:2, target = 9)))$target)
+  local_device()
+  expect_leaves_session_alone(plot(ars))
+  expect_identical(plot(ars, cem), ars)
+  expect_identical(plot(A = ars, B = cem, ylim = c(0, 9)), ars)
+  expect_identical(plot(cem, ars, main = "mine"), cem)
+  expect_error(plot(ars, 3), class = "gym_error_argument")
+  skip_if_not_installed("ggplot2")
+  for (plot in list(ggplot2::autoplot(ars, cem), ggplot2::autoplot(cem, A = ars),
+                    ggplot2::autoplot(ars))) {
+    built <- ggplot2::ggplot_build(plot)
+    expect_identical(built$data[[3]]$yintercept, 5)
+  }
+  expect_error(ggplot2::autoplot(ars, ylim = 3), class = "gym_error_argument")
+})
+
+test_that("trainings without an evaluation are refused, and single ones drawn without", {
+  env <- fake_environment(reward = first_action)
+  step <- env$step
+  env$step <- function(action) if (length(env$seeds) == 40L) rlang::interrupt() else step(action)
+  trained <- suppressMessages(
+    train_agent(agent_ars(), env, iterations = 9, seed = 1, target = Inf)
+  )
+  expect_null(trained$evaluations)
+  expect_identical(nrow(training_plot_data(trained)$curve), 0L)
+  local_device()
+  expect_identical(plot(trained), trained)
+  expect_error(plot(trained, trained), "no policy of trained was evaluated",
+               class = "gym_error_argument")
+})
