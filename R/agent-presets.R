@@ -15,7 +15,8 @@
 #'   and `bias` (a logical), of the training `episodes`, `steps` (its budget) and `target` (the mean
 #'   return at which it stops, which lies above the one that the environment counts as solved, so
 #'   that the final evaluation reaches that), and where they come from: `origin` is `"paper"`, with
-#'   the `source`, or `"ours"`.
+#'   the `source`, or `"ours"`. `tried` is how many settings were tried (an integer), with the seeds 1
+#'   to 99, before these were chosen; `vignette("solved")` reports other seeds.
 #' @section Errors: `gym_error_argument` when `env_id` is no string.
 #' @export
 #' @examples
