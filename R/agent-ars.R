@@ -38,8 +38,8 @@
 #'   default, takes the preset's.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
-#' @return `agent_ars()` an agent of class `gym_agent_ars`; `search_ars()` makes that agent, trains it
-#'   and returns what [train_agent()] does.
+#' @return `agent_ars()` an agent of class `gym_agent_ars`; `search_ars()` makes that agent, trains
+#'   it and returns what [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31. Code:

@@ -24,8 +24,8 @@
 #'   default, takes the preset's.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
-#' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains it
-#'   and returns what [train_agent()] does.
+#' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains
+#'   it and returns what [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @references I. Szita and A. Lorincz (2006), Learning Tetris using the noisy cross-entropy method,
 #'   Neural Computation 18(12), 2936-2941.

@@ -8,14 +8,14 @@
 #'
 #' @param env_id The id of an environment, a string, for its presets alone; `NULL`, the default, for
 #'   all.
-#' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the
-#'   environment's own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or
-#'   `"cem"`), the agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such
-#'   one), of the policy `hidden` (how many hidden neurons a network has, `NA` for a linear policy)
-#'   and `bias` (a logical), of the training `episodes`, `steps` (its budget) and `target` (the mean
-#'   return at which it stops, which lies above the one that the environment counts as solved, so
-#'   that the final evaluation reaches that), and where they come from: `origin` is `"paper"`, with
-#'   the `source`, or `"ours"`. `tried` is how many settings were tried (an integer), with the seeds 1
+#' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the environment's
+#'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or `"cem"`), the
+#'   agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such one), of the
+#'   policy `hidden` (how many hidden neurons a network has, `NA` for a linear policy) and `bias` (a
+#'   logical), of the training `episodes`, `steps` (its budget) and `target` (the mean return at
+#'   which it stops, which lies above the one that the environment counts as solved, so that the
+#'   final evaluation reaches that), and where they come from: `origin` is `"paper"`, with the
+#'   `source`, or `"ours"`. `tried` is how many settings were tried (an integer), with the seeds 1
 #'   to 99, before these were chosen; `vignette("solved")` reports other seeds.
 #' @section Errors: `gym_error_argument` when `env_id` is no string.
 #' @export
@@ -35,7 +35,8 @@ agent_presets <- function(env_id = NULL) {
   presets
 }
 
-# The preset of an agent for an environment with these arguments, a list; `NULL` where there is none.
+# The preset of an agent for an environment with these arguments, a list; `NULL` where there is
+# none.
 find_preset <- function(agent, env, kwargs) {
   if (!is.character(env)) {
     return(NULL)

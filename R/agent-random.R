@@ -127,8 +127,8 @@ format.gym_agent_random <- function(x, ...) {
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same search.}
-#'     \item{history, agent, steps}{As those of a training, see [train_agent()]: a search is one, too,
-#'       in which each round is an iteration with one candidate.}
+#'     \item{history, agent, steps}{As those of a training, see [train_agent()]: a search is one,
+#'       too, in which each round is an iteration with one candidate.}
 #'     \item{elapsed}{The seconds that it took, a double.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }

@@ -1,8 +1,8 @@
 #' Make a moving picture of an episode
 #'
-#' Writes an episode as an animated GIF file: of a rollout one that was played with
-#' `frames = TRUE`, of a search, a training or a policy a fresh one, which is played for it. Printed
-#' in an interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
+#' Writes an episode as an animated GIF file: of a rollout one that was played with `frames = TRUE`,
+#' of a search, a training or a policy a fresh one, which is played for it. Printed in an
+#' interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
 #' names another function that opens it, or `FALSE`), and a document of knitr has it on the page,
 #' one made by LaTeX its [filmstrip][plot.gym_rollout()].
 #'

@@ -1,40 +1,5 @@
-# Where a result comes from: what must be known to get it again, or to see why it came out otherwise.
-
-#' Where a result comes from
-#'
-#' Every result keeps what made it: versions, system, the library of linear algebra (whose sums
-#' differ in the last bits from machine to machine), environment, seeds and time. `provenance()`
-#' gives it, also of the file of a checkpoint.
-#'
-#' @param x A result: what [rollout()], [evaluate_policy()], [train_agent()], [search_random()] or
-#'   [search_repeat()] returned; or the file of a checkpoint, a string.
-#' @param ... Not used.
-#' @return An object of class `gym_provenance`, which prints a line for each of its elements; a list
-#'   of `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK` (strings), `server` (the versions of the
-#'   server, a named list of strings; `NULL` for an environment in R), `env_id` (a string), `kwargs`
-#'   (the environment's own arguments, a named list), `wrappers` (strings), `num_envs`, `seed` (whole
-#'   numbers), `preset` (a list, `NULL` where none was taken), `started` (a date with time) and
-#'   `elapsed` (seconds, a double). Rollouts and evaluations have no times, `NULL` and `NA`, so that
-#'   two with the same seed are identical.
-#' @section Errors: `gym_error_argument` for something that has no provenance,
-#'   `gym_error_checkpoint` for a file that is no checkpoint.
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' provenance(rollout("CartPole-v1", policy_random(), episodes = 10, seed = 1))
-provenance <- function(x, ...) UseMethod("provenance")
-
-#' @export
-provenance.default <- function(x, ...) {
-  kept <- if (is.data.frame(x)) attr(x, "provenance") else if (is.list(x)) x$provenance
-  if (!inherits(kept, "gym_provenance")) {
-    abort_argument(x, "a result of this package, or the file of a checkpoint", "x",
-                   rlang::current_env())
-  }
-  if (is.list(x) && is_number(x$elapsed)) {
-    kept$elapsed <- x$elapsed
-  }
-  kept
-}
+# Where a result comes from: what must be known to get it again, or to see why it came out
+# otherwise.
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()

@@ -1,9 +1,10 @@
 #' Plot a network
 #'
-#' Draws the diagram of a network: its layers from left to right, neurons as circles,
-#' weights as lines that are the wider the further from 0, blue where they are positive,
-#' vermillion and dashed where they are negative. Biases are the weights of a circle with a 1, the
-#' last of its layer. Few weights are written on the lines as numbers; of a layer with many neurons some are left out, which dots show.
+#' Draws the diagram of a network: its layers from left to right, neurons as circles, weights as
+#' lines that are the wider the further from 0, blue where they are positive, vermillion and dashed
+#' where they are negative. Biases are the weights of a circle with a 1, the last of its layer. Few
+#' weights are written on the lines as numbers; of a layer with many neurons some are left out,
+#' which dots show.
 #'
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
 #' policy knows its environment: because it was played there, or because it is given as `env`.

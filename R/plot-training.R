@@ -14,7 +14,8 @@
 #' @param main The title; the default names the environment and the agent.
 #' @param xlab,ylab The axes' labels.
 #' @param ... Further trainings to compare, with the names of their lines or without; and further
-#'   arguments of [plot()][graphics::plot.default()], such as `ylim`, which `autoplot()` does not take.
+#'   arguments of [plot()][graphics::plot.default()], such as `ylim`, which `autoplot()` does not
+#'   take.
 #' @return `x`, invisibly; `autoplot()` a ggplot.
 #' @section Errors: `gym_error_argument` when no iteration was played to its end.
 #' @export

@@ -3,21 +3,21 @@
 #' Plot trainings
 #'
 #' Shows how good the agents' own policies were over the steps of the environment: of trainings with
-#' several seeds ([gym_trainings]) the median of the seeds as a line and the middle half of them as a
-#' band, of a single training its evaluations as a line; the target is a dashed line. Several that are
-#' given together are compared in one picture.
+#' several seeds ([gym_trainings]) the median of the seeds as a line and the middle half of them as
+#' a band, of a single training its evaluations as a line; the target is a dashed line. Several that
+#' are given together are compared in one picture.
 #'
-#' Between two evaluations a training's return is taken from the straight line between them, and from
-#' its end on it stays what its final evaluation found. A picture begins where all seeds were
+#' Between two evaluations a training's return is taken from the straight line between them, and
+#' from its end on it stays what its final evaluation found. A picture begins where all seeds were
 #' evaluated once.
 #'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
-#' @param x,object Trainings, as `train_agent(seeds = )` returns them. It may have another name, that
-#'   of its line, as in `plot(ARS = first, CEM = second)`.
-#' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, with the names
-#'   of their lines or without; and further arguments of [plot()][graphics::plot.default()], such as
-#'   `ylim`, which `autoplot()` does not take.
+#' @param x,object Trainings, as `train_agent(seeds = )` returns them. It may have another name,
+#'   that of its line, as in `plot(ARS = first, CEM = second)`.
+#' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, with the
+#'   names of their lines or without; and further arguments of
+#'   [plot()][graphics::plot.default()], such as `ylim`, which `autoplot()` does not take.
 #' @param main The title; the default names environment, agent and number of seeds.
 #' @param xlab,ylab The axes' labels.
 #' @return `x`, invisibly; `autoplot()` a ggplot.

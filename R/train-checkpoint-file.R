@@ -124,17 +124,3 @@ warn_not_written <- function(path, what, cnd) {
     class = "gym_warning_checkpoint"
   )
 }
-
-#' @export
-provenance.character <- function(x, ...) {
-  call <- rlang::current_env()
-  check_string(x)
-  if (!file.exists(x)) {
-    abort_argument(x, "a file that exists, or a result of this package", "x", call)
-  }
-  saved <- read_checkpoint(x, call)
-  kept <- saved$provenance
-  kept$seed <- saved$seed
-  kept$elapsed <- saved$elapsed
-  kept
-}

@@ -51,8 +51,8 @@ finish_training.gym_training_settings <- function(settings, state, vector_env) {
 #' @noRd
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   policy <- agent_policy(state$agent)
-  # The final evaluation draws from copies: a training that goes on with a larger budget evaluates as
-  # one that had it from the start.
+  # The final evaluation draws from copies: a training that goes on with a larger budget evaluates
+  # as one that had it from the start.
   final <- kind == "final"
   streams <- state$evaluation_streams
   if (final) streams <- restore_streams(saved_streams(streams))

@@ -2,8 +2,8 @@
 #
 # When it ends, what is looked at in between and what it returns are a rule, of which there are two:
 # settings of class "gym_training_settings" evaluate the agent's policy (train-evaluation.R), those
-# of class "gym_search_settings" keep the rule of the post, in which the first candidate that reaches
-# the target ends the search (train-search-rule.R).
+# of class "gym_search_settings" keep the rule of the post, in which the first candidate that
+# reaches the target ends the search (train-search-rule.R).
 
 #' Make what changes while an agent is trained
 #'
@@ -171,7 +171,8 @@ played_trajectories <- function(history, vector_env) {
   steps_table(history$batches, episodes, vector_env, several = TRUE, next_observation = TRUE)
 }
 
-# What an agent is told of its candidates. Those after one that has ended the search were not played.
+# What an agent is told of its candidates. Those after one that has ended the search were not
+# played.
 candidate_results <- function(history, asked, call) {
   each <- function(name) {
     values <- unlist(lapply(history$batches, function(batch) batch[[name]]))

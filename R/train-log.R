@@ -75,8 +75,10 @@ write_config <- function(file, settings) {
   numbers <- c("iterations", "steps", "episodes", "target", "max_steps", "eval_every",
                "eval_episodes", "seed")
   config <- c(
-    list(agent = format(settings$agent), env = settings$env_id, kwargs = empty_as_object(settings$kwargs),
-         policy = policy_text(settings$policy)),
+    list(
+      agent = format(settings$agent), env = settings$env_id,
+      kwargs = empty_as_object(settings$kwargs), policy = policy_text(settings$policy)
+    ),
     unclass(settings)[numbers],
     list(provenance = plain_provenance(settings$provenance))
   )

@@ -92,7 +92,8 @@ training_progress.gym_search_settings <- function(settings, state, progress,
   show <- function(episodes) {
     best <- state$agent$best_return
     note <- if (is.finite(best)) number_text(best) else "-"
-    bar(state$agent$played + episodes %/% settings$episodes, paste0("best mean return ", note, ", "))
+    finished <- state$agent$played + episodes %/% settings$episodes
+    bar(finished, paste0("best mean return ", note, ", "))
   }
   state$report <- show
   if (state$agent$played) show(0)

@@ -3,7 +3,8 @@
 #
 #   tools/in-env Rscript tools/figures.R
 #
-# Takes some seconds, and the packages magick and png.
+# Takes some two minutes, most of them for a training of LunarLander, and the packages magick and
+# png.
 
 library(gym)
 
@@ -30,3 +31,7 @@ draw("trajectory.png", played, type = "trajectory")
 draw("filmstrip.png", played, type = "filmstrip", height = 1.5)
 # Every second frame is smooth enough, at the same pace.
 print(animate(played, "man/figures/cartpole.gif", width = 300, every = 2))
+
+lander <- search_ars("LunarLander-v3", continuous = TRUE, seed = 1001)
+print(lander)
+print(animate(lander, "man/figures/lander.gif", seed = 3, width = 300, every = 5))
