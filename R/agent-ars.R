@@ -17,6 +17,8 @@
 #' | V2 | normalised | all |
 #' | V2-t | normalised | the `top` ones |
 #'
+#' (A policy that was made with `normalize = TRUE` normalises them in V1, too.)
+#'
 #' As in the authors' code there is no step where the returns used are all the same, and a number of
 #' an observation that has not changed comes in as 0; unlike there, of directions with equal returns
 #' the first are used, and not all.
@@ -55,6 +57,11 @@ agent_ars <- function(directions = 8, top = max(1, directions %/% 2), step_size 
                       noise = 0.05, version = "V2-t", shift = 0) {
   check_count(directions)
   check_choice(version, c("V1", "V1-t", "V2", "V2-t"))
+  if (!missing(top) && !endsWith(version, "-t") && !identical(top + 0, directions + 0)) {
+    must <- paste0("the number of directions in version ", version, ", which uses all of them; \"",
+                   version, "-t\" uses the best")
+    abort_argument(top, must, "top", rlang::current_env())
+  }
   check_count(top, max = directions)
   check_above_zero(step_size)
   check_above_zero(noise)

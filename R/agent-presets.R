@@ -58,8 +58,7 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 
 #' Make an agent and train it
 #'
-#' @param agent The agent's name, as in the presets.
-#' @param make The function that makes it.
+#' @param agent The agent's name, as in the presets; `make`, the function that makes it.
 #' @param given What the user has given, a list: the agent's arguments, `policy`, and arguments of
 #'   the training.
 #' @param env,... As for [train_agent()].
@@ -69,22 +68,53 @@ search_by <- function(agent, make, given, env, ..., call = rlang::caller_env()) 
   dots <- list(...)
   of_training <- names(dots) %in% names(formals(train_agent))
   preset <- find_preset(agent, env, dots[!of_training])
-  given <- given[lengths(given) > 0L]
+  given <- given[!vapply(given, is.null, NA)]
   own <- intersect(names(formals(make)), names(given))
   arguments <- preset[intersect(names(formals(make)), names(preset))]
+  # A part of the candidates that was meant for another number of them, or another version.
+  if (any(c("directions", "version") %in% own)) arguments$top <- NULL
+  if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
-  made <- rlang::exec(make, !!!arguments)
+  made <- rlang::exec(paste0("agent_", agent), !!!arguments)
   training <- c(given[setdiff(names(given), own)], dots[of_training])
+  # A budget of the user's own is the only one.
+  budget <- any(c("iterations", "steps") %in% names(training))
+  if (is.null(preset) && !budget) {
+    abort_no_budget(agent, env, dots[!of_training], call)
+  }
   if (!is.null(preset)) {
-    # A budget of the user's own is the only one.
-    budget <- any(c("iterations", "steps") %in% names(training))
     from_preset <- preset[setdiff(c("episodes", "target", if (!budget) "steps"), names(training))]
     training[names(from_preset)] <- from_preset
     training$policy <- training$policy %||% preset_policy(preset)
     inform_of_preset(preset, env)
   }
-  made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
-  rlang::exec(train_agent, made, env, !!!training, !!!dots[!of_training])
+  if (!is.null(preset)) {
+    made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
+    made$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
+  }
+  rlang::exec("train_agent", made, env, !!!training, !!!dots[!of_training])
+}
+
+abort_no_budget <- function(agent, env, kwargs, call) {
+  presets <- if (is.character(env)) agent_presets(env)
+  known <- if (NROW(presets)) {
+    paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
+           presets$kwargs, collapse = ", ")
+  }
+  gym_abort(
+    c(
+      "Training needs a budget: give `iterations`, or `steps` of the environment.",
+      i = if (length(known)) {
+        paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
+               known, ".")
+      },
+      i = if (length(known) && length(kwargs)) {
+        paste0("These were taken for the environment's own: ",
+               paste0("`", names(kwargs), "`", collapse = ", "), ".")
+      }
+    ),
+    class = "gym_error_argument", argument = "iterations", call = call
+  )
 }
 
 preset_policy <- function(preset) {

@@ -3,15 +3,14 @@
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
-  session <- utils::sessionInfo()
   structure(
     list(
       gym = as.character(utils::packageVersion("gym")),
       R = as.character(getRversion()),
       platform = R.version$platform,
       system = paste(system[["sysname"]], system[["release"]]),
-      BLAS = session$BLAS %||% NA_character_,
-      LAPACK = session$LAPACK %||% NA_character_,
+      BLAS = extSoftVersion()[["BLAS"]],
+      LAPACK = La_library(),
       server = server_versions(vector_env$client),
       env_id = environment_label(vector_env),
       kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),

@@ -71,13 +71,13 @@ draw_training <- function(x, main, xlab, ylab, chosen) {
 #' @noRd
 training_plot_data <- function(x, call = rlang::caller_env()) {
   history <- x$history
-  if (is.null(history)) {
+  if (!NROW(history)) {
     gym_abort(
       "There is nothing to plot: the training ended before its first iteration did.",
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
-  evaluations <- x$evaluations %||% no_evaluations
+  evaluations <- x$evaluations
   evaluations$steps <- history$steps[evaluations$iteration]
   final <- evaluations[evaluations$kind == "final", ]
   target <- if (!is.null(x$target) && is.finite(x$target)) x$target
@@ -85,11 +85,10 @@ training_plot_data <- function(x, call = rlang::caller_env()) {
     history = history, curve = evaluations[evaluations$kind != "final", ],
     final = if (NROW(final)) final[nrow(final), ], target = target,
     xlim = c(0, max(history$steps)),
-    ylim = range(history$min_return, history$max_return, evaluations$mean_return, target)
+    ylim = range(history$min_return, history$max_return, evaluations$mean_return,
+                 final[c("lower", "upper")], target, na.rm = TRUE)
   )
 }
-
-no_evaluations <- data.frame(iteration = integer(), kind = character(), mean_return = numeric())
 
 training_legend <- function(data) {
   shown <- c(TRUE, TRUE, NROW(data$curve) > 0L || !is.null(data$final), !is.null(data$target))
@@ -127,11 +126,16 @@ autoplot_training <- function(object) {
                          fill = okabe_ito$sky_blue, alpha = 0.35) +
     ggplot2::geom_line(ggplot2::aes(y = .data$median_return), colour = okabe_ito$blue,
                        linewidth = 0.8) +
-    ggplot2::geom_point(ggplot2::aes(y = .data$mean_return), rbind(data$curve, data$final),
+    ggplot2::geom_point(ggplot2::aes(y = .data$mean_return), data$curve, shape = 1,
                         colour = okabe_ito$orange, size = 2) +
+    ggplot2::geom_pointrange(
+      ggplot2::aes(y = .data$mean_return, ymin = .data$lower, ymax = .data$upper),
+      data$final %||% data$curve[0L, ], colour = okabe_ito$orange
+    ) +
     ggplot2::labs(
       title = trainings_title(list(object)), x = training_steps_label, y = returns_label,
-      subtitle = "band: candidates; line: their median; points: the policy; dashed: target"
+      subtitle = paste("band: candidates; line: their median; points: the policy, filled at the",
+                       "end; dashed: target")
     )
   if (is.null(data$target)) {
     plot

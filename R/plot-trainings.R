@@ -43,6 +43,7 @@ training_steps_label <- "steps of the environment"
 
 # Tells the trainings among the arguments of a plot from the others.
 given_trainings <- function(dots, written, call = rlang::caller_env()) {
+  check_no_search(dots, call)
   are <- vapply(dots, is_training, NA)
   names <- rlang::names2(dots)
   unnamed <- which(!are & !nzchar(names))
@@ -58,8 +59,17 @@ given_trainings <- function(dots, written, call = rlang::caller_env()) {
   )
 }
 
-is_training <- function(x) {
-  inherits(x, c("gym_training", "gym_trainings")) && !inherits(x, "gym_search")
+is_training <- function(x) inherits(x, c("gym_training", "gym_trainings"))
+
+check_no_search <- function(dots, call) {
+  if (any(vapply(dots, inherits, NA, c("gym_search", "gym_searches")))) {
+    gym_abort(
+      c(paste("A search by `search_random()` has no evaluations that could be compared with those",
+              "of a training."),
+        i = "`train_agent(agent_random(), ...)` has."),
+      class = "gym_error_argument", argument = "...", call = call
+    )
+  }
 }
 
 training_label <- function(x) sub(":.*", "", format(x$agent))
@@ -72,8 +82,8 @@ training_label <- function(x) sub(":.*", "", format(x$agent))
 #' @noRd
 trainings_plot_data <- function(trainings, call = rlang::caller_env()) {
   curves <- do.call(rbind, Map(trainings_curve, trainings, names(trainings), list(call)))
-  targets <- unique(lapply(unname(trainings), function(x) x$target))
-  target <- if (length(targets) == 1L) targets[[1L]]
+  targets <- unique(lapply(unname(trainings), function(x) as.numeric(x$target)))
+  target <- if (length(targets) == 1L && length(targets[[1L]])) targets[[1L]]
   target <- if (!is.null(target) && is.finite(target)) target
   list(
     curves = curves,
@@ -122,7 +132,7 @@ trainings_curve <- function(x, label, call) {
 
 # The evaluations of a training; of several at one place the last, which had the most episodes.
 evaluation_curve <- function(training) {
-  evaluations <- training$evaluations %||% no_evaluations
+  evaluations <- training$evaluations
   steps <- training$history$steps[evaluations$iteration]
   last <- !duplicated(steps, fromLast = TRUE)
   data.frame(steps = steps[last], mean_return = evaluations$mean_return[last])
@@ -156,7 +166,13 @@ draw_trainings <- function(given, main, xlab, ylab) {
     )
   }
   for (curve in split(data$curves, data$curves$label)) {
-    graphics::lines(curve$steps, curve$median, col = data$colours[[curve$label[[1L]]]], lwd = 2)
+    colour <- data$colours[[curve$label[[1L]]]]
+    graphics::lines(curve$steps, curve$median, col = colour, lwd = 2)
+    # A line of one point is not seen.
+    if (nrow(curve) == 1L) {
+      graphics::segments(curve$steps, curve$lower, curve$steps, curve$upper, col = colour, lwd = 2)
+      graphics::points(curve$steps, curve$median, pch = 16L, col = colour)
+    }
   }
   title_above(main %||% data$title)
   targets <- if (!is.null(data$target)) paste("target", number_text(data$target))
@@ -190,6 +206,10 @@ autoplot_trainings <- function(trainings) {
       colour = NA
     ) +
     ggplot2::geom_line(ggplot2::aes(y = .data$median), linewidth = 0.8) +
+    ggplot2::geom_pointrange(
+      ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper),
+      data$curves[data$curves$label %in% names(which(table(data$curves$label) == 1L)), ]
+    ) +
     ggplot2::scale_colour_manual(values = data$colours, aesthetics = c("colour", "fill")) +
     ggplot2::labs(
       title = data$title, x = training_steps_label, y = returns_label, colour = NULL, fill = NULL,

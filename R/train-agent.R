@@ -17,7 +17,9 @@
 #'
 #' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
 #' so often that it takes a tenth of the time at most. The same call goes on from there, to the
-#' result to which an undisturbed training comes. `iterations` and `steps` may be others then.
+#' result to which an undisturbed training comes. `iterations` and `steps` may be others then. (A
+#' network of given sizes has drawn its weights before: make it after [set.seed()], or with the sizes
+#' `NA`, or it is another policy in the next session.)
 #'
 #' @param agent The agent, as [agent_ars()], [agent_cem()] or [agent_hill_climb()] make it, or one
 #'   of your own, see [agent_ask()].
@@ -47,7 +49,8 @@
 #'   training so far, an object as `train_agent()` returns it. Training ends when it returns
 #'   `FALSE`.
 #' @param log `NULL`, the default, or a folder, which is made where it does not exist: each
-#'   iteration appends a row to `progress.csv` there, and `config.json` says what was trained.
+#'   iteration appends a row to `progress.csv` there, and `config.json` says what was trained. What
+#'   an earlier training has left there keeps its rows as `progress-1.csv`, and so on.
 #' @param checkpoint `NULL`, the default, or the file to keep the training in, such as
 #'   `"training.rds"`.
 #' @param resume Go on with what the file has, if it is there? `TRUE`, the default, or `FALSE`,
@@ -148,9 +151,11 @@ train_in <- function(vector_env, settings, file, log, progress, call) {
   settings$seed <- file$saved$seed %||% settings$seed %||% draw_seed()
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings$env_id <- environment_label(vector_env)
-  settings$provenance <- new_provenance(vector_env, settings)
+  settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)
   bound <- bind_with_seed(settings$policy, vector_env, settings$seed, call)
-  state <- new_training(agent_start(settings$agent, bound), settings)
+  state <- new_training(settings$agent, settings)
+  state$agent <- with_generator(state$streams$agent, agent_start(settings$agent, bound))
+  check_is_agent(state$agent, "agent_start()", call)
   state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
   state$log <- training_log(log, settings, state$iteration, call)
   run_training(state, vector_env, settings, progress, call)
@@ -160,7 +165,9 @@ train_in <- function(vector_env, settings, file, log, progress, call) {
 # policy that draws them is drawn anew.
 bind_with_seed <- function(policy, vector_env, seed, call) {
   if (!is.null(policy$weights_seed)) {
-    policy$weights_seed <- seed
+    # A stream that nothing else draws from: the agent's first draws must not be the weights.
+    own <- new_generator(stream = parallel::nextRNGSubStream(seed_stream(seed)))
+    policy$weights_seed <- with_generator(own, draw_seed())
   }
   policy_bind(policy, vector_env, call = call)
 }
@@ -168,7 +175,10 @@ bind_with_seed <- function(policy, vector_env, seed, call) {
 check_training <- function(settings, call) {
   check_agent(settings$agent, call)
   check_environment(settings$env, "env", call)
-  check_policy(settings$policy, "policy", call)
+  if (!inherits(settings$policy, "gym_policy_network")) {
+    check_policy(settings$policy, "policy", call)
+    abort_no_weights(settings$policy, "policy", call)
+  }
   check_number(settings$steps, min = 1, allow_null = TRUE, arg = "steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   check_seed(settings$seed, "seed", call)

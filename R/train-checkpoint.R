@@ -64,7 +64,7 @@ check_same_search <- function(path, there, here, what, call) {
     lines <- vapply(differ, function(name) {
       texts <- c(argument_text(name, there[[name]]), argument_text(name, here[[name]]))
       if (texts[[1L]] == texts[[2L]]) {
-        paste0("`", name, "` is another there.")
+        paste0("`", name, "` is another there", if (name == "policy") ", with other weights", ".")
       } else {
         paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
       }

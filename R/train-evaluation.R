@@ -33,8 +33,7 @@ training_ends.gym_training_settings <- function(settings, state, vector_env) {
     stopping <- evaluate_agent(state, vector_env, settings, "stopping", settings$eval_episodes)
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
-  callback <- settings$callback
-  state$solved || !is.null(callback) && isFALSE(callback(training_result(settings, state)))
+  state$solved
 }
 
 #' @exportS3Method

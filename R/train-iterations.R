@@ -71,6 +71,10 @@ run_training <- function(state, vector_env, settings, progress, call) {
       state$ended <- training_ends(settings, state, vector_env)
       state$log(state)
       show(state)
+      if (!is.null(settings$callback)) {
+        stop_now <- isFALSE(settings$callback(training_result(settings, state)))
+        state$ended <- state$ended || stop_now
+      }
       state$checkpoint()
     }
     finish_training(settings, state, vector_env)
@@ -114,10 +118,8 @@ train_iteration <- function(state, vector_env, settings, call) {
   if ("trajectories" %in% needs) {
     results$trajectories <- played_trajectories(history, vector_env)
   }
-  agent <- agent_tell(agent, results)
-  if (!inherits(agent, "gym_agent")) {
-    abort_agent(agent, "agent_tell()", "an agent", call)
-  }
+  agent <- with_generator(state$streams$agent, agent_tell(agent, results))
+  check_is_agent(agent, "agent_tell()", call)
   steps <- state$steps + sum(results$lengths) * settings$episodes
   # An interrupt finds the iteration entered completely, or not at all.
   suspendInterrupts({
@@ -136,6 +138,12 @@ train_iteration <- function(state, vector_env, settings, call) {
       elapsed = proc.time()[["elapsed"]] - state$started
     )
   })
+}
+
+check_is_agent <- function(agent, method, call) {
+  if (!inherits(agent, "gym_agent")) {
+    abort_agent(agent, method, "an agent", call)
+  }
 }
 
 check_asked <- function(asked, policy, agent, call) {

@@ -102,20 +102,35 @@ keep_iterations <- function(table, iteration) {
   if (!file.exists(table)) {
     return(invisible())
   }
+  if (iteration == 0L) {
+    # It is another training's.
+    return(invisible(file.rename(table, free_name(table))))
+  }
   lines <- readLines(table)
   # The first column counts iterations; the first line has the columns' names.
   of_lines <- suppressWarnings(as.numeric(sub(",.*", "", lines)))
-  kept <- lines[is.na(of_lines) | of_lines <= iteration]
-  if (iteration == 0L) unlink(table) else writeLines(kept, table)
+  writeLines(lines[is.na(of_lines) | of_lines <= iteration], table)
+}
+
+# "progress-1.csv" for "progress.csv", or the first such name that is free.
+free_name <- function(file) {
+  number <- 1L
+  while (file.exists(name <- sub("[.]csv$", paste0("-", number, ".csv"), file))) {
+    number <- number + 1L
+  }
+  name
 }
 
 append_row <- function(table, row) {
   first <- !file.exists(table)
-  # Numbers with as many digits as they need, and nothing for what was not evaluated.
+  # Numbers with as many digits as they need and without an exponent, and nothing for what was not
+  # evaluated.
+  old <- options(scipen = 15)
+  on.exit(options(old))
   withCallingHandlers(
     utils::write.table(
       row, table, append = !first, sep = ",", na = "", row.names = FALSE, col.names = first,
-      qmethod = "double"
+      quote = FALSE
     ),
     # The warning says more than the error that follows.
     warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE)

@@ -44,7 +44,7 @@ settings_in <- function(vector_env, settings) {
 #' @return A search, as [search_result()] makes it.
 #' @noRd
 play_search <- function(agent, vector_env, settings, progress, call, file = NULL) {
-  settings$provenance <- new_provenance(vector_env, settings)
+  settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)
   state <- new_training(agent, settings)
   state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
   run_training(state, vector_env, settings, progress, call)

@@ -23,6 +23,10 @@ check_training_seeds <- function(seeds, seed, call) {
 train_seeds <- function(in_env, settings, seeds, files, progress, call) {
   started <- proc.time()[["elapsed"]]
   of_seeds <- lapply(seeds, function(seed) training_of_seed(settings, seed, files, call))
+  kept <- sum(!vapply(of_seeds, function(one) is.null(one$file$saved), NA))
+  if (kept > 0L) {
+    inform_resumed("Going on from the files of {kept} of {length(seeds)} seed{?s}.")
+  }
   show <- if (progress) progress_bar(length(seeds), "Seed", "0 solved, ") else function(...) NULL
   trainings <- list()
   result <- function(interrupted = FALSE) {
@@ -33,9 +37,9 @@ train_seeds <- function(in_env, settings, seeds, files, progress, call) {
     anew <- length(vector_env$remembers) && !is_playable(settings$env)
     with_env <- if (anew) in_env else function(use) use(vector_env)
     for (one in of_seeds) {
-      training <- with_env(function(vector_env) {
-        train_quietly(vector_env, one$settings, one$file, one$log, call)
-      })
+      training <- quietly_for_seed(with_env(function(vector_env) {
+        train_in(vector_env, one$settings, one$file, one$log, progress = FALSE, call)
+      }))
       keep(training)
       if (training$interrupted) {
         rlang::interrupt()
@@ -51,13 +55,22 @@ train_seeds <- function(in_env, settings, seeds, files, progress, call) {
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
-    gym_error_training = function(cnd) {
-      begun <- cnd$result
-      begun$interrupted <- TRUE
-      keep(begun)
+    error = function(cnd) {
+      if (!length(trainings) && !inherits(cnd, "gym_error_training")) {
+        rlang::cnd_signal(cnd)
+      }
+      finished <- count_of(length(trainings), "seed")
+      if (inherits(cnd$result, "gym_training")) {
+        begun <- cnd$result
+        begun$interrupted <- TRUE
+        keep(begun)
+      }
       abort_with_result(
-        cnd$parent %||% cnd, "The training", result(),
-        count_of(length(trainings) - 1L, "seed"), "gym_error_training", call
+        if (inherits(cnd, "gym_error_training")) cnd$parent %||% cnd else cnd, "The training",
+        result(), finished, "gym_error_training", call,
+        if (!is.null(files$checkpoint)) {
+          "The same call goes on from the checkpoints when what is wrong is fixed."
+        }
       )
     }
   )
@@ -81,10 +94,11 @@ training_of_seed <- function(settings, seed, files, call) {
 }
 
 # Messages come once, for all seeds.
-train_quietly <- function(vector_env, settings, file, log, call) {
+quietly_for_seed <- function(code) {
   withCallingHandlers(
-    train_in(vector_env, settings, file, log, progress = FALSE, call),
+    code,
     gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd),
-    gym_message_resumed = function(cnd) rlang::cnd_muffle(cnd)
+    gym_message_resumed = function(cnd) rlang::cnd_muffle(cnd),
+    gym_message_remembers = function(cnd) rlang::cnd_muffle(cnd)
   )
 }

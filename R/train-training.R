@@ -7,8 +7,8 @@ training_result.gym_training_settings <- function(settings, state, interrupted =
       policy = agent_policy(state$agent),
       agent = state$agent,
       solved = state$solved,
-      history = rows_table(state$history),
-      evaluations = rows_table(state$evaluations),
+      history = rows_table(state$history, no_iterations),
+      evaluations = rows_table(state$evaluations, no_evaluations),
       final = state$final,
       target = settings$target,
       env_id = settings$env_id,
@@ -25,15 +25,27 @@ training_result.gym_training_settings <- function(settings, state, interrupted =
   )
 }
 
-# Rows, which are lists or data frames, as one data frame.
-rows_table <- function(rows) {
-  if (length(rows)) {
-    columns <- lapply(stats::setNames(nm = names(rows[[1L]])), function(name) {
-      unlist(lapply(rows, `[[`, name))
-    })
-    as.data.frame(columns)
+# Rows, which are lists or data frames, as one data frame; `none` is that of no rows.
+rows_table <- function(rows, none) {
+  if (!length(rows)) {
+    return(none)
   }
+  columns <- lapply(stats::setNames(nm = names(rows[[1L]])), function(name) {
+    unlist(lapply(rows, `[[`, name))
+  })
+  as.data.frame(columns)
 }
+
+no_iterations <- data.frame(
+  iteration = integer(), steps = numeric(), min_return = numeric(), median_return = numeric(),
+  mean_return = numeric(), max_return = numeric(), mean_length = numeric(),
+  evaluation = numeric(), elapsed = numeric()
+)
+
+no_evaluations <- data.frame(
+  iteration = integer(), kind = character(), mean_return = numeric(), se = numeric(),
+  lower = numeric(), upper = numeric(), episodes = integer(), steps = integer()
+)
 
 #' @export
 as.data.frame.gym_training <- function(x, row.names = NULL, optional = FALSE, ...) x$history
@@ -87,7 +99,7 @@ summary.gym_training <- function(object, ...) {
 print.summary.gym_training <- function(x, ...) {
   training <- x$training
   cat(training_lines(training)[1:3], sep = "\n")
-  if (is.null(training$history)) {
+  if (!nrow(training$history)) {
     return(invisible(x))
   }
   stopping <- training$evaluations[training$evaluations$kind == "stopping", ]

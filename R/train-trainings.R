@@ -13,10 +13,12 @@
 #'   \describe{
 #'     \item{trainings}{A list of the trainings, objects of class `gym_training`, named by their
 #'       seeds.}
-#'     \item{env_id, target}{The environment's id, a string, and the target, a number or `NULL`.}
+#'     \item{agent, env_id, target}{The agent as given, the environment's id, a string, and the
+#'       target, a number or `NULL`.}
 #'     \item{elapsed}{The seconds that all took, a double.}
 #'     \item{interrupted}{Whether it was interrupted, a logical. The last of the trainings may then
 #'       have ended early.}
+#'     \item{provenance}{What [provenance()] tells, with all seeds.}
 #'   }
 #'   `as.data.frame()` gives a row for each seed: `seed` (integer), `solved` (logical: has the final
 #'   evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`, `se`,
@@ -136,7 +138,7 @@ trainings_lines <- function(x) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))
     },
-    paste0(if (x$interrupted) "Interrupted after " else "Played ",
+    paste0(if (any(table$interrupted)) "Interrupted after " else "Played ",
            count_of(nrow(table), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
            seconds_text(x$elapsed))
   )

@@ -16,7 +16,7 @@ agents <- list(
 
 train <- function(agent) {
   train_agent(agent, "CartPole-v1", policy_network(c(NA, 2, 1)), steps = budget, seeds = 1:20,
-              eval_every = 2)
+              eval_every = 4)
 }
 trained <- lapply(agents, train)
 

@@ -5,8 +5,10 @@
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
 #
 # It takes hours. What the tables have already is not trained again, so that it may be stopped at
-# any time; a row that is to be made anew is deleted from both first.
+# any time; a row that is to be made anew is deleted from both first. At the end the short table of
+# README.md is written.
 source("tools/solve/jobs.R")
+source("tools/solve/readme.R")
 
 given <- strsplit(commandArgs(trailingOnly = TRUE), "=", fixed = TRUE)
 option <- function(name, default) {
@@ -47,8 +49,8 @@ start <- function(one) {
   file <- tempfile(fileext = ".rds")
   process <- processx::process$new(
     file.path(R.home("bin"), "Rscript"),
-    c("--no-init-file", "tools/solve/train.R", one$row, one$seed, file), stderr = "|",
-    cleanup_tree = TRUE
+    c("--no-init-file", "tools/solve/train.R", one$row, one$seed, file),
+    stderr = paste0(file, ".txt"), cleanup_tree = TRUE
   )
   list(process = process, file = file, one = one)
 }
@@ -56,7 +58,9 @@ start <- function(one) {
 finish <- function(running) {
   name <- key(running$one)
   if (!file.exists(running$file)) {
-    stop(name, " failed: ", paste(running$process$read_all_error_lines(), collapse = "\n"))
+    # The others go on; this one is trained when the script runs again.
+    cat(name, "failed:", readLines(paste0(running$file, ".txt")), sep = "\n")
+    return(invisible())
   }
   made <- readRDS(running$file)
   add_rows(table_file, made$table)
@@ -78,3 +82,4 @@ while (nrow(todo) || length(running)) {
   for (one in running[ended]) finish(one)
   running <- running[!ended]
 }
+write_readme_rows()

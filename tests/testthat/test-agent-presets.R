@@ -52,6 +52,13 @@ test_that("a search takes its preset, says so, and lets arguments go before it",
   expect_identical(own$agent[c("directions", "top", "noise", "step_size")],
                    list(directions = 3L, top = 1L, noise = 0.4, step_size = preset$step_size))
   expect_length(coef(own), 5)
+  expect_setequal(provenance(own)$preset$changed,
+                  c("policy", "directions", "top", "noise", "target", "iterations"))
+  # Without `top` it is half of them, not the preset's.
+  few <- suppressMessages(
+    search_ars("CartPole-v1", directions = 2, iterations = 1, eval_episodes = 2, client = client)
+  )
+  expect_identical(few$agent$top, 1L)
   expect_identical(own$target, 5)
 })
 
@@ -70,4 +77,11 @@ test_that("without a preset agents have their own defaults, and training needs a
     expect_error(search(env), "needs a budget", class = "gym_error_argument")
   }
   expect_error(search_ars(env, directions = 0, iterations = 1), class = "gym_error_argument")
+  expect_error(search_ars(env, directions = numeric(), iterations = 1),
+               class = "gym_error_argument")
+  expect_error(search_ars("CartPole-v1", step_sizes = 1),
+               "presets of CartPole-v1 .*\"ars\".*own: `step_sizes`", class = "gym_error_argument")
+  expect_error(search_cem("CartPole-v1"), "another agent: \"ars\"",
+               class = "gym_error_argument")
+  expect_error(agent_ars(4, 2, version = "V1"), "V1-t", class = "gym_error_argument")
 })

@@ -25,8 +25,9 @@ test_that("a training is drawn by base R and by ggplot2", {
   plot <- ggplot2::autoplot(trained)
   built <- ggplot2::ggplot_build(plot)
   expect_identical(built$data[[1]]$ymax, trained$history$max_return)
-  expect_identical(built$data[[3]]$y, trained$evaluations$mean_return)
-  expect_identical(built$data[[4]]$yintercept, 30)
+  expect_identical(built$data[[3]]$y, trained$evaluations$mean_return[1:3])
+  expect_identical(built$data[[4]]$ymax, trained$final$upper)
+  expect_identical(built$data[[5]]$yintercept, 30)
   expect_identical(plot$labels$title, "ARS V2-t in Fake-v0")
 })
 

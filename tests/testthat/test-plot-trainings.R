@@ -66,9 +66,28 @@ test_that("trainings that are given together are compared, by their names", {
   for (plot in list(ggplot2::autoplot(ars, cem), ggplot2::autoplot(cem, A = ars),
                     ggplot2::autoplot(ars))) {
     built <- ggplot2::ggplot_build(plot)
-    expect_identical(built$data[[3]]$yintercept, 5)
+    expect_identical(built$data[[4]]$yintercept, 5)
   }
   expect_error(ggplot2::autoplot(ars, ylim = 3), class = "gym_error_argument")
+})
+
+test_that("trainings that were evaluated once are a point and a bar", {
+  once <- trainings_of(training_of(10, 1), training_of(10, 3), training_of(10, 2))
+  curve <- trainings_plot_data(list(a = once))$curves
+  expect_identical(nrow(curve), 1L)
+  expect_equal(unlist(curve[c("median", "lower", "upper")]), c(median = 2, lower = 1.5, upper = 2.5))
+  local_device()
+  expect_identical(plot(once), once)
+  skip_if_not_installed("ggplot2")
+  built <- ggplot2::ggplot_build(ggplot2::autoplot(once))
+  expect_identical(built$data[[3]]$ymax, 2.5)
+})
+
+test_that("a search among them is refused, with or without a name", {
+  search <- search_random(fake_environment(), rounds = 2, seed = 1)
+  trained <- training_of(c(10, 20), c(1, 2))
+  expect_error(plot(trained, search), "has no evaluations", class = "gym_error_argument")
+  expect_error(plot(ARS = trained, random = search), "agent_random", class = "gym_error_argument")
 })
 
 test_that("trainings without an evaluation are refused, and single ones drawn without", {
@@ -78,7 +97,7 @@ test_that("trainings without an evaluation are refused, and single ones drawn wi
   trained <- suppressMessages(
     train_agent(agent_ars(), env, iterations = 9, seed = 1, target = Inf)
   )
-  expect_null(trained$evaluations)
+  expect_identical(nrow(trained$evaluations), 0L)
   expect_identical(nrow(training_plot_data(trained)$curve), 0L)
   local_device()
   expect_identical(plot(trained), trained)

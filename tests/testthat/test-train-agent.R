@@ -248,9 +248,14 @@ test_that("the log has a row for each iteration, also where a training went on",
   expect_identical(config$env, "Fake-v0")
   expect_identical(config$seed, 1L)
   expect_match(config$agent, "^ARS V2-t")
-  # Without a checkpoint the table begins anew.
-  quiet_training(agent_ars(), iterations = 1, log = file.path(folder, "a"))
-  expect_identical(nrow(utils::read.csv(file.path(folder, "a", "progress.csv"))), 1L)
+  # Without a checkpoint the table begins anew, and the one before is kept.
+  for (time in 1:2) {
+    quiet_training(agent_ars(), iterations = time, log = file.path(folder, "a"))
+  }
+  rows <- function(name) nrow(utils::read.csv(file.path(folder, "a", name)))
+  expect_identical(rows("progress.csv"), 2L)
+  expect_identical(rows("progress-1.csv"), 4L)
+  expect_identical(rows("progress-2.csv"), 1L)
   file.create(file.path(folder, "file"))
   expect_error(quiet_training(agent_ars(), iterations = 1, log = file.path(folder, "file", "a")),
                "cannot be written", class = "gym_error_argument")
@@ -285,6 +290,58 @@ test_that("a log that cannot be written in the middle warns once and ends nothin
   expect_length(warnings, 1)
   expect_match(warnings, "goes on without")
   expect_identical(nrow(trained$history), 5L)
+})
+
+test_that("what an agent draws when it is told follows from the seed, also after a checkpoint", {
+  .S3method("agent_start", "drawing", function(agent, policy) {
+    agent <- NextMethod()
+    coef(agent$policy) <- rnorm(4)
+    agent
+  })
+  .S3method("agent_ask", "drawing", function(agent) rbind(coef(agent_policy(agent)) + 1))
+  .S3method("agent_tell", "drawing", function(agent, results) {
+    agent <- NextMethod()
+    coef(agent$policy) <- results$weights[1, ] * runif(1)
+    agent
+  })
+  drawing <- structure(list(), class = c("drawing", "gym_agent"))
+  play <- function(checkpoint = NULL) {
+    quiet_training(drawing, iterations = 4, target = Inf, checkpoint = checkpoint)
+  }
+  set.seed(1)
+  before <- .Random.seed
+  first <- what_counts(play())
+  expect_identical(.Random.seed, before)
+  kept <- local_kept_files()
+  expect_identical(what_counts(play(local_checkpoint())), first)
+  for (bytes in kept$list) expect_identical(what_counts(play(local_checkpoint(bytes))), first)
+  .S3method("agent_start", "drawing", function(agent, policy) NULL)
+  expect_error(play(), "`agent_start()` must return an agent", fixed = TRUE,
+               class = "gym_error_agent")
+})
+
+test_that("the callback is called after every iteration, also the last", {
+  calls <- 0L
+  trained <- quiet_training(agent_ars(), iterations = 5, target = -100, callback = function(one) {
+    calls <<- calls + 1L
+    expect_identical(nrow(one$history), calls)
+  })
+  expect_true(trained$solved)
+  expect_identical(calls, nrow(trained$history))
+})
+
+test_that("drawn weights are not what the agent draws first", {
+  trained <- quiet_training(agent_random(1), policy = policy_network(c(NA, 2, 1)), iterations = 1,
+                            target = Inf)
+  policy <- policy_network(c(NA, 2, 1))
+  start <- bind_with_seed(policy, fake_environment(), 1, rlang::current_env())
+  expect_false(any(coef(start) %in% coef(trained)))
+})
+
+test_that("a training that had ended keeps where it came from", {
+  path <- local_checkpoint()
+  play <- function() quiet_training(agent_ars(), iterations = 1, checkpoint = path)
+  expect_identical(provenance(play())$started, provenance(play())$started)
 })
 
 test_that("an agent that was trained before begins anew", {
@@ -360,6 +417,8 @@ test_that("arguments that are wrong are refused before anything is made", {
   refused(agent_ars(), iterations = 1, callback = 3, name = "callback")
   refused(agent_ars(), iterations = 1, seed = 0.5, name = "seed")
   refused(agent_ars(), iterations = 1, policy = "linear", name = "policy")
+  refused(agent_ars(), iterations = 1, policy = function(o) 0L, name = "policy")
+  refused(agent_ars(), iterations = 1, policy = policy_random(), name = "policy")
   expect_error(train_agent(agent_ars(), "CartPole-v1", iterations = 1, is_round = TRUE,
                            client = test_client()), "is_round", class = "gym_error_http")
 })

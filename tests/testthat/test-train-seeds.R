@@ -94,6 +94,17 @@ test_that("an interrupt and an error keep the trainings before them, and the one
   expect_identical(counted(cnd$result$trainings[[1]]), counted(whole$trainings[[1]]))
 })
 
+test_that("a seed that cannot begin keeps the trainings before it", {
+  folder <- withr::local_tempdir()
+  file.create(file.path(folder, "seed-2"))
+  cnd <- expect_error(quiet_trainings(log = folder), "after 1 seed", class = "gym_error_training")
+  expect_s3_class(cnd, "gym_error_argument")
+  expect_identical(as.data.frame(cnd$result)$seed, 1L)
+  # Of the first seed nothing was trained: the error is what it is.
+  expect_error(quiet_trainings(log = folder, seeds = 2:3), "cannot be written",
+               class = "gym_error_argument")
+})
+
 test_that("seeds that are wrong are refused before anything is made", {
   refused <- function(..., name) {
     cnd <- expect_error(

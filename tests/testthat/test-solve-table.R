@@ -1,0 +1,57 @@
+# The table of solved environments, which tools/solve-table.R makes.
+
+read_solved <- function(name) {
+  file <- system.file("extdata", name, package = "gym")
+  utils::read.csv(file, colClasses = c(kwargs = "character"), na.strings = "NA")
+}
+
+task_of <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
+
+test_that("each seed has one row, from 1001 on without a gap, failures included", {
+  table <- read_solved("solve-table.csv")
+  for (seeds in split(table$seed, paste(table$env_id, table$kwargs))) {
+    expect_identical(seeds, 1000L + seq_along(seeds))
+  }
+  expect_identical(table$solved, table$mean_return >= table$target)
+  expect_true(all(table$lower <= table$mean_return & table$mean_return <= table$upper))
+  expect_true(all(table$episodes == 100))
+  expect_false(anyNA(table[c("steps", "seconds", "gym", "R", "gymnasium", "BLAS")]))
+  # No paths of a machine.
+  expect_false(any(grepl("/", table$BLAS)))
+})
+
+test_that("the curves end with the final evaluations of the table", {
+  table <- read_solved("solve-table.csv")
+  curves <- read_solved("solve-curves.csv")
+  final <- curves[curves$kind == "final", ]
+  expect_identical(task_of(final), task_of(table))
+  expect_equal(final$mean_return, table$mean_return, tolerance = 0.005 / 10)
+  expect_identical(final$steps, table$steps)
+  expect_true(all(final$iteration == table$iterations))
+})
+
+test_that("its settings are the presets, by which a row can be made again", {
+  table <- read_solved("solve-table.csv")
+  presets <- agent_presets()
+  for (own in split(table, paste(table$env_id, table$kwargs))) {
+    expect_length(unique(own$agent), 1)
+    kwargs <- if (nzchar(own$kwargs[[1]])) paste0("{\"", own$kwargs[[1]], "\":true}") else ""
+    preset <- presets[presets$env_id == own$env_id[[1]] & presets$kwargs == kwargs, ]
+    expect_identical(nrow(preset), 1L)
+    expect_identical(unique(own$train_target), preset$target)
+    arguments <- as.list(preset[intersect(names(formals(agent_ars)), names(preset))])
+    if (preset$agent == "ars") {
+      made <- do.call(agent_ars, arguments[!is.na(arguments)])
+      expect_identical(unique(own$agent), format(made))
+    }
+  }
+})
+
+test_that("a training of the table comes out the same again", {
+  table <- read_solved("solve-table.csv")
+  row <- table[table$env_id == "CartPole-v1" & table$seed == 1001, ]
+  trained <- suppressMessages(search_ars("CartPole-v1", seed = 1001, client = test_client()))
+  expect_equal(trained$steps, row$steps)
+  expect_equal(trained$final$mean_return, row$mean_return)
+  expect_identical(nrow(trained$history), row$iterations)
+})

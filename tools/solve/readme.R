@@ -1,0 +1,24 @@
+# The rows of README.md's short table, between its lines <!-- solved -->, from solve-table.csv.
+
+write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv") {
+  table <- utils::read.csv(table_file, colClasses = c(kwargs = "character"))
+  task <- paste0(table$env_id, ifelse(nzchar(table$kwargs), paste0(", ", table$kwargs), ""))
+  rows <- vapply(split(table, factor(task, unique(task))), function(rows) {
+    count <- nrow(rows)
+    solved <- if (count > 1L) {
+      paste(sum(rows$solved), "of", count, "seeds")
+    } else {
+      paste("a demonstration:", round(rows$mean_return))
+    }
+    steps <- format(round(stats::median(rows$steps), -3), big.mark = ",", scientific = FALSE)
+    name <- paste0(rows$env_id[[1L]], if (nzchar(rows$kwargs[[1L]])) paste0(", ", rows$kwargs[[1L]]))
+    paste("|", name, "|", rows$target[[1L]], "|", solved, "|", steps, "|")
+  }, "")
+  lines <- readLines("README.md")
+  marks <- which(lines == "<!-- solved -->")
+  head <- c("| environment | target | solved | steps, median |", "|---|---|---|---|")
+  writeLines(
+    c(lines[seq_len(marks[[1L]])], head, unname(rows), lines[marks[[2L]]:length(lines)]),
+    "README.md"
+  )
+}
