@@ -18,8 +18,8 @@
 #' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
 #' so often that it takes a tenth of the time at most. The same call goes on from there, to the
 #' result to which an undisturbed training comes. `iterations` and `steps` may be others then. (A
-#' network of given sizes has drawn its weights before: make it after [set.seed()], or with the sizes
-#' `NA`, or it is another policy in the next session.)
+#' network of given sizes has drawn its weights before: make it after [set.seed()], or with the
+#' sizes `NA`, or it is another policy in the next session.)
 #'
 #' @param agent The agent, as [agent_ars()], [agent_cem()] or [agent_hill_climb()] make it, or one
 #'   of your own, see [agent_ask()].

@@ -75,7 +75,8 @@ test_that("trainings that were evaluated once are a point and a bar", {
   once <- trainings_of(training_of(10, 1), training_of(10, 3), training_of(10, 2))
   curve <- trainings_plot_data(list(a = once))$curves
   expect_identical(nrow(curve), 1L)
-  expect_equal(unlist(curve[c("median", "lower", "upper")]), c(median = 2, lower = 1.5, upper = 2.5))
+  expect_equal(unlist(curve[c("median", "lower", "upper")]),
+               c(median = 2, lower = 1.5, upper = 2.5))
   local_device()
   expect_identical(plot(once), once)
   skip_if_not_installed("ggplot2")

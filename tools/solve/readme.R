@@ -11,7 +11,8 @@ write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv") {
       paste("a demonstration:", round(rows$mean_return))
     }
     steps <- format(round(stats::median(rows$steps), -3), big.mark = ",", scientific = FALSE)
-    name <- paste0(rows$env_id[[1L]], if (nzchar(rows$kwargs[[1L]])) paste0(", ", rows$kwargs[[1L]]))
+    kwargs <- rows$kwargs[[1L]]
+    name <- paste0(rows$env_id[[1L]], if (nzchar(kwargs)) paste0(", ", kwargs))
     paste("|", name, "|", rows$target[[1L]], "|", solved, "|", steps, "|")
   }, "")
   lines <- readLines("README.md")

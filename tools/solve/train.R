@@ -1,6 +1,6 @@
 # Trains one seed of a job of the table of solved environments, in a process of its own:
-# Rscript tools/solve/train.R ROW SEED FILE. FILE gets a list of two tables, see
-# tools/solve-table.R.
+# Rscript tools/solve/train.R ROW SEED FILE. FILE gets a list of two tables, which
+# tools/solve-table.R puts together.
 suppressMessages(library(gym))
 source("tools/solve/jobs.R")
 
