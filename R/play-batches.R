@@ -47,15 +47,14 @@ cut_batches <- function(batch_size, candidates, episodes) {
 #' @param streams As [new_streams()] makes them.
 #' @param common_seeds Whether all candidates begin their episodes with the same seeds, where each
 #'   episode has a seed of its own.
-#' @return An environment: these, how many batches and episodes were played, and `batches`, what
-#'   [play_batch()] returned for each.
+#' @return An environment: these, how many batches were drawn and episodes played, and `batches`,
+#'   what [play_batch()] returned for each.
 #' @noRd
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
     candidates = candidates, episodes = as.integer(episodes), streams = streams,
     common_seeds = common_seeds, draw_seeds = draw_environment_seeds, seeds = NULL,
-    played_batches = 0, played_episodes = 0,
-    batches = list()
+    drawn_batches = 0, played_episodes = 0, batches = list()
   )
 }
 
@@ -72,30 +71,54 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #' @noRd
 play_batches <- function(vector_env, history, policy_of, after = function(history, played) FALSE,
                          report = function(ended) NULL, ...) {
-  batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size
-  cut <- cut_batches(batch_size, history$candidates, history$episodes)
-  while (!is.null(episodes <- cut(history$played_batches + 1))) {
-    episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
-    stream <- take_stream(history$streams)
-    # The policy of a batch has its candidates alone.
-    candidates <- unique(episodes$candidate)
-    policy <- policy_of(candidates)
-    episodes$candidate <- match(episodes$candidate, candidates)
-    played <- play_batch(
-      vector_env, policy, episodes, stream, each = history$episodes, report = report, ...
-    )
-    played$candidate <- candidates[played$candidate]
+  while (!is.null(batch <- next_batch(vector_env, history))) {
+    played <- play_drawn_batch(vector_env, batch, policy_of, report, ...)
     # An interrupt finds the batch entered completely, or not at all.
     suspendInterrupts({
-      history$batches[[length(history$batches) + 1L]] <- played
-      history$played_batches <- history$played_batches + 1
-      history$played_episodes <- history$played_episodes + length(played$episode)
+      enter_batch(history, played)
       ended <- after(history, played)
     })
     if (ended) {
       break
     }
   }
+}
+
+#' Draw what the next batch is played with
+#'
+#' What comes of a batch depends on this alone, so that batches can be played in any order, as long
+#' as they are drawn and entered in theirs.
+#' @return A list: `episodes`, as [play_batch()] takes them, with the candidates' own numbers,
+#'   `each`, how many a candidate plays, and `stream`; `NULL` when there is no further batch.
+#' @noRd
+next_batch <- function(vector_env, history) {
+  batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size
+  cut <- cut_batches(batch_size, history$candidates, history$episodes)
+  episodes <- cut(history$drawn_batches + 1)
+  if (is.null(episodes)) {
+    return(NULL)
+  }
+  history$drawn_batches <- history$drawn_batches + 1
+  episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
+  list(episodes = episodes, each = history$episodes, stream = take_stream(history$streams))
+}
+
+# Plays a batch. Its policy has its candidates alone.
+play_drawn_batch <- function(vector_env, batch, policy_of, report = function(ended) NULL, ...) {
+  episodes <- batch$episodes
+  candidates <- unique(episodes$candidate)
+  episodes$candidate <- match(episodes$candidate, candidates)
+  played <- play_batch(
+    vector_env, policy_of(candidates), episodes, batch$stream, each = batch$each, report = report,
+    ...
+  )
+  played$candidate <- candidates[played$candidate]
+  played
+}
+
+enter_batch <- function(history, played) {
+  history$batches[[length(history$batches) + 1L]] <- played
+  history$played_episodes <- history$played_episodes + length(played$episode)
 }
 
 # Where one generator serves all sub-environments, those that begin together share a seed.
