@@ -17,6 +17,7 @@ for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "
                "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
+source("tools/fewer-colours.R")
 
 progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 
@@ -106,12 +107,16 @@ report <- function(result, csv, text, figure, environments) {
   lines <- c(all_tables(result$rows), goal_lines(result$rows), "", run_lines(result$run))
   writeLines(lines, text)
   cat(lines, sep = "\n")
+  made <- character()
   if (all(c("single", "vector") %in% result$rows$part)) {
     draw_figure(result$rows, result$run, figure)
+    made <- figure
   }
   if (all(c("env_rollouts", "wire") %in% result$rows$part)) {
     draw_environments(result$rows, result$run, environments)
+    made <- c(made, environments)
   }
+  if (requireNamespace("magick", quietly = TRUE)) fewer_colours(made)
 }
 
 arguments <- commandArgs(trailingOnly = TRUE)

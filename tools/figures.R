@@ -7,6 +7,7 @@
 # png.
 
 library(gym)
+source("tools/fewer-colours.R")
 
 results <- readRDS("vignettes/results.rds")
 policy <- results$search$policy
@@ -16,6 +17,7 @@ draw <- function(name, object, ..., width = 7, height = 5) {
   grDevices::png(file, width = width, height = height, units = "in", res = 120)
   plot(object, ...)
   grDevices::dev.off()
+  fewer_colours(file)
   cat(file, ": ", round(file.size(file) / 1000), " kB\n", sep = "")
 }
 
