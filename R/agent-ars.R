@@ -142,5 +142,5 @@ search_ars <- function(env = "CartPole-v1", policy = NULL, directions = NULL, to
     policy = policy, directions = directions, top = top, step_size = step_size, noise = noise,
     version = version, shift = shift, iterations = iterations, steps = steps, target = target
   )
-  search_by("ars", agent_ars, given, env, ...)
+  search_by("ars", given, env, ...)
 }

@@ -98,5 +98,5 @@ search_cem <- function(env = "CartPole-v1", policy = NULL, population = NULL, el
     extra_noise = extra_noise, extra_iterations = extra_iterations, iterations = iterations,
     steps = steps, target = target
   )
-  search_by("cem", agent_cem, given, env, ...)
+  search_by("cem", given, env, ...)
 }

@@ -58,24 +58,26 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 
 #' Make an agent and train it
 #'
-#' @param agent The agent's name, as in the presets; `make`, the function that makes it.
+#' @param agent The agent's name, as in the presets.
 #' @param given What the user has given, a list: the agent's arguments, `policy`, and arguments of
 #'   the training.
 #' @param env,... As for [train_agent()].
 #' @noRd
-search_by <- function(agent, make, given, env, ..., call = rlang::caller_env()) {
+search_by <- function(agent, given, env, ..., call = rlang::caller_env()) {
   check_environment(env, "env", call)
+  make <- paste0("agent_", agent)
+  of_agent <- names(formals(make))
   dots <- list(...)
   of_training <- names(dots) %in% names(formals(train_agent))
   preset <- find_preset(agent, env, dots[!of_training])
   given <- given[!vapply(given, is.null, NA)]
-  own <- intersect(names(formals(make)), names(given))
-  arguments <- preset[intersect(names(formals(make)), names(preset))]
+  own <- intersect(of_agent, names(given))
+  arguments <- preset[intersect(of_agent, names(preset))]
   # A part of the candidates that was meant for another number of them, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
-  made <- rlang::exec(paste0("agent_", agent), !!!arguments)
+  made <- rlang::exec(make, !!!arguments)
   training <- c(given[setdiff(names(given), own)], dots[of_training])
   # A budget of the user's own is the only one.
   budget <- any(c("iterations", "steps") %in% names(training))
@@ -87,8 +89,6 @@ search_by <- function(agent, make, given, env, ..., call = rlang::caller_env()) 
     training[names(from_preset)] <- from_preset
     training$policy <- training$policy %||% preset_policy(preset)
     inform_of_preset(preset, env)
-  }
-  if (!is.null(preset)) {
     made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
     made$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
   }

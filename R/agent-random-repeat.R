@@ -140,14 +140,10 @@ play_searches <- function(with_env, template, settings, seeds, progress, call) {
 # An interrupt of one search ends all of them. Messages come once, for all.
 play_seed <- function(with_env, template, settings, seed, call) {
   settings$seed <- seed
-  withCallingHandlers(
-    with_env(function(vector_env) {
-      agent <- agent_start(agent_random(), template)
-      play_search(agent, vector_env, settings, progress = FALSE, call)
-    }),
-    gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd),
-    gym_message_remembers = function(cnd) rlang::cnd_muffle(cnd)
-  )
+  quietly_for_seed(with_env(function(vector_env) {
+    agent <- agent_start(agent_random(), template)
+    play_search(agent, vector_env, settings, progress = FALSE, call)
+  }))
 }
 
 search_row <- function(search) {

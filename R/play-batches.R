@@ -64,23 +64,14 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #'   error or an interrupt ends the playing.
 #' @param policy_of A function of the numbers of the candidates of a batch, which returns the policy
 #'   that plays it; `candidate` then counts from 1 in this policy.
-#' @param after A function that is called when a batch was played, with the history and what came of
-#'   the batch. It returns `TRUE` when no more need be played.
 #' @param report A function that is called with how many episodes have ended in the present batch.
 #' @param ... Further arguments of [play_batch()].
 #' @noRd
-play_batches <- function(vector_env, history, policy_of, after = function(history, played) FALSE,
-                         report = function(ended) NULL, ...) {
+play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...) {
   while (!is.null(batch <- next_batch(vector_env, history))) {
     played <- play_drawn_batch(vector_env, batch, policy_of, report, ...)
     # An interrupt finds the batch entered completely, or not at all.
-    suspendInterrupts({
-      enter_batch(history, played)
-      ended <- after(history, played)
-    })
-    if (ended) {
-      break
-    }
+    suspendInterrupts(enter_batch(history, played))
   }
 }
 

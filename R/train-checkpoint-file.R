@@ -5,7 +5,7 @@
 checkpoint_format <- 5L
 
 #' Read the file of a search
-#' @return What [keep_history()] wrote, `NULL` where there is no file.
+#' @return What [training_checkpoint()] wrote, `NULL` where there is no file.
 #' @noRd
 read_checkpoint <- function(path, call) {
   if (!file.exists(path)) {

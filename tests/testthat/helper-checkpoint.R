@@ -1,3 +1,9 @@
+# What counts of a training, without how long it took, when and where.
+what_counts <- function(training) {
+  training$history$elapsed <- NULL
+  training[setdiff(names(training), c("elapsed", "env", "provenance"))]
+}
+
 # Plays a search that writes after each batch, and keeps the file as each write left it.
 local_kept_files <- function(frame = parent.frame()) {
   files <- new.env()

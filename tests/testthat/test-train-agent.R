@@ -1,9 +1,3 @@
-# What counts of a training, without how long it took, when and where.
-what_counts <- function(training) {
-  training$history$elapsed <- NULL
-  training[setdiff(names(training), c("elapsed", "env", "provenance"))]
-}
-
 quiet_training <- function(..., env = fake_environment(reward = first_action), seed = 1) {
   suppressMessages(train_agent(..., env = env, seed = seed, eval_episodes = 4, eval_every = 3),
                    classes = "gym_message_resumed")

@@ -1,6 +1,5 @@
 # As play_batches(), but the batches are played in another order than they were drawn.
-shuffled_batches <- function(vector_env, history, policy_of, after = NULL,
-                             report = function(ended) NULL, ...) {
+shuffled_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...) {
   batches <- list()
   while (!is.null(batch <- next_batch(vector_env, history))) batches <- c(batches, list(batch))
   order <- sample(length(batches))

@@ -1,9 +1,3 @@
-# What counts of a training, without how long it took, when and where.
-counted <- function(training) {
-  training$history$elapsed <- NULL
-  training[setdiff(names(training), c("elapsed", "env", "provenance"))]
-}
-
 quiet_trainings <- function(..., env = fake_environment(reward = first_action), seeds = 1:3) {
   suppressMessages(
     train_agent(agent_ars(3, 2), env, iterations = 4, seeds = seeds, target = Inf,
@@ -19,7 +13,8 @@ test_that("the training of each seed is the one that the seed makes alone", {
   for (seed in c(5, 2, 1e5)) {
     alone <- train_agent(agent_ars(3, 2), fake_environment(reward = first_action), iterations = 4,
                          seed = seed, target = Inf, eval_every = 2, eval_episodes = 4)
-    expect_identical(counted(trained$trainings[[format(seed, scientific = FALSE)]]), counted(alone))
+    name <- format(seed, scientific = FALSE)
+    expect_identical(what_counts(trained$trainings[[name]]), what_counts(alone))
   }
   weights <- coef(trained)
   expect_identical(rownames(weights), c("5", "2", "100000"))
@@ -66,7 +61,7 @@ test_that("each seed has its own checkpoint and log, and all go on from there", 
   unlink(file.path(folder, "my.training-2.rds"))
   idle <- fake_environment(reward = first_action)
   again <- quiet_trainings(checkpoint = path, env = idle)
-  expect_identical(lapply(again$trainings, counted), lapply(first$trainings, counted))
+  expect_identical(lapply(again$trainings, what_counts), lapply(first$trainings, what_counts))
   # Only the second was trained again.
   expect_length(idle$seeds, 6 * 4 + 2 * 4 + 4)
 })
@@ -83,7 +78,7 @@ test_that("an interrupt and an error keep the trainings before them, and the one
   expect_message(trained <- quiet_trainings(env = stopping(rlang::interrupt)),
                  "after 1 of 3 seeds", class = "gym_message_interrupted")
   expect_true(trained$interrupted)
-  expect_identical(counted(trained$trainings[[1]]), counted(whole$trainings[[1]]))
+  expect_identical(what_counts(trained$trainings[[1]]), what_counts(whole$trainings[[1]]))
   expect_identical(nrow(trained$trainings[[2]]$history), 2L)
   expect_identical(as.data.frame(trained)$interrupted, c(FALSE, TRUE))
   expect_identical(summary(trained)$finished, 1L)
@@ -91,7 +86,7 @@ test_that("an interrupt and an error keep the trainings before them, and the one
   cnd <- expect_error(quiet_trainings(env = stopping(function() gym_abort("lost"))),
                       "after 1 seed", class = "gym_error_training")
   expect_identical(nrow(cnd$result$trainings[[2]]$history), 2L)
-  expect_identical(counted(cnd$result$trainings[[1]]), counted(whole$trainings[[1]]))
+  expect_identical(what_counts(cnd$result$trainings[[1]]), what_counts(whole$trainings[[1]]))
 })
 
 test_that("a seed that cannot begin keeps the trainings before it", {
@@ -125,7 +120,7 @@ test_that("an environment of the server trains many seeds, with its own argument
                 max_steps = 20, eval_episodes = 2, num_envs = 4, client = test_client(), ...)
   }
   trained <- play(seeds = 1:2)
-  expect_identical(counted(trained$trainings[[2]]), counted(play(seed = 2L)))
+  expect_identical(what_counts(trained$trainings[[2]]), what_counts(play(seed = 2L)))
   expect_identical(provenance(trained)$kwargs, list(is_slippery = FALSE))
   expect_identical(provenance(trained)$seed, c(1, 2))
 })
