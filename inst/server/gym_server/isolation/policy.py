@@ -128,6 +128,7 @@ class Isolation:
             self.settings(None, allowed_modules, 0),
             on_end=lambda why: None,
             hint="",
+            first_result=True,
         )
         overdue = threading.Timer(seconds, worker.kill, (_search_too_long(seconds),))
         overdue.daemon = True

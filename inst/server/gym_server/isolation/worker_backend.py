@@ -62,7 +62,12 @@ class WorkerBackend:
             else ""
         )
         self._worker = WorkerProcess(
-            serve_instance, config, settings, on_end=lambda why: self._on_end(why), hint=hint
+            serve_instance,
+            config,
+            settings,
+            on_end=lambda why: self._on_end(why),
+            hint=hint,
+            first_result=True,
         )
 
     def create(self, reservation: MemoryReservation) -> None:

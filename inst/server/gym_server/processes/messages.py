@@ -85,15 +85,21 @@ class CallPipe:
             while there is none.
     """
 
-    def __init__(self, connection: Connection, trusted: bool = False) -> None:
+    def __init__(
+        self, connection: Connection, trusted: bool = False, first_result: bool = False
+    ) -> None:
         """Take over the server's end of a pipe.
 
         Args:
             connection: the end.
             trusted: whether the process may return any object of Python's.
+            first_result: whether the process sends a result without a call, which
+                ``first_result()`` is going to read.
         """
         self._pipe = Pipe(connection)
         self._trusted = trusted
+        self._first_result_is_due = first_result
+        self._is_closed = False
         self._lock = threading.Lock()
         self._number = 0
         self.busy_since: float | None = None
@@ -153,7 +159,12 @@ class CallPipe:
     def first_result(self) -> Ready | Result:
         """Wait for the result that the process sends without a call; see ``call()``."""
         with self._lock:
-            return self._receive(None)
+            try:
+                return self._receive(None)
+            finally:
+                self._first_result_is_due = False
+                if self._is_closed:
+                    self._pipe.close()
 
     def _receive(self, timeout: float | None) -> Ready | Result:
         while True:
@@ -172,9 +183,15 @@ class CallPipe:
         self._pipe.wake()
 
     def close(self) -> None:
-        """Close the pipe as soon as no call waits any more; ``wake()`` ends one that does."""
+        """Close the pipe as soon as no call waits any more; ``wake()`` ends one that does.
+
+        A process may have ended before anybody has asked for its first result, which can still be
+        read: then ``first_result()`` closes the pipe.
+        """
         with self._lock:
-            self._pipe.close()
+            self._is_closed = True
+            if not self._first_result_is_due:
+                self._pipe.close()
 
 
 def _pickled(number: int, method: str, args: tuple) -> bytes:

@@ -44,6 +44,7 @@ class WorkerProcess:
         on_end: Callable[[GymServerError], None],
         hint: str,
         trusted: bool = False,
+        first_result: bool = False,
     ) -> None:
         """Start it.
 
@@ -54,6 +55,7 @@ class WorkerProcess:
                 without having been asked to; see ``report_end()``.
             hint: what to do about such an end, or "".
             trusted: whether its results may be any objects of Python's; see ``messages``.
+            first_result: whether it sends a result without a call; see ``first_result()``.
         """
         self._on_end = on_end
         self._hint = hint or None
@@ -69,7 +71,8 @@ class WorkerProcess:
         self.why: GymServerError | None = None
         context = start.context()
         pipes = [context.Pipe() for _ in range(2)]
-        self._calls, self._queries = (CallPipe(ours, trusted) for ours, _ in pipes)
+        self._calls = CallPipe(pipes[0][0], trusted, first_result)
+        self._queries = CallPipe(pipes[1][0], trusted)
         # Not a daemon: a daemon may start no processes, and sub-environments can be processes.
         self._process = context.Process(
             target=target, args=(*(theirs for _, theirs in pipes), *args), daemon=False

@@ -95,6 +95,18 @@ FORGED = [
 ]
 
 
+def test_a_first_result_is_read_after_the_pipe_was_closed():
+    ours, theirs = multiprocessing.Pipe()
+    pipe, other = CallPipe(ours, first_result=True), Pipe(theirs)
+    other.send(value_message(0, "made"))
+    other.close()
+    pipe.wake()
+    pipe.close()
+    assert pipe.first_result().value == "made"
+    with pytest.raises(OSError):
+        pipe.call("step")
+
+
 @pytest.mark.parametrize("forged", FORGED)
 def test_what_is_no_result_is_refused(ends, forged):
     pipe, other = ends

@@ -10,6 +10,9 @@ import pytest
 from conftest import ServerProcess
 from running import descendants, is_running, is_stopped
 
+from gym_server.isolation.worker import WorkerSettings, list_registry
+from gym_server.processes.worker_process import WorkerProcess
+
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
 
 
@@ -79,6 +82,17 @@ def is_running_safely(pid):
         return is_running(pid)
     except OSError:
         return False
+
+
+def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
+    settings = WorkerSettings(frozenset())
+    worker = WorkerProcess(
+        list_registry, "CartPole", settings, on_end=print, hint="", first_result=True
+    )
+    eventually(lambda: worker.why is not None)
+    # The thread that waited for the end closes its pipes now.
+    time.sleep(0.2)
+    assert worker.first_result().value[0]["id"].startswith("CartPole-v")
 
 
 @pytest.mark.parametrize("at", ["constructor", "close", "render"])
