@@ -11,8 +11,8 @@
 #' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the environment's
 #'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or `"cem"`), the
 #'   agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such one), of the
-#'   policy `hidden` (how many hidden neurons a network has, `NA` for a linear policy) and `bias` (a
-#'   logical), of the training `episodes`, `steps` (its budget) and `target` (the mean return at
+#'   policy `hidden` (how many hidden neurons a network has, which are tanh and see normalised
+#'   observations, `NA` for a linear policy) and `bias` (a logical), of the training `episodes`, `steps` (its budget) and `target` (the mean return at
 #'   which it stops, which lies above the one that the environment counts as solved, so that the
 #'   final evaluation reaches that), and where they come from: `origin` is `"paper"`, with the
 #'   `source`, or `"ours"`. `tried` is how many settings were tried (an integer), with the seeds 1
@@ -122,7 +122,7 @@ preset_policy <- function(preset) {
     policy_linear(bias = preset$bias)
   } else {
     policy_network(
-      c(NA, preset$hidden, NA), c("tanh", "identity"), bias = preset$bias, normalize = FALSE
+      c(NA, preset$hidden, NA), c("tanh", "identity"), bias = preset$bias, normalize = TRUE
     )
   }
 }

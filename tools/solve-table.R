@@ -39,7 +39,7 @@ todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
   job <- solve_jobs[row, ]
   data.frame(
     row = row, env_id = job$env_id, kwargs = job$kwargs,
-    seed = first_seed + seq_len(job$seeds) - 1L
+    seed = first_seed(job) + seq_len(job$seeds) - 1L
   )
 }))
 todo <- todo[todo$env_id %in% only & !key(todo) %in% key(read_rows(table_file)), ]

@@ -1,22 +1,25 @@
 # What the table of solved environments has: the target that is reported, where it comes from, and
 # how many seeds are trained. The settings are the presets of the package (agent_presets()).
+#
+# Settings were tried on the seeds 1 to 99. The first choice of them is reported on the seeds from
+# 1001 on. Where it missed its goal and another one was chosen, again on the seeds 1 to 99, that is
+# reported on the seeds from 2001 on, and so on; the rows of the first choice stay in the table.
 
 solve_jobs <- utils::read.csv(text = "
-env_id,kwargs,agent,target,target_source,seeds
-CartPole-v1,,ars,475,registered,20
-Acrobot-v1,,ars,-100,registered,20
-MountainCarContinuous-v0,,ars,90,registered,20
-LunarLander-v3,continuous,ars,200,registered,20
-LunarLander-v3,,ars,200,registered,20
-Swimmer-v5,,ars,325,paper (registered 360),20
-HalfCheetah-v5,,ars,3430,paper (registered 4800),10
-Pendulum-v1,,cem,-200,ours,10
-Hopper-v5,,ars,3120,paper (registered 3800),1
-BipedalWalker-v3,,ars,300,registered,1
+env_id,kwargs,agent,target,target_source,choice,seeds
+CartPole-v1,,ars,475,registered,1,20
+Acrobot-v1,,ars,-100,registered,1,20
+MountainCarContinuous-v0,,ars,90,registered,1,20
+LunarLander-v3,continuous,ars,200,registered,1,20
+LunarLander-v3,,ars,200,registered,1,20
+Swimmer-v5,,ars,325,paper (registered 360),2,20
+HalfCheetah-v5,,ars,3430,paper (registered 4800),1,10
+Pendulum-v1,,cem,-200,ours,1,10
+Hopper-v5,,ars,3120,paper (registered 3800),1,1
+BipedalWalker-v3,,ars,300,registered,1,1
 ", strip.white = TRUE, na.strings = "NA", colClasses = c(kwargs = "character"))
 
-# Settings were tried on the seeds 1 to 99; those reported begin here.
-first_seed <- 1001L
+first_seed <- function(job) 1000L * job$choice + 1L
 
 # The environment's own arguments of a job, by their names in the table.
 job_kwargs <- function(name) if (nzchar(name)) stats::setNames(list(TRUE), name) else list()
