@@ -24,6 +24,8 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
   } else {
     definition$task <- made$task
     definition$wrappers <- c(definition$wrappers, list(made$around))
+    # A wrapper may change what the model says.
+    definition["model"] <- list(NULL)
     function_env$new(definition)
   }
 }

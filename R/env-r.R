@@ -47,6 +47,9 @@
 #' @param ... Further values, by name, which each `self` has from the beginning, such as
 #'   `size = 5` for `self$size`. In a vectorised environment `num_envs` is how many
 #'   sub-environments this object has, 256 unless it is given.
+#' @param model The environment's [model][gym_model()], for [env_model()], the table of its
+#'   transitions, or a function of the environment that returns one of them; `NULL`, the default,
+#'   for an environment that has none.
 #' @param id What the environment is called in messages and titles, a string.
 #' @param max_episode_steps After how many steps an episode is cut off, a whole number; `NULL`, the
 #'   default, for never.
@@ -98,8 +101,8 @@
 #'
 #' rollout(corridor, policy_random(), episodes = 100, seed = 1)
 gym_env <- function(reset, step, observation_space, action_space, render = NULL,
-                    vectorized = FALSE, ..., id = "R-environment", max_episode_steps = NULL,
-                    reward_threshold = NULL, render_fps = NULL) {
+                    vectorized = FALSE, ..., model = NULL, id = "R-environment",
+                    max_episode_steps = NULL, reward_threshold = NULL, render_fps = NULL) {
   check_takes(reset, "self")
   check_takes(step, c("self", "action"))
   if (!is.null(render)) {
@@ -116,7 +119,7 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
   )
   function_env$new(list(
     task = task, reset = reset, step = step, render = render, vectorized = vectorized,
-    parameters = parameters
+    parameters = parameters, model = model
   ))
 }
 

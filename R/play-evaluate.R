@@ -37,9 +37,14 @@
 #' evaluation
 #' best <- policy_network(c(4, 2, 1))
 #' coef(best) <- weights[which.max(evaluation$mean_return), ]
-evaluate_policy <- function(env, policy, episodes = 100, seed = NULL, ..., max_steps = NULL,
-                            num_envs = NULL, level = 0.95, progress = rlang::is_interactive(),
-                            client = gym_client(), num_workers = NULL) {
+evaluate_policy <- function(env, policy, ...) UseMethod("evaluate_policy")
+
+#' @rdname evaluate_policy
+#' @export
+evaluate_policy.default <- function(env, policy, episodes = 100, seed = NULL, ...,
+                                    max_steps = NULL, num_envs = NULL, level = 0.95,
+                                    progress = rlang::is_interactive(), client = gym_client(),
+                                    num_workers = NULL) {
   if (!is_number(level) || level <= 0 || level >= 1) {
     abort_argument(level, "a number between 0 and 1", "level", rlang::current_env())
   }

@@ -10,7 +10,7 @@ import gymnasium
 import numpy
 
 from gym_server import __version__
-from gym_server.api import fields, openapi, schemas, watch_routes
+from gym_server.api import fields, model_routes, openapi, schemas, watch_routes
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
@@ -397,4 +397,4 @@ def openapi_document(call: Call) -> dict:
     return openapi.document(call.services.routes)
 
 
-ROUTES.extend(watch_routes.ROUTES)
+ROUTES.extend([*model_routes.ROUTES, *watch_routes.ROUTES])

@@ -19,6 +19,11 @@ def or_null(schema: dict) -> dict:
     return {"anyOf": [schema, {"type": "null"}]}
 
 
+def array_of(items: dict) -> dict:
+    """Return the schema of a list."""
+    return {"type": "array", "items": items}
+
+
 def json_object(required: dict[str, dict], **others: dict) -> dict:
     """Return the schema of an object that has some properties, and may have others."""
     return {
@@ -70,6 +75,22 @@ LISTED_ENVIRONMENT = json_object(
         "extra": or_null(TEXT),
         "available": FLAG,
         "reason": or_null(TEXT),
+    }
+)
+
+PROBABILITY = {"type": "number", "minimum": 0}
+
+TRANSITION_MODEL = json_object(
+    {
+        "num_states": COUNT,
+        "num_actions": COUNT,
+        "start": array_of(PROBABILITY),
+        "state": array_of(COUNT),
+        "action": array_of(COUNT),
+        "next_state": array_of(COUNT),
+        "probability": array_of(PROBABILITY),
+        "reward": array_of({"type": "number"}),
+        "terminated": array_of(FLAG),
     }
 )
 

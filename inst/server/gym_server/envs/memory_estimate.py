@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
@@ -20,11 +20,13 @@ from gym_server.envs.registry import module_of
 
 _KB, _MB = 2**10, 2**20
 
+_TOY_TEXT = "gymnasium.envs.toy_text"
+
 # By the beginning of the module's name, the more particular one before the more general one;
 # environments of all others are small.
 _ENVIRONMENT_BYTES = {
-    "gymnasium.envs.toy_text.taxi": 1 * _MB,
-    "gymnasium.envs.toy_text": 128 * _KB,
+    f"{_TOY_TEXT}.taxi": 1 * _MB,
+    _TOY_TEXT: 128 * _KB,
     "gymnasium.envs.box2d.car_racing": 5 * _MB,
     "gymnasium.envs.box2d": 512 * _KB,
     "gymnasium.envs.mujoco": 2 * _MB,
@@ -36,6 +38,10 @@ _OTHER_ENVIRONMENT_BYTES = 16 * _KB
 # The figures above include arguments that are no longer than _FREE_ARGUMENT_LETTERS.
 _ARGUMENT_LETTER_BYTES = 2 * _KB
 _FREE_ARGUMENT_LETTERS = 64
+
+# What a transition takes in the answer that holds all of them: in the columns, and while they are
+# written as JSON. Of 20,000 and more of them each takes less.
+_TRANSITION_BYTES = 544
 
 # A wrapper's arguments may be arrays of bounds: the bytes per digit that they are written in.
 _WRAPPER_LETTER_BYTES = 16
@@ -60,6 +66,15 @@ def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
         if module.startswith(beginning):
             return size + _ARGUMENT_LETTER_BYTES * max(0, letters - _FREE_ARGUMENT_LETTERS)
     return _OTHER_ENVIRONMENT_BYTES + _WRAPPER_LETTER_BYTES * letters
+
+
+def model_bytes(env: gymnasium.Env) -> float:
+    """Estimate the answer that holds the transition model of an environment of Gymnasium's."""
+    base: Any = env.unwrapped
+    if not type(base).__module__.startswith(_TOY_TEXT) or not hasattr(base, "P"):
+        return 0
+    actions = [outcomes for by_action in base.P.values() for outcomes in by_action.values()]
+    return _TRANSITION_BYTES * sum(map(len, actions))
 
 
 def vector_bytes(spec: EnvSpec, kwargs: dict) -> float:

@@ -64,6 +64,15 @@ _MOST_WRAPPERS = 32
 # Wrappers that draw when they are made and in each step.
 _DRAWING = ("AddRenderObservation",)
 
+# Wrappers that leave observations, actions and rewards as they are. The first two are Gymnasium's
+# own additions.
+_UNCHANGING = (
+    gymnasium.wrappers.OrderEnforcing,
+    gymnasium.wrappers.PassiveEnvChecker,
+    gymnasium.wrappers.RecordEpisodeStatistics,
+    gymnasium.wrappers.TimeLimit,
+)
+
 # Environments that draw their own observation, a picture, in each step.
 _DRAWING_ENVIRONMENTS = ("gymnasium.envs.box2d.car_racing",)
 
@@ -132,6 +141,20 @@ def time_limit(env: gymnasium.Env) -> int | None:
         env = env.env
         limits.append(env.spec.max_episode_steps if env.spec else None)
     return min(filter(None, limits), default=None)
+
+
+def changing_wrapper(env: gymnasium.Env) -> str | None:
+    """Return the name of a wrapper that may change observations, actions or rewards, or None.
+
+    That is the outermost one that is not known to leave them as they are.
+    """
+    base = env.unwrapped
+    while env is not base:
+        # Others may call theirs by the same names, or derive from them.
+        if not isinstance(env, gymnasium.Wrapper) or type(env) not in _UNCHANGING:
+            return type(env).__name__
+        env = env.env
+    return None
 
 
 def draws_when_stepped(env: gymnasium.Env) -> bool:

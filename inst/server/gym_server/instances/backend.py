@@ -56,6 +56,9 @@ class Backend(Protocol):
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
 
+    def transition_model(self) -> dict | Ready:
+        """Tell how the environment moves; see ``Instance.transition_model()``."""
+
     def start_monitor(
         self,
         instance_id: str,

@@ -8,6 +8,7 @@ from functools import partial
 
 from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_estimate import model_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.environment import Environment
@@ -51,6 +52,7 @@ def make_instance(
             reservation,
         )
         undo.push(_closing_quietly(partial(renderer.run, env.close)))
+        reservation.reserve(make.ask(model_bytes, env), "Its transition model")
         wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
         return _instance(SingleEnvironment(wrapped, config, renderer), config, renderer)
     sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer, reservation)

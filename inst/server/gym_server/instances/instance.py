@@ -156,6 +156,26 @@ class Instance:
         """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
         return self._backend.look(sub_env)
 
+    def transition_model(self) -> dict | Ready:
+        """Tell how an environment moves that has a table of it.
+
+        Returns:
+            ``{"model"}``, see ``envs.transition_model``; ``Ready`` from the process of an isolated
+            environment.
+
+        Raises:
+            GymServerError: ``not_supported``; ``environment_error``.
+        """
+        if not self._is_single:
+            raise GymServerError(
+                "not_supported",
+                f"{self.env_id} has sub-environments here, and a transition model is that of a "
+                "single environment",
+                "create it without num_envs",
+            )
+        with self.lock:
+            return self._backend.transition_model()
+
     @property
     def moves(self) -> Moves:
         """How often the environment has begun to move."""

@@ -12,6 +12,7 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import ask
+from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import time_limit
 from gym_server.errors import GymServerError, reset_needed
 from gym_server.instances.actions import ActionReader
@@ -178,6 +179,10 @@ class LocalBackend:
             reason = {"why_no_picture": refusal.message, "hint": refusal.hint}
             observation = self.env.observed(sub_env, self._observation)
             return {**facts, **reason, "observation": entries(observation)}, None
+
+    def transition_model(self) -> dict:
+        """Tell how the environment moves; see ``Instance.transition_model()``."""
+        return {"model": ask(transition_model, self.env.gym_env, self.env_id)}
 
     # At any time ----------------------------------------------------------------------------
 

@@ -181,6 +181,9 @@ class _Methods:
     def look(self, sub_env: int) -> _Look:
         return _Look(*self._instance.look(sub_env))
 
+    def transition_model(self) -> answers.Answer:
+        return answers.answer(self._instance.transition_model(), None)
+
     def start_monitor(self, instance_id: str, path: Path, *args: Any) -> None:
         self._instance.instance_id = instance_id
         root: Any = _Resolved(path)

@@ -129,6 +129,10 @@ class WorkerBackend:
         result = self._ask("look", sub_env)
         return dict(_dict(result)), result.frame
 
+    def transition_model(self) -> Ready:
+        """Tell how the environment moves; see ``Instance.transition_model()``."""
+        return cast(Ready, self._worker.call("transition_model"))
+
     # At any time ----------------------------------------------------------------------------
 
     @property

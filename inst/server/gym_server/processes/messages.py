@@ -52,7 +52,7 @@ def read_call(raw: bytes) -> tuple[int, str, tuple]:
 
 
 def answer_message(number: int, answer: Answer) -> bytes:
-    """Return the message that carries the answer to a reset or a step."""
+    """Return the message that carries an answer that is ready."""
     return _HEAD.pack(number, _KINDS[answer.content_type], 0) + answer.body
 
 
@@ -113,7 +113,7 @@ class CallPipe:
             timeout: how many seconds to wait; None for as long as it takes.
 
         Returns:
-            ``Ready`` for a reset or a step, else ``Result``.
+            ``Ready`` for a method that returns an ``Answer``, else ``Result``.
 
         Raises:
             GymServerError: what the process refused with; ``malformed_json``.

@@ -126,7 +126,7 @@ class WorkerProcess:
         """Call a method there; the caller sees to it that only one call runs at a time.
 
         Returns:
-            ``Ready`` for a reset or a step, else ``Result``.
+            ``Ready`` for a method that returns an ``Answer``, else ``Result``.
 
         Raises:
             GymServerError: what it refused with, or why it has ended.

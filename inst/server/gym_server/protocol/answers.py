@@ -75,7 +75,7 @@ class Content(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """The body of a reset's or a step's answer, to which only the request is to be added."""
+    """A body from the process of an environment, to which only the request is to be added."""
 
     body: bytes
     content_type: str

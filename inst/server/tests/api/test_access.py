@@ -277,6 +277,7 @@ def test_a_key_opens_nothing_else(locked, watched):
     reads = ["/v1/envs/", "/v1/health/", f"{url}/", f"{url}/render/", f"{url}/action_space/sample/"]
     reads += [f"{other}/watch/", f"{other}/watch/state/", f"{url}/watch/../render/"]
     reads += [f"{url}/watch/state/../../render/", f"{url}%2fwatch/../", f"{url}/watch/%2e%2e/"]
+    reads += [f"{url}/model/"]
     for path in reads:
         assert locked.get(f"{path}?key={key}").status_code == 401, path
     posts = [f"{url}/watch/key/", f"{url}/watch/", f"{url}/watch/state/", f"{url}/step/"]

@@ -1,5 +1,7 @@
 """Memory is estimated before it is taken, for all environments together."""
 
+import tracemalloc
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,11 +12,13 @@ from gym_server.api.app import Config, create_app
 from gym_server.budget import Budget
 from gym_server.envs import make
 from gym_server.envs.config import Wrapper
-from gym_server.envs.memory_estimate import observation_bytes
+from gym_server.envs.memory_estimate import model_bytes, observation_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import wrap
 from gym_server.errors import GymServerError
 from gym_server.manager.limits import Limits
+from gym_server.protocol.answers import dumps
 from gym_server.rendering.render_thread import RenderThread
 
 MB = 2**20
@@ -172,6 +176,33 @@ def test_what_people_do_is_within_the_default(env_id, num_envs, wrappers):
     wrap(env, chosen, renderer, memory)
     renderer.stop()
     assert memory.taken < Limits.max_memory_mb * MB
+
+
+@pytest.mark.parametrize(
+    ("env_id", "kwargs"),
+    [
+        ("FrozenLake-v1", {"desc": ["S" + 29 * "F", *(28 * [30 * "F"]), 29 * "F" + "G"]}),
+        ("FrozenLake-v1", {}),
+        ("CliffWalking-v1", {}),
+        ("Taxi-v4", {}),
+        ("Taxi-v4", {"is_rainy": True}),
+    ],
+)
+def test_a_transition_model_takes_no_more_than_is_estimated(env_id, kwargs):
+    env = gymnasium.make(env_id, **kwargs)
+    tracemalloc.start()
+    dumps({"model": transition_model(env, env_id)})
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most <= model_bytes(env) < 2 * most
+
+
+def test_a_transition_model_is_paid_for_in_advance(limited):
+    client = limited(max_memory_mb=1)
+    assert create(client, "FrozenLake-v1").status_code == 200
+    answer = create(client, "FrozenLake-v1", kwargs={"desc": ["S" + 119 * "F", 119 * "F" + "G"]})
+    assert refused(answer)
+    assert answer.json["message"].startswith("Its transition model would bring")
 
 
 def test_what_is_taken_is_at_most_what_there_is():

@@ -31,6 +31,7 @@ from faulty_envs.raising import (
     Variables,
 )
 from faulty_envs.rogue import Rogue
+from faulty_envs.tables import LooksTimed, Table
 from faulty_envs.uneven import CannotSaySo, Insists, KillsItself, SpoilsOneSubEnv, Uneven
 
 __all__ = ["SPACES"]
@@ -50,6 +51,7 @@ for _kind in (
     KillsItself,
     Letters,
     LongDouble,
+    LooksTimed,
     Meeting,
     Nested,
     NotANumber,
@@ -64,6 +66,7 @@ for _kind in (
     Shifted,
     Spins,
     SpoilsOneSubEnv,
+    Table,
     Uneven,
     Variables,
 ):

@@ -230,6 +230,26 @@ def test_its_errors_are_those_that_it_would_have(servers):
         assert [a[0] for a in answers[0]] == [a[0] for a in answers[1]]
 
 
+def test_its_model_is_the_one_that_it_would_have(servers):
+    for env_id, fields, status in [
+        ("FrozenLake-v1", {"kwargs": {"map_name": "8x8"}}, 200),
+        ("Taxi-v4", {}, 200),
+        ("CliffWalking-v1", {}, 200),
+        ("CliffWalking-v1", {"num_envs": 2}, 400),
+        ("CliffWalking-v1", {"wrappers": [{"name": "FlattenObservation"}]}, 400),
+        ("CartPole-v1", {}, 400),
+        ("faulty_envs:Table-v0", {"kwargs": {"P": "half a probability"}}, 400),
+        ("faulty_envs:Table-v0", {"kwargs": {"P": "itself"}}, 400),
+        ("faulty_envs:Table-v0", {"kwargs": {"P": "raises"}}, 500),
+    ]:
+        calls = [("GET", "model/", b"", ""), ("POST", "reset/", {"seed": 1}, "")]
+        isolated, ordinary = both(servers, env_id, calls, **fields)
+        assert isolated == ordinary
+        assert [answer[0] for answer in ordinary] == [status, 200]
+    answer = json.loads(both(servers, "Taxi-v4", [("GET", "model/", b"", "")])[0][0][2])
+    assert len(answer["model"]["state"]) == 3_000
+
+
 def test_an_environment_that_is_closed_has_no_process_any_more(isolated, eventually):
     before = set(descendants(isolated.process.pid))
     url = isolated.create("CartPole-v1", num_envs=2, vectorization_mode="async")

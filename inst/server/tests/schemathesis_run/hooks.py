@@ -16,6 +16,7 @@ ENV_IDS = itertools.cycle(
         {"env_id": "CartPole-v1"},
         {"env_id": "CartPole-v1", "num_envs": 3},
         {"env_id": "Pendulum-v1", "num_envs": 2, "vectorization_mode": "sync"},
+        {"env_id": "FrozenLake-v1"},
         {"env_id": "faulty_envs:Counting-v0"},
         {"env_id": "faulty_envs:Nested-v0"},
         {"env_id": "faulty_envs:NotANumber-v0"},

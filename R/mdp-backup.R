@@ -1,0 +1,103 @@
+# A model as matrices with a row for each pair of a state and an action, by which all states are
+# looked at in one vectorised step.
+
+#' Prepare a model for sweeps over all its states
+#'
+#' Row s + S * (a - 1) is that of state s and action a, both counted from 1, of S states; the
+#' columns are the transitions from there, of which the last may be empty.
+#' @return A list: `states` and `actions`, how many there are; `next_state` (from 1), `probability`,
+#'   `terminated` and `weight`, matrices, the weight being the probability that the episode goes on
+#'   there; `expected`, the expected reward of each row; `possible`, whether the action can be taken.
+#' @noRd
+backup_of <- function(model) {
+  table <- model$transitions
+  states <- length(model$start)
+  actions <- as.integer(model$action_space$n)
+  row <- state_rows(model, table$state) + states * action_columns(model, table$action) - states
+  table <- table[order(row, method = "radix"), ]
+  row <- sort(row)
+  place <- sequence(rle(row)$lengths)
+  shape <- c(states * actions, max(place))
+  at <- cbind(row, place)
+  filled <- function(values, empty = 0) {
+    matrix <- array(empty, shape)
+    matrix[at] <- values
+    matrix
+  }
+  probability <- filled(table$probability)
+  list(
+    states = states, actions = actions,
+    next_state = filled(state_rows(model, table$next_state), 1L),
+    probability = probability, terminated = filled(table$terminated, TRUE),
+    weight = filled(table$probability * !table$terminated),
+    expected = rowSums(probability * filled(table$reward)), possible = seq_len(shape[[1L]]) %in% row
+  )
+}
+
+# Numbers of states and actions, counted from 1.
+state_rows <- function(model, state) as.integer(state - model$observation_space$start + 1L)
+action_columns <- function(model, action) as.integer(action - model$action_space$start + 1L)
+
+# The value of each action in each state, a matrix, given the value of each state: Bellman's
+# equation. Actions that cannot be taken have -Inf.
+action_values <- function(backup, values, discount) {
+  ahead <- backup$weight * values[backup$next_state]
+  q <- backup$expected + discount * .rowSums(ahead, nrow(backup$weight), ncol(backup$weight))
+  q[!backup$possible] <- -Inf
+  dim(q) <- c(backup$states, backup$actions)
+  q
+}
+
+# The value of each state by the best action; of a state that no action leaves 0.
+best_values <- function(q) {
+  best <- row_max(q)
+  best[best == -Inf] <- 0
+  best
+}
+
+# The value of each state when actions are taken with these probabilities, a matrix like `q`.
+mean_values <- function(q, probabilities) {
+  q[probabilities == 0] <- 0
+  .rowSums(q * probabilities, nrow(q), ncol(q))
+}
+
+#' How a policy moves from state to state
+#'
+#' @param probabilities A matrix with a row for each state and a column for each action.
+#' @return A list: `weight`, a matrix of how likely state j follows on state i, the rest of a row
+#'   being the end of the episode; `reward`, the expected reward in each state; `ends`, the states
+#'   in which the episode may end.
+#' @noRd
+chain_of <- function(backup, probabilities) {
+  states <- backup$states
+  taken <- as.vector(probabilities)
+  from <- rep(rep(seq_len(states), backup$actions), ncol(backup$weight))
+  weight <- backup$weight * taken
+  used <- weight > 0
+  flow <- matrix(0, states, states)
+  cell <- from[used] + states * (backup$next_state[used] - 1L)
+  sums <- rowsum(weight[used], cell)
+  flow[as.integer(rownames(sums))] <- sums
+  mean_of <- function(x) mean_values(array(x, dim(probabilities)), probabilities)
+  end <- rowSums(backup$probability * backup$terminated)
+  list(
+    weight = flow, reward = mean_of(backup$expected),
+    ends = mean_of(end) > 0 | rowSums(probabilities) == 0
+  )
+}
+
+#' The states from which some are reached
+#'
+#' @param leads A function of a logical vector of states that returns those from which one of them
+#'   is reached in one step.
+#' @param reached The states to begin with, a logical vector.
+#' @noRd
+closure <- function(leads, reached) {
+  repeat {
+    more <- reached | leads(reached)
+    if (identical(more, reached)) {
+      return(reached)
+    }
+    reached <- more
+  }
+}

@@ -1,0 +1,112 @@
+#' Get the model of an environment
+#'
+#' Asks an environment for the table by which it moves. Gymnasium's FrozenLake, CliffWalking and
+#' Taxi have one, with the arguments that they were made with, and so has an environment of your own
+#' that was made with `gym_env(model = )`.
+#'
+#' @param env The environment: an id, such as `"FrozenLake-v1"`, or one made by [gym_make()] or
+#'   [gym_env()], which is not moved.
+#' @param ... The environment's own arguments, by name, where it is named by its id, such as
+#'   `is_slippery = FALSE`.
+#' @param client The client of the server where an environment named by its id is made; the default
+#'   is the session's own, [gym_client()].
+#' @return An object of class [gym_model].
+#' @section Errors: `gym_error_argument` for an environment in R without a model;
+#'   `gym_error_http_400` for one of Gymnasium's that has none, that is a vector environment, or
+#'   that has wrappers, which may change what the model says.
+#' @seealso [solve_mdp()], [gym_model()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' lake <- env_model("FrozenLake-v1", is_slippery = FALSE)
+#' lake
+#' head(as.data.frame(lake))
+env_model <- function(env, ..., client = gym_client()) {
+  if (inherits(env, "gym_model")) {
+    return(env)
+  }
+  check_environment(env)
+  if (rlang::is_string(env) || inherits(env, "gym_wrapped")) {
+    if (!is_registered(env)) {
+      env <- gym_make(env, ..., client = client)
+      on.exit(close_quietly(env))
+      return(model_of_env(env, rlang::current_env()))
+    }
+    env <- gym_make(env, ...)
+  } else {
+    check_dots_empty(...)
+  }
+  model_of_env(env, rlang::current_env())
+}
+
+# What a function takes as a model.
+as_model <- function(x, call = rlang::caller_env()) {
+  if (inherits(x, "gym_model")) {
+    return(x)
+  }
+  if (!rlang::is_string(x) && !inherits(x, "gym_env")) {
+    abort_argument(x, "a model, or an environment that has one", "model", call)
+  }
+  env_model(x)
+}
+
+model_of_env <- function(env, call) UseMethod("model_of_env")
+
+#' @exportS3Method
+model_of_env.default <- function(env, call) abort_without_model(env, call)
+
+#' @exportS3Method
+model_of_env.gym_server_env <- function(env, call) {
+  route <- paste0(instance_route(env$instance_id), "model/")
+  described <- get_answer(env$client, route, call = call)$model
+  column <- function(name, type) methods::as(unlist(described[[name]]), type)
+  table <- data.frame(
+    state = column("state", "integer"), action = column("action", "integer"),
+    next_state = column("next_state", "integer"),
+    probability = column("probability", "numeric"), reward = column("reward", "numeric"),
+    terminated = column("terminated", "logical")
+  )
+  new_model(
+    table, env$observation_space, env$action_space, column("start", "numeric"),
+    env$spec[c("id", "reward_threshold", "max_episode_steps")], call
+  )
+}
+
+#' @exportS3Method
+model_of_env.gym_r_env <- function(env, call) {
+  model <- definition_of(env)$model
+  if (is.function(model)) {
+    model <- model(env)
+  }
+  if (is.null(model)) {
+    abort_without_model(env, call)
+  }
+  if (is.data.frame(model)) {
+    model <- gym_model(model)
+  }
+  check_fits_env(model, env, call)
+  model$spec <- env$spec[c("id", "reward_threshold", "max_episode_steps")]
+  model
+}
+
+abort_without_model <- function(env, call) {
+  gym_abort(
+    c(paste0(environment_label(env), " has no model."),
+      i = "`gym_env(model = )` gives an environment one, `estimate_model()` makes one of steps."),
+    class = "gym_error_argument", argument = "env", value = env, call = call
+  )
+}
+
+check_fits_env <- function(model, env, call) {
+  if (!inherits(model, "gym_model")) {
+    abort_argument(model, "a model or its table of transitions", "gym_env(model = )", call)
+  }
+  for (name in c("observation_space", "action_space")) {
+    if (!identical(format(model[[name]]), format(env[[name]]))) {
+      gym_abort(
+        paste0("The model of ", environment_label(env), " has the ", sub("_", " ", name), " ",
+               format(model[[name]]), ", but the environment has ", format(env[[name]]), "."),
+        class = "gym_error_argument", argument = "model", value = model, call = call
+      )
+    }
+  }
+}

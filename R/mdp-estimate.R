@@ -1,0 +1,94 @@
+#' Estimate a model from steps
+#'
+#' Counts in steps that were played how often each action led where, and for which reward, and takes
+#' the shares for probabilities (maximum likelihood). What was never tried is not in the model.
+#'
+#' @param x What [rollout()] returned with `steps = TRUE, next_observation = TRUE`, or a data frame
+#'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`, and perhaps
+#'   `episode`, by whose first rows it is known where episodes start.
+#' @param ... For methods.
+#' @return A model, see [gym_model()]. A state that was reached but never left, because episodes
+#'   were cut off there, counts as an end; a message says so.
+#' @section Errors: `gym_error_argument` for steps that were not kept, or whose observations are not
+#'   Discrete.
+#' @seealso [env_model()], which asks the environment
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' played <- rollout("FrozenLake-v1", policy_random(), episodes = 1000, seed = 1, steps = TRUE,
+#'                   next_observation = TRUE)
+#' estimated <- estimate_model(played)
+#' estimated
+#' solve_mdp(estimated, horizon = 100)$start_value
+estimate_model <- function(x, ...) UseMethod("estimate_model")
+
+#' @export
+estimate_model.default <- function(x, ...) {
+  must <- "a rollout with its steps, or a data frame of steps"
+  abort_argument(x, must, "x", rlang::current_env())
+}
+
+#' @export
+estimate_model.gym_rollout <- function(x, ...) {
+  steps <- x$steps
+  after <- grep("^next_", names(steps), value = TRUE)
+  if (!is.data.frame(steps) || !length(after)) {
+    gym_abort(
+      c("The rollout does not have what is needed of its steps.",
+        i = "Play it with `rollout(steps = TRUE, next_observation = TRUE)`."),
+      class = "gym_error_argument", argument = "x", value = x
+    )
+  }
+  if (length(after) != 1L || !is.integer(steps[[after]]) || !is.integer(steps$action)) {
+    gym_abort(
+      paste0("A model has numbered states and actions, and those of ", x$env_id,
+             " are not Discrete."),
+      class = "gym_error_argument", argument = "x", value = x
+    )
+  }
+  table <- data.frame(
+    episode = paste(steps$candidate %||% 1L, steps$episode),
+    state = steps[[sub("^next_", "", after)]], action = steps$action, next_state = steps[[after]], reward = steps$reward,
+    terminated = steps$terminated
+  )
+  model <- estimate_model(table)
+  model$spec$id <- paste(x$env_id, "(estimated)")
+  model
+}
+
+#' @export
+estimate_model.data.frame <- function(x, ...) {
+  call <- rlang::current_env()
+  if (is.null(x$terminated)) x$terminated <- FALSE
+  x$probability <- NULL
+  steps <- check_transitions(x, "x", call)
+  steps$terminated <- end_at_unknown(steps)
+  first <- if (is.null(x$episode)) 1L else !duplicated(x$episode)
+  key <- do.call(paste, steps[c("state", "action", "next_state", "reward", "terminated")])
+  count <- rowsum(rep(1, nrow(steps)), key, reorder = FALSE)[, 1L]
+  table <- steps[!duplicated(key), ]
+  pair <- paste(table$state, table$action)
+  tried <- rowsum(count, pair, reorder = FALSE)[, 1L]
+  table$probability <- unname(count / tried[pair])
+  states <- range(table$state, table$next_state)
+  actions <- range(table$action)
+  numbers <- seq.int(states[[1L]], states[[2L]])
+  starts <- tabulate(match(steps$state[first], numbers), length(numbers))
+  new_model(
+    table, space_discrete(length(numbers), states[[1L]]),
+    space_discrete(diff(actions) + 1, actions[[1L]]), starts / sum(starts),
+    list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
+  )
+}
+
+# Arriving at a state that was never left ends the episode, as far as is known.
+end_at_unknown <- function(steps) {
+  stuck <- !steps$terminated & !steps$next_state %in% steps$state
+  count <- length(unique(steps$next_state[stuck]))
+  if (count) {
+    cli::cli_inform(
+      c(i = "{count} state{?s} {?was/were} reached but never left: the model ends there."),
+      class = "gym_message_model"
+    )
+  }
+  steps$terminated | stuck
+}

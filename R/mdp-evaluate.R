@@ -1,0 +1,64 @@
+#' Evaluate policies exactly
+#'
+#' Where the model of an environment is known, what a policy comes to is calculated instead of
+#' played: nothing is drawn, and there is no interval.
+#'
+#' @inheritParams solve_mdp
+#' @param env A model, see [gym_model()] and [env_model()].
+#' @param policy The policy, as for [solve_mdp()], or a list of several.
+#' @param max_steps After how many steps episodes are cut off, a whole number. `NULL`, the default,
+#'   takes the model's own limit, and without one they go on to their end; `Inf` does so, too.
+#' @param ... Must be empty.
+#' @return A data frame with a row for each policy and the columns `candidate` (its number, an
+#'   integer), `mean_return` and `mean_length` (doubles: the expected return, and the expected
+#'   number of steps) and `max_steps` (double, `Inf` for no limit). Names of policies in a list are
+#'   the names of rows.
+#' @section Errors: `gym_error_argument` for a policy that does not fit.
+#' @seealso [evaluate_policy()], which plays; [solve_mdp()] for the value of each state
+#' @export
+#' @examples
+#' walk <- gym_model(data.frame(
+#'   state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+#'   reward = c(0, 0, 0, 1)
+#' ), start = 1)
+#' evaluate_policy(walk, list(random = policy_random(), right = c(1, 1, 1, 1)))
+#'
+#' @examplesIf gym:::can_start_server()
+#' lake <- env_model("FrozenLake-v1")
+#' evaluate_policy(lake, solve_mdp(lake)$policy)
+evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discount = 1) {
+  check_dots_empty(...)
+  check_discount(discount)
+  if (!identical(max_steps, Inf)) check_count(max_steps, allow_null = TRUE)
+  call <- rlang::current_env()
+  backup <- backup_of(env)
+  limit <- max_steps %||% env$spec$max_episode_steps %||% Inf
+  several <- is.list(policy) && !is.object(policy)
+  policies <- if (several) policy else list(policy)
+  if (!length(policies)) {
+    abort_argument(policy, "a policy, or a list of at least one", "policy", call)
+  }
+  # What each step counts, in place of the reward.
+  counting <- backup
+  counting$expected <- rep(1, length(backup$expected))
+  rows <- lapply(seq_along(policies), function(i) {
+    probabilities <- policy_matrix(policies[[i]], env, call)
+    value <- function(of, discount) start_mean(env, limited_values(of, probabilities, limit,
+                                                                   discount))
+    data.frame(
+      candidate = i, mean_return = value(backup, discount), mean_length = value(counting, 1),
+      max_steps = as.double(limit)
+    )
+  })
+  evaluated <- do.call(rbind, rows)
+  if (!is.null(names(policies))) row.names(evaluated) <- make.unique(names(policies))
+  evaluated
+}
+
+limited_values <- function(backup, probabilities, limit, discount) {
+  if (limit == Inf) {
+    policy_values(backup, probabilities, discount)
+  } else {
+    horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities))
+  }
+}

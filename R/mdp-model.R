@@ -1,0 +1,221 @@
+#' Write down the model of an environment
+#'
+#' A model is the table by which an environment with finitely many states moves: for each state and
+#' action where it leads, how likely, and for which reward. [env_model()] gives that of an
+#' environment which has one, [estimate_model()] makes one of steps that were played, and this
+#' function takes a table that you have typed.
+#'
+#' A model can be solved by [solve_mdp()] and judges a policy exactly, by
+#' [evaluate_policy()][evaluate_policy.gym_model()]. And it is an environment by itself:
+#' [rollout()], [train_agent()] and everything else that plays takes it where an environment is
+#' wanted, and [model_env()] gives it as an object with `$reset()` and `$step()`.
+#'
+#' States and actions keep the environment's own numbers, which in Gymnasium begin at 0. The rows
+#' and columns of matrices and vectors count from 1, as always in R: the first row is that of the
+#' lowest number.
+#'
+#' @param transitions A data frame with a row for each transition and the columns `state`, `action`
+#'   and `next_state` (whole numbers), `reward` (a number), and perhaps `probability` (1 without it)
+#'   and `terminated` (whether the episode ends there; without it `TRUE` where `next_state` is a
+#'   state that no row leaves). An action that has no row in a state cannot be taken there.
+#' @param start Where episodes start: a state's number, or a numeric vector with a probability for
+#'   each state. `NULL`, the default, is any state that some row leaves, each equally likely.
+#' @param id What it is called in messages and titles, a string.
+#' @param max_episode_steps After how many steps an episode is cut off when it is played, a whole
+#'   number; `NULL`, the default, for never.
+#' @param reward_threshold The mean return from which it counts as solved, a number; `NULL`, the
+#'   default, for none.
+#' @return An object of class `gym_model`, a list with the elements
+#'   \describe{
+#'     \item{transitions}{A data frame with the columns `state`, `action`, `next_state` (integer),
+#'       `probability`, `reward` (double) and `terminated` (logical), sorted by state and action.
+#'       `as.data.frame()` gives it.}
+#'     \item{start}{How likely each state is the first one, a numeric vector with the states'
+#'       numbers as names.}
+#'     \item{observation_space, action_space}{The states and the actions, Discrete spaces.}
+#'     \item{spec}{A list of `id`, `reward_threshold` and `max_episode_steps`.}
+#'   }
+#'   [model_arrays()] gives it as the arrays of other packages.
+#' @section Errors: `gym_error_argument` for a table that is no model: a column that is missing,
+#'   probabilities that do not add up to 1 (the state and the action are named), a state that no row
+#'   leaves although arriving there does not end the episode.
+#' @seealso [env_model()], [estimate_model()], [solve_mdp()]
+#' @export
+#' @examples
+#' # A machine that can be run or repaired; worn (1), it breaks (2) in one case of five.
+#' machine <- gym_model(data.frame(
+#'   state =       c(0,   0,   0,  1,   1,   1),
+#'   action =      c(0,   0,   1,  0,   0,   1),
+#'   next_state =  c(0,   1,   0,  1,   2,   0),
+#'   probability = c(0.7, 0.3, 1,  0.8, 0.2, 1),
+#'   reward =      c(10,  10, -5,  6,   -50, -5)
+#' ), start = 0, id = "Machine")
+#' machine
+#' solve_mdp(machine, discount = 0.95)
+gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_steps = NULL,
+                      reward_threshold = NULL) {
+  check_string(id)
+  check_count(max_episode_steps, allow_null = TRUE)
+  check_number(reward_threshold, allow_null = TRUE)
+  spec <- list(
+    id = id, reward_threshold = reward_threshold,
+    max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
+  )
+  table <- check_transitions(transitions)
+  states <- range(table$state, table$next_state)
+  actions <- range(table$action)
+  new_model(
+    table,
+    space_discrete(states[[2L]] - states[[1L]] + 1, states[[1L]]),
+    space_discrete(actions[[2L]] - actions[[1L]] + 1, actions[[1L]]),
+    start, spec
+  )
+}
+
+#' Make a model of a table
+#'
+#' @param table As [check_transitions()] returns it.
+#' @param call The user's call.
+#' @noRd
+new_model <- function(table, states, actions, start, spec, call = rlang::caller_env()) {
+  table <- table[order(table$state, table$action, method = "radix"), ]
+  row.names(table) <- NULL
+  check_probabilities(table, call)
+  check_ends(table, call)
+  structure(
+    list(
+      transitions = table, start = start_probabilities(start, table, states, call),
+      observation_space = states, action_space = actions, spec = spec
+    ),
+    class = "gym_model"
+  )
+}
+
+# Checks ----------------------------------------------------------------------------
+
+check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()) {
+  if (!is.data.frame(x) || !nrow(x)) {
+    abort_argument(x, "a data frame with a row for each transition", arg, call)
+  }
+  needed <- c("state", "action", "next_state", "reward")
+  absent <- setdiff(needed, names(x))
+  if (length(absent)) {
+    gym_abort(
+      paste0("`", arg, "` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+  for (name in needed[-4L]) {
+    check_column(x, name, "whole numbers", are_whole_numbers, arg, call)
+  }
+  check_column(x, "reward", "finite numbers", are_finite, arg, call)
+  probability <- x$probability %||% rep(1, nrow(x))
+  x$probability <- probability
+  check_column(x, "probability", "numbers from 0 to 1", are_probabilities, arg, call)
+  terminated <- x$terminated %||% !x$next_state %in% x$state
+  x$terminated <- terminated
+  check_column(x, "terminated", "TRUE or FALSE", are_flags, arg, call)
+  data.frame(
+    state = as.integer(x$state), action = as.integer(x$action),
+    next_state = as.integer(x$next_state), probability = as.double(probability),
+    reward = as.double(x$reward), terminated = terminated
+  )
+}
+
+check_column <- function(x, name, must, are_good, arg, call) {
+  good <- are_good(x[[name]])
+  if (!all(good)) {
+    row <- which(!good)[[1L]]
+    gym_abort(
+      paste0("The column `", name, "` of `", arg, "` must have ", must, ", and in row ", row,
+             " it has ", describe_value(x[[name]][[row]]), "."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+}
+
+# Each returns a flag for each value, or a single one for values of another type.
+are_finite <- function(x) if (is.numeric(x)) is.finite(x) else FALSE
+are_whole_numbers <- function(x) {
+  if (is.numeric(x)) is.finite(x) & x == trunc(x) & abs(x) <= .Machine$integer.max else FALSE
+}
+are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 else FALSE
+are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
+
+# How far the probabilities of a state and an action may be from 1 together: they may have been
+# rounded. The server has the same rule.
+sum_tolerance <- 1e-6
+
+check_probabilities <- function(table, call) {
+  pair <- paste(table$state, table$action)
+  sums <- rowsum(table$probability, pair, reorder = FALSE)[, 1L]
+  wrong <- which(abs(sums - 1) > sum_tolerance)
+  if (length(wrong)) {
+    at <- strsplit(names(sums)[[wrong[[1L]]]], " ", fixed = TRUE)[[1L]]
+    gym_abort(
+      c(paste0("The probabilities of action ", at[[2L]], " in state ", at[[1L]], " add up to ",
+               format(sums[[wrong[[1L]]]], digits = 10), ", not to 1."),
+        i = if (length(wrong) > 1L) {
+          paste0("So it is with ", count_of(length(wrong) - 1, "further pair"),
+                 " of a state and an action.")
+        }),
+      class = "gym_error_argument", argument = "transitions", call = call
+    )
+  }
+}
+
+check_ends <- function(table, call) {
+  stuck <- !table$terminated & table$probability > 0 & !table$next_state %in% table$state
+  if (any(stuck)) {
+    state <- table$next_state[stuck][[1L]]
+    gym_abort(
+      c(paste0("No row leaves state ", state, ", and arriving there does not end the episode."),
+        i = "Set `terminated` to TRUE in the rows that lead there, or add rows that leave it."),
+      class = "gym_error_argument", argument = "transitions", call = call
+    )
+  }
+}
+
+start_probabilities <- function(start, table, states, call) {
+  numbers <- state_numbers(states)
+  left <- numbers %in% table$state
+  if (is.null(start)) {
+    start <- left / sum(left)
+  } else if (is_number(start)) {
+    if (!start %in% numbers[left]) {
+      abort_argument(start, "the number of a state that some row leaves", "start", call)
+    }
+    start <- as.double(numbers == start)
+  }
+  if (length(start) != length(numbers) || !all(are_probabilities(start)) ||
+        abs(sum(start) - 1) > sum_tolerance) {
+    must <- paste("a state's number, or probabilities that add up to 1, one for each of",
+                  count_of(length(numbers), "state"))
+    abort_argument(start, must, "start", call)
+  }
+  if (any(start[!left] > 0)) {
+    abort_argument(numbers[!left & start > 0][[1L]], "a state that some row leaves", "start", call)
+  }
+  stats::setNames(as.double(start), numbers)
+}
+
+# The numbers of a Discrete space: those of states, or of actions.
+state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
+
+# Methods -----------------------------------------------------------------------------
+
+#' @export
+print.gym_model <- function(x, ...) {
+  starts <- names(x$start)[x$start > 0]
+  cat(
+    "<model of ", x$spec$id, ": ", count_of(length(x$start), "state"), ", ",
+    count_of(as.integer(x$action_space$n), "action"), ", ",
+    count_of(nrow(x$transitions), "transition"), ", starts in ",
+    if (length(starts) == 1L) paste("state", starts) else count_of(length(starts), "state"), ">\n",
+    sep = ""
+  )
+  invisible(x)
+}
+
+#' @export
+as.data.frame.gym_model <- function(x, row.names = NULL, optional = FALSE, ...) x$transitions

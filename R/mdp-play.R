@@ -1,0 +1,110 @@
+#' Play a model
+#'
+#' Makes an environment that moves as a model says, drawn from R's own generator. No server is
+#' needed, and all sub-environments are moved at once, so that [rollout()] plays it quickly. Where
+#' an environment is wanted a model can be given itself; this function is for its `$reset()` and
+#' `$step()`.
+#'
+#' @param model A model, see [gym_model()].
+#' @param num_envs How many sub-environments it has, a whole number of at least 1; `NULL`, the
+#'   default, for a single environment.
+#' @return An environment as [gym_env()] makes them. An action that cannot be taken in a state is an
+#'   error there.
+#' @section Errors: `gym_error_argument` when `model` is no model.
+#' @export
+#' @examples
+#' walk <- gym_model(data.frame(
+#'   state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+#'   reward = c(0, 0, 0, 1)
+#' ), start = 1)
+#' env <- model_env(walk)
+#' env$reset(seed = 1)
+#' env$step(1)
+#' rollout(walk, policy_random(), episodes = 100, seed = 1)
+model_env <- function(model, num_envs = NULL) {
+  if (!inherits(model, "gym_model")) {
+    abort_argument(model, "a model, as `gym_model()` makes it", "model", rlang::current_env())
+  }
+  check_count(num_envs, allow_null = TRUE)
+  moves <- moves_of(model)
+  make <- function(...) {
+    gym_env(
+      reset = function(self) {
+        self$row <- draw_start(moves, self$num_envs %||% 1L)
+        moves$states[self$row]
+      },
+      step = function(self, action) {
+        pair <- self$row + moves$count * (action_columns(model, action) - 1L)
+        check_possible(moves, model, self$row, action, pair)
+        drawn <- draw_transition(moves, pair)
+        self$row <- moves$next_row[drawn]
+        list(
+          observation = moves$states[self$row], reward = moves$reward[drawn],
+          terminated = moves$terminated[drawn]
+        )
+      },
+      observation_space = model$observation_space, action_space = model$action_space,
+      model = model, id = model$spec$id, max_episode_steps = model$spec$max_episode_steps,
+      reward_threshold = model$spec$reward_threshold, ...
+    )
+  }
+  if (is.null(num_envs)) make() else make(vectorized = TRUE, num_envs = num_envs)
+}
+
+#' @export
+as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
+                                    client = NULL, num_workers = NULL) {
+  check_made_before(NULL, c(list(...), num_workers = num_workers), x)
+  as_vector_env(model_env(x, num_envs %||% vectorized_sub_envs), num_envs, frames = frames)
+}
+
+#' Prepare the drawing of a model's transitions
+#'
+#' All probabilities, one transition after the other, make one line on which transition i ends at
+#' `until[i]`. Those of a pair of a state and an action lie beside each other from `from` on, so
+#' that one number that is uniform there finds a transition in a single search.
+#' @noRd
+moves_of <- function(model) {
+  table <- model$transitions
+  table <- table[table$probability > 0, ]
+  count <- length(model$start)
+  pair <- state_rows(model, table$state) + count * (action_columns(model, table$action) - 1L)
+  table <- table[order(pair, method = "radix"), ]
+  pair <- sort(pair)
+  until <- cumsum(table$probability)
+  first <- match(seq_len(count * as.integer(model$action_space$n)), pair)
+  last <- first + tabulate(pair, length(first)) - 1L
+  list(
+    count = count, states = state_numbers(model$observation_space),
+    start = cumsum(model$start), last_start = max(which(model$start > 0)),
+    until = until, from = c(0, until)[first], width = until[last] - c(0, until)[first],
+    first = first, last = last,
+    next_row = state_rows(model, table$next_state), reward = table$reward,
+    terminated = table$terminated, is_end = !seq_len(count) %in% state_rows(model, table$state)
+  )
+}
+
+draw_start <- function(moves, n) {
+  pmin(findInterval(stats::runif(n), moves$start) + 1L, moves$last_start)
+}
+
+draw_transition <- function(moves, pair) {
+  at <- moves$from[pair] + stats::runif(length(pair)) * moves$width[pair]
+  drawn <- findInterval(at, moves$until) + 1L
+  # By rounding it may lie beside its own transitions; where an episode has ended anything will do.
+  drawn <- pmin(pmax(drawn, moves$first[pair]), moves$last[pair])
+  drawn[is.na(drawn)] <- 1L
+  drawn
+}
+
+check_possible <- function(moves, model, row, action, pair) {
+  # A sub-environment whose episode has ended is stepped, and what comes of it ignored.
+  barred <- is.na(moves$first[pair]) & !moves$is_end[row]
+  if (any(barred)) {
+    gym_abort(
+      paste0("Action ", action[barred][[1L]], " cannot be taken in state ",
+             moves$states[row[barred]][[1L]], " of ", model$spec$id, "."),
+      class = "gym_error_argument", argument = "action", value = action, call = NULL
+    )
+  }
+}

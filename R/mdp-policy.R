@@ -1,0 +1,93 @@
+# Policies as a model sees them: how likely each action is in each state.
+
+#' The probabilities with which a policy acts
+#'
+#' @param policy As for [solve_mdp()].
+#' @return A matrix with a row for each state and a column for each action.
+#' @noRd
+policy_matrix <- function(policy, model, call) {
+  possible <- possible_actions(model)
+  probabilities <- if (is.matrix(policy) && is.numeric(policy)) {
+    check_policy_matrix(policy, possible, call)
+  } else if (is.numeric(policy)) {
+    rows_of_actions(policy, model, "policy", call)
+  } else {
+    check_policy(policy, "policy", call)
+    check_one_policy(policy, "policy", call)
+    policy_probabilities(policy_bind(policy, model, call = call), model, call)
+  }
+  barred <- probabilities > 0 & !possible
+  if (any(barred & rowSums(possible) > 0)) {
+    at <- which(barred & rowSums(possible) > 0, arr.ind = TRUE)[1L, ]
+    gym_abort(
+      paste0("The policy takes action ", state_numbers(model$action_space)[[at[[2L]]]],
+             " in state ", state_numbers(model$observation_space)[[at[[1L]]]],
+             ", where the model does not have it."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+  probabilities[barred] <- 0
+  probabilities
+}
+
+possible_actions <- function(model) {
+  possible <- matrix(FALSE, length(model$start), as.integer(model$action_space$n))
+  table <- model$transitions
+  possible[cbind(state_rows(model, table$state), action_columns(model, table$action))] <- TRUE
+  possible
+}
+
+check_policy_matrix <- function(policy, possible, call) {
+  good <- identical(dim(policy), dim(possible)) && all(are_probabilities(policy)) &&
+    all(abs(rowSums(policy) - 1) < sum_tolerance | rowSums(possible) == 0)
+  if (!good) {
+    must <- paste0("a matrix of probabilities, with ", count_of(nrow(possible), "row"), " and ",
+                   count_of(ncol(possible), "column"), ", each row of which adds up to 1")
+    abort_argument(policy, must, "policy", call)
+  }
+  policy
+}
+
+rows_of_actions <- function(actions, model, arg, call) {
+  columns <- action_columns(model, actions)
+  count <- as.integer(model$action_space$n)
+  if (length(actions) != length(model$start) || anyNA(columns) || any(columns < 1L) ||
+        any(columns > count) || any(actions != trunc(actions))) {
+    must <- paste("the number of an action for each of", count_of(length(model$start), "state"))
+    abort_argument(actions, must, arg, call)
+  }
+  probabilities <- matrix(0, length(actions), count)
+  probabilities[cbind(seq_along(actions), columns)] <- 1
+  probabilities
+}
+
+# How likely a policy takes each action in each state of a model that it is bound to.
+policy_probabilities <- function(policy, model, call) UseMethod("policy_probabilities")
+
+#' @exportS3Method
+policy_probabilities.default <- function(policy, model, call) {
+  states <- state_numbers(model$observation_space)
+  possible <- rowSums(possible_actions(model)) > 0
+  # States that no action leaves are never asked about in play.
+  asked <- states[possible]
+  here <- list(
+    observation_space = model$observation_space, action_space = model$action_space,
+    spec = model$spec, call = call
+  )
+  actions <- rep(as.integer(model$action_space$start), length(states))
+  actions[possible] <- as.integer(
+    keep_random_state(act_batch(policy, asked, length(asked), here))
+  )
+  rows_of_actions(actions, model, "policy", call)
+}
+
+#' @exportS3Method
+policy_probabilities.gym_policy_random <- function(policy, model, call) {
+  possible <- possible_actions(model)
+  possible / pmax(rowSums(possible), 1)
+}
+
+#' @exportS3Method
+policy_probabilities.gym_policy_table <- function(policy, model, call) {
+  row_probabilities(policy, policy$q)
+}

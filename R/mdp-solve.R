@@ -1,0 +1,254 @@
+#' Solve a model
+#'
+#' Calculates how much each state of a model is worth, exactly: by the best policy, which is found
+#' on the way, or by one that is given.
+#'
+#' # Whose value it is
+#'
+#' Three numbers can be meant by the value of an environment whose episodes are cut off, and the
+#' result prints those that it has, for the start:
+#'
+#' - The endless one, as if episodes were never cut off. It is what `solve_mdp(model)` calculates.
+#' - That of the same policy when episodes are cut off after the model's `max_episode_steps`: what
+#'   playing it comes to. A policy that looks only at the state is meant, as all policies here do.
+#' - That of the best policy that also counts the steps, and acts otherwise when few are left. It
+#'   is what `solve_mdp(model, horizon = )` calculates, and no policy comes to more.
+#'
+#' Gymnasium does not count steps in the observation, so the second is what an agent can hope for,
+#' and its best policy is in general neither that of the first nor of the third.
+#'
+#' # Methods
+#'
+#' Value iteration applies Bellman's equation to all states at once until the values no longer
+#' change (by more than a part in 10^13). Policy iteration solves the linear equations of a policy,
+#' improves it, and so on. Where several actions are worth the same, which is common with a discount
+#' of 1, some may lead in circles for ever; those are taken that end episodes in the fewest steps.
+#'
+#' @param model A model, see [gym_model()], or an environment that has one, as for [env_model()].
+#' @param policy The policy to value: a [policy_table()] or another policy, a vector with the number
+#'   of an action for each state, or a matrix of probabilities with a row for each state and a
+#'   column for each action. `NULL`, the default, for the best one.
+#' @param discount The discount, by which a reward counts less with each step that it is away, a
+#'   number above 0 and at most 1, the default.
+#' @param horizon After how many steps everything ends, a whole number; `NULL`, the default, for
+#'   never.
+#' @param method `"value_iteration"`, the default, or `"policy_iteration"`; with a policy or a
+#'   horizon it makes no difference.
+#' @param trace Keep the values after each sweep? `FALSE`, the default, or `TRUE`.
+#' @return An object of class `gym_solution`, which [print()], [as.data.frame()], [predict()] and
+#'   [plot()][plot.gym_solution()] know; a list with the elements
+#'   \describe{
+#'     \item{values}{The value of each state, a numeric vector with the states' numbers as names;
+#'       with a horizon when all its steps are to go.}
+#'     \item{q}{The value of each action in each state, a matrix with a row for each state and a
+#'       column for each action; `-Inf` where it cannot be taken.}
+#'     \item{actions}{The numbers of the actions that are taken, an integer vector; with a horizon a
+#'       matrix with a column for each step, the first being the first step. `NULL` where a policy
+#'       was given.}
+#'     \item{policy}{The policy that plays so, a [policy_table()], or the one given. `NULL` with a
+#'       horizon, because such a policy counts steps.}
+#'     \item{start_value}{The value of the start, a number: the mean of the values over where
+#'       episodes start.}
+#'     \item{limited}{The value of the start when the policy's episodes are cut off after the
+#'       model's `max_episode_steps`, a number; `NULL` where there is no such limit, or with a
+#'       horizon.}
+#'     \item{trace}{The values after each sweep, a matrix with a row for each, of which the first
+#'       are the values 0; `NULL` without `trace = TRUE`.}
+#'     \item{model, discount, horizon, method, sweeps}{As given, and how many sweeps it took.}
+#'   }
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a model
+#'   whose values have no end: one without an end, or one in which rewards go on for ever, and
+#'   neither a discount below 1 nor a horizon.
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press, chapter 4.
+#' @seealso [evaluate_policy()][evaluate_policy.gym_model()], which judges several policies by a
+#'   model
+#' @export
+#' @examples
+#' walk <- gym_model(data.frame(
+#'   state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+#'   reward = c(0, 0, 0, 1)
+#' ), start = 1)
+#' solve_mdp(walk)
+#' solve_mdp(walk, policy = policy_random())$values
+#'
+#' @examplesIf gym:::can_start_server()
+#' solved <- solve_mdp("FrozenLake-v1")
+#' solved
+#' plot(solved)
+#' solve_mdp("FrozenLake-v1", horizon = 100)
+solve_mdp <- function(model, policy = NULL, discount = 1, horizon = NULL,
+                      method = c("value_iteration", "policy_iteration"), trace = FALSE) {
+  model <- as_model(model)
+  check_discount(discount)
+  check_count(horizon, allow_null = TRUE)
+  method <- check_choice(method[1L], c("value_iteration", "policy_iteration"), arg = "method")
+  check_flag(trace)
+  call <- rlang::current_env()
+  backup <- backup_of(model)
+  probabilities <- if (!is.null(policy)) policy_matrix(policy, model, call)
+  if (is.null(horizon) && is.null(policy) && discount == 1) {
+    check_has_end(backup, model, call)
+  }
+  notes <- new_sweep_notes(backup, trace)
+  found <- if (!is.null(horizon)) {
+    solve_horizon(backup, horizon, discount, probabilities, notes)
+  } else if (!is.null(policy)) {
+    list(values = policy_values(backup, probabilities, discount), sweeps = 0L)
+  } else {
+    iterate <- if (method == "value_iteration") iterate_values else iterate_policies
+    iterate(backup, discount, notes$see, call)
+  }
+  new_solution(model, backup, found, policy, probabilities, discount, horizon, method, notes)
+}
+
+check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!is_number(x) || x <= 0 || x > 1) {
+    abort_argument(x, "a number above 0 and at most 1", arg, call)
+  }
+}
+
+check_has_end <- function(backup, model, call) {
+  ends <- any(backup$probability > 0 & backup$terminated) || any(rowSums(
+    array(backup$possible, c(backup$states, backup$actions))
+  ) == 0)
+  if (!ends && any(backup$expected != 0)) {
+    gym_abort(
+      c(paste0("Episodes of ", model$spec$id, " have no end, and without a discount their values ",
+               "have none either."),
+        i = "Give a `discount` below 1, or a `horizon`."),
+      class = "gym_error_argument", argument = "discount", value = 1, call = call
+    )
+  }
+}
+
+# Keeps the values of each sweep, where they are wanted, and the actions.
+new_sweep_notes <- function(backup, trace) {
+  notes <- rlang::env(trace = if (trace) list(numeric(backup$states)), choices = list())
+  notes$see <- function(values, q) {
+    if (trace) notes$trace[[length(notes$trace) + 1L]] <- values
+  }
+  notes
+}
+
+# The sweep after which i steps are to go chooses the action of the i-th step from the end.
+solve_horizon <- function(backup, horizon, discount, probabilities, notes) {
+  best <- is.null(probabilities)
+  values_of <- if (best) best_values else function(q) mean_values(q, probabilities)
+  values <- horizon_values(backup, horizon, discount, values_of, function(values, q) {
+    notes$see(values, q)
+    notes$q <- q
+    if (best) notes$choices[[length(notes$choices) + 1L]] <- best_choice(q)
+  })
+  list(values = values, sweeps = horizon, q = notes$q)
+}
+
+# The number of the best action in each state, from 1; of equal ones, up to rounding, the first.
+best_choice <- function(q) max.col(q >= row_max(q) - tie_tolerance(q), "first")
+
+tie_tolerance <- function(q) 1e-9 * max(1, abs(q[is.finite(q)]))
+
+new_solution <- function(model, backup, found, policy, probabilities, discount, horizon, method,
+                         notes) {
+  q <- found$q %||% action_values(backup, found$values, discount)
+  first_action <- as.integer(model$action_space$start)
+  actions <- NULL
+  if (is.null(policy)) {
+    choice <- if (is.null(horizon)) {
+      tied <- q >= row_max(q) - tie_tolerance(q) & q > -Inf
+      ending_choice(backup, tied)
+    } else {
+      do.call(cbind, rev(notes$choices))
+    }
+    actions <- choice + first_action - 1L
+    if (is.null(horizon)) {
+      probabilities <- choice_probabilities(backup, choice)
+      policy <- table_policy_of(model, probabilities)
+    }
+  }
+  limit <- model$spec$max_episode_steps
+  limited <- if (!is.null(limit) && is.null(horizon)) {
+    values_of <- function(q) mean_values(q, probabilities)
+    start_mean(model, horizon_values(backup, limit, discount, values_of))
+  }
+  structure(
+    list(
+      values = stats::setNames(found$values, names(model$start)),
+      q = array(q, dim(q), list(names(model$start), state_numbers(model$action_space))),
+      actions = actions, policy = if (is.null(horizon)) policy,
+      start_value = start_mean(model, found$values), limited = limited,
+      trace = if (!is.null(notes$trace)) do.call(rbind, notes$trace),
+      model = model, discount = discount, horizon = horizon,
+      method = if (is.null(policy) && is.null(horizon) || !is.null(actions)) method,
+      sweeps = as.integer(found$sweeps)
+    ),
+    class = "gym_solution"
+  )
+}
+
+# A policy that takes the actions with the largest probabilities, of the model's spaces.
+table_policy_of <- function(model, probabilities) {
+  nowhere <- rowSums(probabilities) == 0
+  probabilities[nowhere, 1L] <- 1
+  policy_bind(policy_table(probabilities), model)
+}
+
+start_mean <- function(model, values) {
+  starts <- model$start > 0
+  sum(model$start[starts] * values[starts])
+}
+
+# Methods -----------------------------------------------------------------------------
+
+#' @export
+print.gym_solution <- function(x, ...) {
+  how <- if (is.null(x$actions)) {
+    "the policy's values"
+  } else if (!is.null(x$horizon)) {
+    "the best policy that counts steps"
+  } else {
+    paste0("by ", sub("_", " ", x$method), ", ", count_of(x$sweeps, "sweep"))
+  }
+  cat("Solution of ", x$model$spec$id, ": ", count_of(length(x$values), "state"), ", ",
+      count_of(ncol(x$q), "action"), ", discount ", number_text(x$discount), " (", how, ")\n",
+      sep = "")
+  cat("Value of the start:\n")
+  rows <- c(stats::setNames(x$start_value, solution_meaning(x)))
+  if (!is.null(x$limited)) {
+    limit <- x$model$spec$max_episode_steps
+    rows[[paste("the same policy, cut off after", count_of(limit, "step"))]] <- x$limited
+  }
+  cat(paste0("  ", format(names(rows)), "  ", vapply(rows, format, "", digits = 6L)), sep = "\n")
+  invisible(x)
+}
+
+solution_meaning <- function(x) {
+  if (is.null(x$horizon)) {
+    "endless"
+  } else if (is.null(x$actions)) {
+    paste("the policy, within", count_of(x$horizon, "step"))
+  } else {
+    paste("within", count_of(x$horizon, "step"), "by a policy that counts them")
+  }
+}
+
+#' @export
+as.data.frame.gym_solution <- function(x, row.names = NULL, optional = FALSE, ...) {
+  data.frame(
+    state = state_numbers(x$model$observation_space), value = unname(x$values),
+    action = if (is.null(x$actions)) NA_integer_ else as.matrix(x$actions)[, 1L],
+    row.names = row.names
+  )
+}
+
+#' @export
+predict.gym_solution <- function(object, newdata, ...) {
+  if (is.null(object$policy)) {
+    gym_abort(
+      c("The policy of a solution with a horizon counts steps, and acts by more than the state.",
+        i = "Its element `actions` has an action for each state and step."),
+      class = "gym_error_argument", argument = "object", value = object
+    )
+  }
+  act(object$policy, newdata)
+}

@@ -1,0 +1,168 @@
+#' Act by a table
+#'
+#' Makes a policy of a table with a row for each observation (a state) and a column for each action:
+#' in each state it takes the action with the largest value there, the first of several. With
+#' `epsilon` it explores: with this probability it draws any action instead, each equally likely
+#' (Sutton and Barto 2018, section 2.2). With `temperature` it draws each action with a probability
+#' that is proportional to `exp(value / temperature)` (softmax, or Boltzmann, exploration).
+#'
+#' Observations are Discrete, MultiDiscrete, MultiBinary, or a Tuple or Dict of these. The rows are
+#' in the order of a Discrete's numbers; of several numbers the last one changes first.
+#'
+#' @param q A numeric matrix with a row for each state and a column for each action: values, or
+#'   anything else of which larger is better. `-Inf` for an action that cannot be taken.
+#' @param epsilon How often it explores, a number from 0, the default, to 1.
+#' @param temperature The temperature of the softmax, a number above 0; `NULL`, the default, for
+#'   none.
+#' @return A policy of class `gym_policy_table`, for [act()], [rollout()] and [evaluate_policy()].
+#' @section Errors: `gym_error_argument` for a table that is no such matrix, or that does not have
+#'   the rows and columns that the environment it is played in needs.
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press.
+#' @seealso [solve_mdp()], which finds the best one where the model is known
+#' @export
+#' @examples
+#' # Two states, three actions.
+#' policy <- policy_table(rbind(c(0, 1, 0), c(2, 0, 0)))
+#' act(policy, c(0, 1, 1))
+policy_table <- function(q, epsilon = 0, temperature = NULL) {
+  if (!is.matrix(q) || !is.numeric(q) || !length(q) || anyNA(q)) {
+    abort_argument(q, "a numeric matrix without missing values", "q", rlang::current_env())
+  }
+  check_number(epsilon, min = 0, max = 1)
+  if (!is.null(temperature)) check_above_zero(temperature)
+  nowhere <- rowSums(q > -Inf) == 0
+  if (any(nowhere)) {
+    gym_abort(
+      paste0("Row ", which(nowhere)[[1L]], " of `q` leaves no action: all its values are -Inf."),
+      class = "gym_error_argument", argument = "q", value = q
+    )
+  }
+  structure(
+    list(
+      q = unname(q), epsilon = epsilon, temperature = temperature,
+      observation_space = NULL, action_space = NULL
+    ),
+    class = c("gym_policy_table", "gym_policy")
+  )
+}
+
+#' @export
+act.gym_policy_table <- function(policy, observation, ...) {
+  space <- policy$observation_space %||% space_discrete(nrow(policy$q))
+  if (!is_stackable(space)) {
+    batch <- batch_of(space, list(observation))
+    return(act_batch(policy, batch, 1L, NULL))
+  }
+  rows <- observation_rows(observation, space)
+  values <- if (length(space$shape)) rows$values else rows$values[, 1L]
+  act_batch(policy, values, nrow(rows$values), NULL)
+}
+
+#' @exportS3Method
+act_batch.gym_policy_table <- function(policy, observation, n, vector_env) {
+  rows <- table_rows(policy, observation, n)
+  start <- policy$action_space$start %||% 0L
+  as.integer(draw_table_actions(policy, rows) - 1L + start)
+}
+
+# The rows of the table for some observations.
+table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
+  index <- space_index(policy$observation_space %||% space_discrete(nrow(policy$q)))
+  number <- index$index(observation, n)
+  beyond <- is.na(number) | number < 1L | number > nrow(policy$q)
+  if (any(beyond)) {
+    gym_abort(
+      paste0("The policy's table has no row for the observation ",
+             describe_value(observation[beyond][[1L]]), "."),
+      class = "gym_error_argument", argument = "observation", value = observation, call = call
+    )
+  }
+  policy$q[number, , drop = FALSE]
+}
+
+# The numbers, from 1, of the actions that are taken. How much is drawn does not depend on the
+# values.
+draw_table_actions <- function(policy, rows) {
+  n <- nrow(rows)
+  if (!is.null(policy$temperature)) {
+    return(draw_by_row(row_probabilities(policy, rows)))
+  }
+  choice <- max.col(rows, "first")
+  if (policy$epsilon > 0) {
+    explores <- stats::runif(n) < policy$epsilon
+    anything <- draw_by_row((rows > -Inf) / rowSums(rows > -Inf))
+    choice[explores] <- anything[explores]
+  }
+  choice
+}
+
+# How likely each action is, a row for each state.
+row_probabilities <- function(policy, rows) {
+  if (!is.null(policy$temperature)) {
+    weight <- exp((rows - row_max(rows)) / policy$temperature)
+    return(weight / rowSums(weight))
+  }
+  possible <- rows > -Inf
+  p <- policy$epsilon * possible / rowSums(possible)
+  best <- cbind(seq_len(nrow(rows)), max.col(rows, "first"))
+  p[best] <- p[best] + 1 - policy$epsilon
+  p
+}
+
+# Draws a column for each row of a matrix of probabilities.
+draw_by_row <- function(p) {
+  u <- stats::runif(nrow(p))
+  choice <- rep(1L, nrow(p))
+  below <- numeric(nrow(p))
+  last <- max.col(p > 0, "last")
+  for (column in seq_len(ncol(p) - 1L)) {
+    below <- below + p[, column]
+    choice <- choice + (u >= below)
+  }
+  # The sum of the probabilities may be a little below 1.
+  pmin(choice, last)
+}
+
+# The largest number in each row.
+row_max <- function(x) x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
+
+#' @exportS3Method
+policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {
+  env <- one_sub_env(env)
+  states <- table_index(env$observation_space, "observations", call)$count
+  if (!inherits(env$action_space, "gym_space_discrete")) {
+    abort_table(
+      policy, paste("A table cannot have a column for each action of", format(env$action_space)),
+      call
+    )
+  }
+  actions <- as.double(env$action_space$n)
+  if (nrow(policy$q) != states || ncol(policy$q) != actions) {
+    abort_table(policy, paste0(
+      "The policy's table has ", count_of(nrow(policy$q), "row"), " and ",
+      count_of(ncol(policy$q), "column"), ", but ", environment_label(env), " has ",
+      count_of(states, "state"), " and ", count_of(actions, "action")
+    ), call)
+  }
+  policy$observation_space <- env$observation_space
+  policy$action_space <- env$action_space
+  policy
+}
+
+abort_table <- function(policy, problem, call) {
+  gym_abort(
+    paste0(problem, "."), class = "gym_error_argument", argument = "policy", value = policy,
+    call = call
+  )
+}
+
+#' @export
+format.gym_policy_table <- function(x, ...) {
+  how <- c(
+    paste0("table ", nrow(x$q), " x ", ncol(x$q)),
+    if (x$epsilon > 0) paste("epsilon", number_text(x$epsilon)),
+    if (!is.null(x$temperature)) paste("softmax of temperature", number_text(x$temperature))
+  )
+  paste(how, collapse = ", ")
+}

@@ -1,0 +1,90 @@
+# The values of a space numbered 1, 2, ..., for tables with a row for each: a Discrete, and what is
+# put together of several.
+
+#' How many values a space has, and where each stands
+#'
+#' @return A list: `count`, a number, and `index`, a function of a batch of values and how many they
+#'   are that returns their numbers, from 1. `NULL` where the values cannot be counted.
+#' @noRd
+space_index <- function(space) UseMethod("space_index")
+
+#' @exportS3Method
+space_index.default <- function(space) NULL
+
+#' @exportS3Method
+space_index.gym_space_discrete <- function(space) {
+  start <- space$start
+  list(count = as.double(space$n), index = function(batch, n) as.integer(batch - start + 1))
+}
+
+#' @exportS3Method
+space_index.gym_space_multidiscrete <- function(space) {
+  digits_index(as.double(space$nvec), as.double(space$start %||% 0), length(space$shape))
+}
+
+#' @exportS3Method
+space_index.gym_space_multibinary <- function(space) {
+  digits_index(rep(2, prod(space$shape)), 0, length(space$shape))
+}
+
+# Numbers of several digits, of which the last one changes first, as in Gymnasium's own arrays.
+digits_index <- function(nvec, start, rank) {
+  weights <- rev(cumprod(c(1, rev(nvec))))[-1L]
+  list(
+    count = prod(nvec),
+    index = function(batch, n) {
+      # Row by row, as `nvec` is.
+      if (rank > 1L) batch <- aperm(batch, c(1L, rank:2 + 1L))
+      digits <- matrix(batch, n) - rep(start, each = if (length(start) > 1L) n else 1L)
+      as.integer(drop(digits %*% weights) + 1)
+    }
+  )
+}
+
+#' @exportS3Method
+space_index.gym_space_tuple <- function(space) parts_index(space)
+
+#' @exportS3Method
+space_index.gym_space_dict <- function(space) parts_index(space)
+
+parts_index <- function(space) {
+  parts <- lapply(space$spaces, space_index)
+  if (any(vapply(parts, is.null, NA))) {
+    return(NULL)
+  }
+  counts <- vapply(parts, function(part) part$count, 0)
+  weights <- rev(cumprod(c(1, rev(counts))))[-1L]
+  list(
+    count = prod(counts),
+    index = function(batch, n) {
+      each <- Map(function(part, values) part$index(values, n) - 1, parts, batch)
+      as.integer(Reduce(`+`, Map(`*`, each, weights)) + 1)
+    }
+  )
+}
+
+# The index of a space that a table is to have rows for.
+table_index <- function(space, what, call) {
+  index <- space_index(space)
+  if (is.null(index)) {
+    gym_abort(
+      c(paste0("A table needs ", what, " that can be counted, and ", format(space), " cannot."),
+        i = paste("Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these."),
+        i = "For observations in a Box there are networks and features."),
+      class = "gym_error_argument", value = space, call = call
+    )
+  }
+  if (index$count > most_values) {
+    gym_abort(
+      paste0("A table for ", format(space), " would have ",
+             format(index$count, big.mark = ",", scientific = FALSE),
+             " rows; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+             " are possible."),
+      class = "gym_error_argument", value = space, call = call
+    )
+  }
+  index
+}
+
+# A table of that many rows and four columns takes a third of a gigabyte.
+most_values <- 1e7

@@ -1,0 +1,173 @@
+"""The transition model of an environment that has a table of it, as Gymnasium's toy-text ones do.
+
+The table is the environment's ``P``, where ``P[state][action]`` lists ``(probability, next_state,
+reward, terminated)``. Beside it ``initial_state_distrib`` holds the probability of each state to be
+the first of an episode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Discrete
+
+from gym_server.envs.wrappers import changing_wrapper
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+
+_COLUMNS = ("state", "action", "next_state", "probability", "reward", "terminated")
+
+# The largest map of FrozenLake that can be made has 750,000 of them.
+_MOST_TRANSITIONS = 1_000_000
+
+# How far from 1 the sum of probabilities may be that were rounded.
+_ROUNDING = 1e-6
+
+
+def transition_model(env: gymnasium.Env, env_id: str) -> dict:
+    """Return the transition model of an environment; a limit of time is no part of it.
+
+    Args:
+        env: the environment, with its wrappers.
+        env_id: its name, for the errors.
+
+    Returns:
+        ``{"num_states", "num_actions", "start", "state", "action", "next_state", "probability",
+        "reward", "terminated"}``, all of them Python's own numbers: how many states and actions
+        there are; the probability of each state to be the first; and columns with one element for
+        each transition of a probability above 0, by state, action, and the order in the table.
+
+    Raises:
+        GymServerError: ``not_supported``.
+    """
+    base = env.unwrapped
+    table = getattr(base, "P", None)
+    start = getattr(base, "initial_state_distrib", None)
+    num_states, num_actions = _size(base.observation_space), _size(base.action_space)
+    if not isinstance(table, dict) or start is None or not num_states or not num_actions:
+        raise GymServerError(
+            "not_supported",
+            f"{env_id} has no table of its transitions",
+            "FrozenLake, CliffWalking and Taxi have one, and so has every environment with the "
+            "attributes P and initial_state_distrib and Discrete spaces that begin at 0",
+        )
+    _check_table_holds(env, env_id)
+    try:
+        first = _start(start, num_states)
+        columns = _columns(_transitions(table, num_states, num_actions), env_id)
+    except _UnsoundError as fault:
+        raise GymServerError(
+            "not_supported",
+            f"The table of the transitions of {env_id} is unsound: {fault}",
+            "P[state][action] must list (probability, next_state, reward, terminated), and "
+            "probabilities must add up to 1; its arguments may be the reason",
+        ) from None
+    return {"num_states": num_states, "num_actions": num_actions, "start": first, **columns}
+
+
+def _size(space: gymnasium.Space) -> int:
+    """Return how many members a Discrete space has that begins at 0; 0 for any other space."""
+    return int(space.n) if isinstance(space, Discrete) and space.start == 0 else 0
+
+
+def _check_table_holds(env: gymnasium.Env, env_id: str) -> None:
+    """Refuse an environment that moves in other ways than its table says."""
+    wrapper = changing_wrapper(env)
+    if wrapper is not None:
+        raise GymServerError(
+            "not_supported",
+            f"The table of the transitions of {env_id} does not hold with its wrapper {wrapper}",
+            "create it without this wrapper; TimeLimit and RecordEpisodeStatistics may stay",
+        )
+    # Taxi's passenger changes the destination after the move that the table has, and whether that
+    # will happen is not a part of the state.
+    if getattr(env.unwrapped, "fickle_passenger", False):
+        raise GymServerError(
+            "not_supported",
+            f"The table of the transitions of {env_id} does not hold with a fickle_passenger",
+            "create it without fickle_passenger",
+        )
+
+
+class _UnsoundError(Exception):
+    """A table is none of a transition model."""
+
+
+def _start(distribution: object, num_states: int) -> list[float]:
+    if isinstance(distribution, np.ndarray):
+        distribution = distribution.tolist()
+    if not isinstance(distribution, (list, tuple)) or len(distribution) != num_states:
+        raise _UnsoundError(
+            f"initial_state_distrib must hold a probability for each of the {num_states} states"
+        )
+    start = [_number(probability) for probability in distribution]
+    if not all(probability >= 0 for probability in start):
+        raise _UnsoundError("initial_state_distrib holds something that is no probability")
+    _check_sum("initial_state_distrib", sum(start))
+    return start
+
+
+def _columns(transitions: Iterable[tuple], env_id: str) -> dict[str, list]:
+    columns: list[list] = [[] for _ in _COLUMNS]
+    appends = [column.append for column in columns]
+    for count, transition in enumerate(transitions):
+        if count == _MOST_TRANSITIONS:
+            raise GymServerError(
+                "not_supported",
+                f"{env_id} has more than {_MOST_TRANSITIONS:,} transitions, the most that an "
+                "answer may hold",
+                "create one with fewer states",
+            )
+        for append, value in zip(appends, transition, strict=True):
+            append(value)
+    return dict(zip(_COLUMNS, columns, strict=True))
+
+
+def _transitions(table: dict, num_states: int, num_actions: int) -> Iterator[tuple]:
+    for state in range(num_states):
+        actions = table.get(state)
+        for action in range(num_actions):
+            name = f"P[{state}][{action}]"
+            outcomes = actions.get(action) if isinstance(actions, dict) else None
+            if not isinstance(outcomes, (list, tuple)):
+                raise _UnsoundError(f"{name} is no list")
+            total = 0.0
+            for outcome in outcomes:
+                probability, next_state, reward, terminated = _read(outcome, num_states, name)
+                total += probability
+                if probability > 0:
+                    yield state, action, next_state, probability, reward, terminated
+            _check_sum(name, total)
+
+
+def _read(outcome: object, num_states: int, name: str) -> tuple[float, int, float, bool]:
+    if isinstance(outcome, (list, tuple)) and len(outcome) == 4:
+        probability, next_state, reward = map(_number, outcome[:3])
+        terminated = outcome[3]
+        if (
+            probability >= 0
+            and 0 <= next_state < num_states
+            and next_state.is_integer()
+            and math.isfinite(reward)
+            and isinstance(terminated, (bool, np.bool_))
+        ):
+            return probability, int(next_state), reward, bool(terminated)
+    raise _UnsoundError(f"{name} holds {brief(outcome)}")
+
+
+def _number(value: object) -> float:
+    """Return a number as a float; NaN for what is none."""
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            pass
+    return math.nan
+
+
+def _check_sum(name: str, total: float) -> None:
+    if abs(total - 1) > _ROUNDING:
+        raise _UnsoundError(f"the probabilities in {name} add up to {total:g}")

@@ -1,0 +1,130 @@
+test_that("both methods find the best values, and the actions that have them", {
+  for (method in c("value_iteration", "policy_iteration")) {
+    solved <- solve_mdp(walk_model(), discount = 0.9, method = method)
+    expect_equal(unname(solved$values), c(0, 0.9, 1, 0), tolerance = 1e-12)
+    expect_identical(solved$actions[2:3], c(1L, 1L))
+    expect_equal(solved$start_value, 0.9, tolerance = 1e-12)
+  }
+})
+
+test_that("the value of a given policy solves its equations", {
+  # The random walk of Sutton and Barto's example 6.2 with two states: 1/3 and 2/3.
+  solved <- solve_mdp(walk_model(), policy = policy_random())
+  expect_equal(unname(solved$values), c(0, 1, 2, 0) / 3, tolerance = 1e-12)
+  expect_null(solved$actions)
+  by_matrix <- solve_mdp(walk_model(), policy = matrix(0.5, 4, 2))
+  expect_equal(by_matrix$values, solved$values)
+  # Always to the left.
+  expect_equal(unname(solve_mdp(walk_model(), policy = c(0, 0, 0, 0))$values), numeric(4))
+  by_function <- solve_mdp(walk_model(), policy = function(state) as.integer(state > 0))
+  expect_equal(unname(by_function$values), c(0, 1, 1, 0))
+})
+
+test_that("rewards that go on for ever have no finite value, and are told apart", {
+  endless <- solve_mdp(endless_model(-1), policy = c(0, 0))
+  expect_identical(unname(endless$values), c(-Inf, 0))
+  expect_identical(unname(solve_mdp(endless_model(2), policy = c(0, 0))$values), c(Inf, 0))
+  # Going on without a reward is worth nothing.
+  expect_identical(unname(solve_mdp(endless_model(0), policy = c(0, 0))$values), c(0, 0))
+  expect_equal(solve_mdp(endless_model(-1), policy = c(0, 0), discount = 0.5)$start_value, -2)
+  # The best policy ends it.
+  expect_equal(solve_mdp(endless_model(-1))$start_value, 5)
+})
+
+test_that("values without an end are refused, with what to give", {
+  circle <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = 1))
+  expect_error(solve_mdp(circle), "have no end.*`discount` below 1, or a `horizon`",
+               class = "gym_error_argument")
+  expect_equal(solve_mdp(circle, discount = 0.5)$start_value, 2)
+  expect_equal(solve_mdp(circle, horizon = 7)$start_value, 7)
+  for (method in c("value_iteration", "policy_iteration")) {
+    expect_error(solve_mdp(endless_model(2), method = method), "do not settle",
+                 class = "gym_error_argument")
+  }
+})
+
+test_that("of equal actions those are taken by which episodes end soonest", {
+  # Without a discount it is worth the same to go the long way, or round in circles.
+  table <- data.frame(
+    state = c(0, 0, 0, 1, 1), action = c(0, 1, 2, 0, 1), next_state = c(0, 1, 2, 0, 2),
+    reward = c(0, 0, 1, 0, 1), terminated = c(FALSE, FALSE, TRUE, FALSE, TRUE)
+  )
+  for (method in c("value_iteration", "policy_iteration")) {
+    solved <- solve_mdp(gym_model(table, start = 0), method = method)
+    expect_identical(solved$actions[1:2], c(2L, 1L))
+  }
+  expect_equal(evaluate_policy(solved$model, solved$policy)$mean_length, 1)
+})
+
+test_that("with a horizon the best action depends on the steps that are left", {
+  # A reward of 1 a step, or 3 at once, which ends it.
+  model <- gym_model(data.frame(
+    state = c(0, 0), action = c(0, 1), next_state = c(0, 1), reward = c(1, 3)
+  ), start = 0)
+  solved <- solve_mdp(model, horizon = 5)
+  expect_equal(solved$start_value, 7)
+  expect_identical(solved$actions[1, ], c(0L, 0L, 0L, 0L, 1L))
+  expect_null(solved$policy)
+  expect_error(predict(solved, 0), "counts steps", class = "gym_error_argument")
+  expect_equal(solve_mdp(model, policy = c(0, 0), horizon = 5)$start_value, 5)
+  expect_output(print(solved), "within 5 steps by a policy that counts them  7", fixed = TRUE)
+})
+
+test_that("the sweeps are kept on request, as a lecture draws them", {
+  solved <- solve_mdp(walk_model(), trace = TRUE)
+  expect_identical(
+    solved$trace, rbind(numeric(4), c(0, 0, 1, 0), c(0, 1, 1, 0), c(0, 1, 1, 0))
+  )
+  expect_identical(nrow(solved$trace), solved$sweeps + 1L)
+  expect_identical(dim(solve_mdp(walk_model(), horizon = 6, trace = TRUE)$trace), c(7L, 4L))
+  expect_null(solve_mdp(walk_model())$trace)
+})
+
+test_that("a solution is a table, a policy and a print", {
+  solved <- solve_mdp(walk_model(id = "Walk", max_episode_steps = 1))
+  expect_identical(
+    as.data.frame(solved),
+    data.frame(state = 0:3, value = c(0, 1, 1, 0), action = c(0L, 1L, 1L, 0L))
+  )
+  expect_identical(act(solved$policy, c(1L, 2L)), c(1L, 1L))
+  # One step does not suffice.
+  expect_identical(solved$limited, 0)
+  expect_output(print(solved), "the same policy, cut off after 1 step  0", fixed = TRUE)
+})
+
+test_that("policies that do not fit the model are refused", {
+  refused <- function(policy, text) {
+    expect_error(solve_mdp(walk_model(), policy = policy), text, class = "gym_error_argument",
+                 fixed = TRUE)
+  }
+  refused(c(0, 1), "the number of an action for each of 4 states")
+  refused(c(0, 1, 2, 0), "the number of an action for each of 4 states")
+  refused(matrix(0.5, 2, 2), "a matrix of probabilities, with 4 rows and 2 columns")
+  refused(policy_table(matrix(0, 3, 2)), "has 4 states and 2 actions")
+  barred <- gym_model(walk_table()[-3, ], start = 1)
+  expect_error(solve_mdp(barred, policy = c(0, 0, 0, 0)),
+               "takes action 0 in state 2, where the model does not have it",
+               class = "gym_error_argument")
+  expect_error(solve_mdp(walk_model(), discount = 1.5), "above 0 and at most 1",
+               class = "gym_error_argument")
+  expect_error(solve_mdp(3), "`model` must be a model", class = "gym_error_argument")
+})
+
+test_that("a policy is evaluated exactly, several together", {
+  evaluated <- evaluate_policy(
+    walk_model(), list(random = policy_random(), right = c(1, 1, 1, 1))
+  )
+  expect_identical(row.names(evaluated), c("random", "right"))
+  expect_equal(evaluated$mean_return, c(1 / 3, 1))
+  expect_equal(evaluated$mean_length, c(2, 2))
+  expect_identical(evaluate_policy(walk_model(), c(1, 1, 1, 1), max_steps = 1)$mean_return, 0)
+  limited <- walk_model(max_episode_steps = 1)
+  expect_identical(evaluate_policy(limited, c(1, 1, 1, 1))$mean_return, 0)
+  expect_identical(evaluate_policy(limited, c(1, 1, 1, 1), max_steps = Inf)$mean_return, 1)
+  expect_equal(evaluate_policy(walk_model(), c(1, 1, 1, 1), discount = 0.5)$mean_return, 0.5)
+  # Exploring policies by the probabilities of what they draw.
+  q <- cbind(0, c(1, 1, 1, 1))
+  explores <- evaluate_policy(walk_model(), policy_table(q, epsilon = 1))
+  expect_equal(explores$mean_return, 1 / 3)
+  expect_error(evaluate_policy(walk_model(), list()), class = "gym_error_argument")
+})
