@@ -12,11 +12,12 @@
 #'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or `"cem"`), the
 #'   agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such one), of the
 #'   policy `hidden` (how many hidden neurons a network has, which are tanh and see normalised
-#'   observations, `NA` for a linear policy) and `bias` (a logical), of the training `episodes`, `steps` (its budget) and `target` (the mean return at
-#'   which it stops, which lies above the one that the environment counts as solved, so that the
-#'   final evaluation reaches that), and where they come from: `origin` is `"paper"`, with the
-#'   `source`, or `"ours"`. `tried` is how many settings were tried (an integer), with the seeds 1
-#'   to 99, before these were chosen; `vignette("solved")` reports other seeds.
+#'   observations, `NA` for a linear policy) and `bias` (a logical), of the training `episodes`,
+#'   `steps` (its budget) and `target` (the mean return at which it stops, which lies above the one
+#'   that the environment counts as solved, so that the final evaluation reaches that), and where
+#'   they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how many
+#'   settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
+#'   `vignette("solved")` reports other seeds.
 #' @section Errors: `gym_error_argument` when `env_id` is no string.
 #' @export
 #' @examples

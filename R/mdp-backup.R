@@ -7,7 +7,8 @@
 #' columns are the transitions from there, of which the last may be empty.
 #' @return A list: `states` and `actions`, how many there are; `next_state` (from 1), `probability`,
 #'   `terminated` and `weight`, matrices, the weight being the probability that the episode goes on
-#'   there; `expected`, the expected reward of each row; `possible`, whether the action can be taken.
+#'   there; `expected`, the expected reward of each row; `possible`, whether the action can be
+#'   taken.
 #' @noRd
 backup_of <- function(model) {
   table <- model$transitions

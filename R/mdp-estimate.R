@@ -47,7 +47,8 @@ estimate_model.gym_rollout <- function(x, ...) {
   }
   table <- data.frame(
     episode = paste(steps$candidate %||% 1L, steps$episode),
-    state = steps[[sub("^next_", "", after)]], action = steps$action, next_state = steps[[after]], reward = steps$reward,
+    state = steps[[sub("^next_", "", after)]], action = steps$action,
+    next_state = steps[[after]], reward = steps$reward,
     terminated = steps$terminated
   )
   model <- estimate_model(table)

@@ -21,6 +21,9 @@
 #'   none; `each`, how many episodes a candidate plays.
 #' @param keep_moments Whether to keep the moments of the observations that were acted on.
 #' @param keep_steps,keep_next Whether to keep each step, and the observation after it.
+#' @param learner `NULL`, or a list of two functions that take the place of the policy: `act` of the
+#'   observations and the numbers of their sub-environments, and `observe` of what each step came
+#'   to, see [agent_observe()].
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
 #'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`.
@@ -28,7 +31,7 @@
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
                        each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
-                       report = function(ended) NULL) {
+                       learner = NULL, report = function(ended) NULL) {
   n <- length(episodes$episode)
   at_once <- vector_env$num_envs
   batch <- rlang::env(
@@ -37,7 +40,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     steps = list(), frames = list(), target = target, each = each, report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
-    keep_next = keep_next, moments = if (keep_moments) no_moments()
+    keep_next = keep_next, learner = learner, moments = if (keep_moments) no_moments()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
@@ -84,13 +87,33 @@ play_episodes <- function(batch, first, last) {
                 return = numeric(length(episode)), began = integer(length(episode))),
     candidate = candidate, acting = policy_rows(batch$policy, candidate)
   )
-  step <- if (batch$keep_next) vector_env$step else vector_env$step_bare %||% vector_env$step
+  whole <- batch$keep_next || !is.null(batch$learner)
+  step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
     n <- length(playing$rows$episode)
-    action <- act_batch(playing$acting, playing$observation, n, vector_env)
+    action <- if (is.null(batch$learner)) {
+      act_batch(playing$acting, playing$observation, n, vector_env)
+    } else {
+      batch$learner$act(playing$observation, playing$rows$sub_env)
+    }
     out <- step(action, playing$rows$sub_env)
+    if (!is.null(batch$learner)) {
+      batch$learner$observe(transitions_of(batch, playing, action, out))
+    }
     end_step(batch, playing, action, out)
   }
+}
+
+# What a learner is told of a step. An episode that `max_steps` cuts short is truncated.
+transitions_of <- function(batch, playing, action, out) {
+  rows <- playing$rows
+  cut <- playing$taken + 1L - rows$began >= batch$max_steps
+  list(
+    observation = playing$observation, action = action, reward = out$reward,
+    next_observation = out$next_observation, terminated = out$terminated,
+    truncated = (out$truncated | cut) & !out$terminated,
+    first = rows$began == playing$taken, sub_env = rows$sub_env
+  )
 }
 
 #' Note what came of a step, and begin the next episodes where some have ended

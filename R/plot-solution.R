@@ -3,8 +3,8 @@
 #' Shows what each state is worth as a colour, which is darker the less it is, and the action that
 #' is taken there as an arrow or a letter: on the lake of FrozenLake, beside the cliff of
 #' CliffWalking, on the grid of Taxi for one passenger and destination, and on any other grid whose
-#' `columns` are given. States at which episodes are over have a cross, and those in which none ever is
-#' are grey. Other models have a point for each state.
+#' `columns` are given. States at which episodes are over have a cross, and those in which none ever
+#' is are grey. Other models have a point for each state.
 #'
 #' `autoplot()` draws the same with ggplot2, where that is installed.
 #'
@@ -62,8 +62,8 @@ taxi_stands <- data.frame(
 #' Compute what a plot of a solution shows
 #' @return A list: `cells`, a data frame with a row for each state that is shown and the columns
 #'   `state`, `value` (`NA` where no episode ever is), `text` (the value), `ends` (are episodes over
-#'   there?), `does` (what the action does), and on a grid `row` and `column`; `columns` and `rows`, `NULL` without a grid; `walls`
-#'   and `stands` of Taxi; `title`.
+#'   there?), `does` (what the action does), and on a grid `row` and `column`; `columns` and `rows`,
+#'   `NULL` without a grid; `walls` and `stands` of Taxi; `title`.
 #' @noRd
 solution_plot_data <- function(x, columns, directions, passenger, destination, step,
                                call = rlang::caller_env()) {
@@ -82,7 +82,8 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   cells$value[kinds$ends] <- 0
   cells$value[!kinds$reached & !kinds$ends] <- NA
   place <- match(cells$action, state_numbers(x$model$action_space))
-  cells$does <- ifelse(cells$ends | is.na(cells$value), "", (directions %||% state_numbers(x$model$action_space))[place])
+  cells$does <- (directions %||% state_numbers(x$model$action_space))[place]
+  cells$does[cells$ends | is.na(cells$value)] <- ""
   cells$does[is.na(cells$does)] <- ""
   data <- list(title = solution_title(x), key = range(cells$value[is.finite(cells$value)]))
   if (known == "Taxi" && is.null(columns)) {

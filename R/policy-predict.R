@@ -15,9 +15,12 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   if (inherits(policy, "gym_policy_model")) {
     return(predict_model(policy, newdata, type, call))
   }
+  if (inherits(policy, c("gym_policy_table", "gym_policy_features"))) {
+    return(predict_values(policy, newdata, type))
+  }
   if (!inherits(policy, "gym_policy_network")) {
     gym_abort(
-      paste0("`predict()` needs the policy to be a network or a model, not ", policy_text(policy),
+      paste0("`predict()` needs the policy to be a network, a table or a model, not ", policy_text(policy),
              "."),
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
@@ -29,6 +32,20 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   values <- observation_rows(observation, policy$observation_space)$values
   outputs <- network_outputs(policy, values, call)
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
+}
+
+# The output of a table, and of values that are linear in features, is a value for each action.
+predict_values <- function(policy, newdata, type) {
+  if (type == "action") {
+    return(act(policy, newdata))
+  }
+  rows <- observation_rows(newdata, policy$observation_space %||% space_discrete(nrow(policy$q)))
+  n <- nrow(rows$values)
+  if (inherits(policy, "gym_policy_table")) {
+    table_rows(policy, if (ncol(rows$values) > 1L) rows$values else rows$values[, 1L], n)
+  } else {
+    linear_values(policy$basis, policy$weights, policy$basis$of(rows$values, n))
+  }
 }
 
 # The observations in a data frame: the columns with their names, or all columns where it has none

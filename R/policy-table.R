@@ -81,18 +81,18 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   policy$q[number, , drop = FALSE]
 }
 
-# The numbers, from 1, of the actions that are taken. How much is drawn does not depend on the
-# values.
+# The numbers, from 1, of the actions that are taken.
 draw_table_actions <- function(policy, rows) {
-  n <- nrow(rows)
   if (!is.null(policy$temperature)) {
     return(draw_by_row(row_probabilities(policy, rows)))
   }
-  choice <- max.col(rows, "first")
+  choice <- best_column(rows)
   if (policy$epsilon > 0) {
-    explores <- stats::runif(n) < policy$epsilon
-    anything <- draw_by_row((rows > -Inf) / rowSums(rows > -Inf))
-    choice[explores] <- anything[explores]
+    explores <- stats::runif(length(choice)) < policy$epsilon
+    if (any(explores)) {
+      possible <- rows[explores, , drop = FALSE] > -Inf
+      choice[explores] <- draw_by_row(possible / rowSums(possible))
+    }
   }
   choice
 }
@@ -105,7 +105,7 @@ row_probabilities <- function(policy, rows) {
   }
   possible <- rows > -Inf
   p <- policy$epsilon * possible / rowSums(possible)
-  best <- cbind(seq_len(nrow(rows)), max.col(rows, "first"))
+  best <- cbind(seq_len(nrow(rows)), best_column(rows))
   p[best] <- p[best] + 1 - policy$epsilon
   p
 }
@@ -124,8 +124,12 @@ draw_by_row <- function(p) {
   pmin(choice, last)
 }
 
-# The largest number in each row.
-row_max <- function(x) x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
+# The largest number in each row, and its column, the first of several. A learner asks about one
+# row in each step.
+row_max <- function(x) {
+  if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
+}
+best_column <- function(x) if (nrow(x) == 1L) which.max(x) else max.col(x, "first")
 
 #' @exportS3Method
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {

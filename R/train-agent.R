@@ -25,7 +25,8 @@
 #'   of your own, see [agent_ask()].
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy whose weights are to be found: a network, by default
-#'   [policy_linear()]. Most agents begin with the weights that it has.
+#'   [policy_linear()]. Most agents begin with the weights that it has. A learner such as
+#'   [agent_q()] makes a policy of its own, and may begin with a [policy_table()] of values.
 #' @param iterations,steps After how many iterations, or steps of the environment, to end, whole
 #'   numbers of at least 1. The iteration in which the steps are used up is played to its end. One
 #'   of the two must be given.
@@ -97,13 +98,15 @@
 #' )
 #' trained
 #' trained$final
-train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL, steps = NULL,
+train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NULL,
                         episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
                         eval_episodes = 100, seed = NULL, seeds = NULL, ..., callback = NULL,
                         log = NULL, checkpoint = NULL, resume = TRUE,
                         progress = rlang::is_interactive(), num_envs = NULL, num_workers = NULL,
                         client = gym_client()) {
   call <- rlang::current_env()
+  check_agent(agent, call)
+  policy <- policy %||% first_policy(agent)
   settings <- structure(
     list(
       what = "training", agent = agent, env = env, kwargs = list(...), policy = policy,
@@ -122,8 +125,10 @@ train_agent <- function(agent, env, policy = policy_linear(), iterations = NULL,
   in_env <- function(use, max_steps = NULL) {
     # However few episodes an evaluation has, candidates are played side by side.
     with_vector_env(env, max(eval_episodes, least_sub_envs), use, max_steps, ...,
-                    num_envs = num_envs, num_workers = num_workers, client = client, call = call)
+                    num_envs = num_envs %||% learner_envs(agent, env), num_workers = num_workers,
+                    client = client, call = call)
   }
+  settings$model <- judging_model(settings, client)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
   if (is.null(seeds)) {
     file <- training_file(settings, files, call)
@@ -152,7 +157,11 @@ train_in <- function(vector_env, settings, file, log, progress, call) {
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings$env_id <- environment_label(vector_env)
   settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)
-  bound <- bind_with_seed(settings$policy, vector_env, settings$seed, call)
+  bound <- if (learns_online(settings$agent)) {
+    spaces_policy(settings$policy, vector_env, call)
+  } else {
+    bind_with_seed(settings$policy, vector_env, settings$seed, call)
+  }
   state <- new_training(settings$agent, settings)
   state$agent <- with_generator(state$streams$agent, agent_start(settings$agent, bound))
   check_is_agent(state$agent, "agent_start()", call)
@@ -173,12 +182,8 @@ bind_with_seed <- function(policy, vector_env, seed, call) {
 }
 
 check_training <- function(settings, call) {
-  check_agent(settings$agent, call)
   check_environment(settings$env, "env", call)
-  if (!inherits(settings$policy, "gym_policy_network")) {
-    check_policy(settings$policy, "policy", call)
-    abort_no_weights(settings$policy, "policy", call)
-  }
+  check_trained_policy(settings$policy, settings$agent, call)
   check_number(settings$steps, min = 1, allow_null = TRUE, arg = "steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   check_seed(settings$seed, "seed", call)
@@ -197,6 +202,18 @@ check_training <- function(settings, call) {
   }
   if (!is.null(settings$callback) && !is.function(settings$callback)) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
+  }
+}
+
+check_trained_policy <- function(policy, agent, call) {
+  if (learns_online(agent)) {
+    if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
+      must <- "NULL, or a table of values to begin with, as `policy_table()` makes it"
+      abort_argument(policy, must, "policy", call)
+    }
+  } else if (!inherits(policy, "gym_policy_network")) {
+    check_policy(policy, "policy", call)
+    abort_no_weights(policy, "policy", call)
   }
 }
 

@@ -44,15 +44,30 @@ finish_training.gym_training_settings <- function(settings, state, vector_env) {
   }
 }
 
-#' Play the agent's policy in fresh episodes
+#' Evaluate the agent's policy: in fresh episodes, or exactly where it is judged by a model
 #' @param kind What for: `"curve"`, `"stopping"` or `"final"`.
 #' @return A row of the training's evaluations.
 #' @noRd
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   policy <- agent_policy(state$agent)
+  final <- kind == "final"
+  played <- if (!is.null(settings$model)) {
+    evaluate_exactly(settings$model, policy, settings$max_steps)
+  } else {
+    play_evaluation(state, vector_env, settings, policy, episodes, final)
+  }
+  row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
+  row.names(row) <- NULL
+  state$evaluations[[length(state$evaluations) + 1L]] <- row
+  if (state$iteration > 0L && !final) {
+    state$history[[state$iteration]]$evaluation <- row$mean_return
+  }
+  row
+}
+
+play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {
   # The final evaluation draws from copies: a training that goes on with a larger budget evaluates
   # as one that had it from the start.
-  final <- kind == "final"
   streams <- state$evaluation_streams
   if (final) streams <- restore_streams(saved_streams(streams))
   half <- last_training_seed / 2
@@ -62,14 +77,7 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   play_batches(
     vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf
   )
-  played <- evaluate_episodes(episodes_table(history$batches), policy)
-  row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
-  row.names(row) <- NULL
-  state$evaluations[[length(state$evaluations) + 1L]] <- row
-  if (state$iteration > 0L && !final) {
-    state$history[[state$iteration]]$evaluation <- row$mean_return
-  }
-  row
+  evaluate_episodes(episodes_table(history$batches), policy)
 }
 
 # Showing ------------------------------------------------------------------------------

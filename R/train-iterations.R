@@ -99,6 +99,10 @@ run_training <- function(state, vector_env, settings, progress, call) {
 }
 
 train_iteration <- function(state, vector_env, settings, call) {
+  if (learns_online(state$agent)) {
+    results <- learn_episodes(state, vector_env, settings, call)
+    return(enter_iteration(state, settings, results$agent, results, sum(results$lengths)))
+  }
   agent <- agent_to_ask(settings, state, vector_env)
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   policy <- agent_policy(agent)
@@ -120,15 +124,22 @@ train_iteration <- function(state, vector_env, settings, call) {
   }
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
-  steps <- state$steps + sum(results$lengths) * settings$episodes
-  # An interrupt finds the iteration entered completely, or not at all.
+  episodes <- if (isTRUE(settings$keep_episodes)) episodes_table(history$batches, several = TRUE)
+  enter_iteration(
+    state, settings, agent, results, sum(results$lengths) * settings$episodes, episodes
+  )
+}
+
+# An interrupt finds the iteration entered completely, or not at all.
+enter_iteration <- function(state, settings, agent, results, steps, episodes = NULL) {
+  steps <- state$steps + steps
   suspendInterrupts({
     state$agent <- agent
     state$iteration <- state$iteration + 1L
     state$steps <- steps
     state$results <- results
-    if (isTRUE(settings$keep_episodes)) {
-      state$episodes[[state$iteration]] <- episodes_table(history$batches, several = TRUE)
+    if (!is.null(episodes)) {
+      state$episodes[[state$iteration]] <- episodes
     }
     state$history[[state$iteration]] <- list(
       iteration = state$iteration, steps = steps,

@@ -66,14 +66,22 @@ training_lines <- function(x) {
       outcome, " ", count_of(max(0L, x$history$iteration), "iteration"), ", ",
       count_of(x$steps, "step"), " in ", seconds_text(x$elapsed), target
     ),
-    if (!is.null(x$final)) {
+    if (is_exact(x$final)) {
+      paste("Expected return, by the model:", number_text(x$final$mean_return))
+    } else if (!is.null(x$final)) {
       paste0("Mean return in ", count_of(x$final$episodes, "fresh episode"), ": ",
              evaluation_text(x$final))
     }
   )
 }
 
+# Was it calculated, without playing an episode?
+is_exact <- function(row) isTRUE(row$episodes == 0)
+
 evaluation_text <- function(row) {
+  if (is_exact(row)) {
+    return(paste(number_text(row$mean_return), "(exact)"))
+  }
   paste0(number_text(row$mean_return), se_text(row$se), ", 95% interval from ",
          number_text(row$lower), " to ", number_text(row$upper))
 }
@@ -107,8 +115,9 @@ print.summary.gym_training <- function(x, ...) {
   several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
   cat(
     "",
-    paste0("The candidates of the last iteration: mean return ", number_text(last$mean_return),
-           ", from ", number_text(last$min_return), " to ", number_text(last$max_return)),
+    paste0(if (learns_online(training$agent)) "The episodes" else "The candidates",
+           " of the last iteration: mean return ", number_text(last$mean_return), ", from ",
+           number_text(last$min_return), " to ", number_text(last$max_return)),
     if (length(stopping$iteration)) {
       paste0("Stopping evaluation", several, ": ",
              evaluation_text(stopping[nrow(stopping), ]))

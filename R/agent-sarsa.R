@@ -1,0 +1,89 @@
+#' Sarsa
+#'
+#' Learns the value of what it does itself: a value moves towards the reward and the value of the
+#' action that is taken next (Rummery and Niranjan 1994; Sutton and Barto 2018, section 6.4). Beside
+#' a cliff it therefore learns to keep away from the edge, over which exploring would lead it.
+#'
+#' `expected = TRUE` takes the mean over what might be done next instead (section 6.6). `n` looks n
+#' steps ahead (section 7.2), and `lambda` over all numbers of steps, with weights that decrease, by
+#' eligibility traces (section 12.7): replacing ones, and accumulating ones for features of your
+#' own.
+#'
+#' @inheritParams agent_q
+#' @param expected Expected Sarsa? `FALSE`, the default, or `TRUE`.
+#' @param n How many steps to look ahead, a whole number of at least 1, the default.
+#' @param lambda How slowly traces fade, a number from 0, the default, to 1. Only with `n = 1`.
+#' @return `agent_sarsa()` an agent of class `gym_agent_sarsa`; `learn_sarsa()` makes that agent,
+#'   trains it and returns what [train_agent()] does.
+#' @inheritSection agent_q Errors
+#' @references G. A. Rummery and M. Niranjan (1994), On-line Q-learning using connectionist systems,
+#'   CUED/F-INFENG/TR 166, Cambridge. R. S. Sutton and A. G. Barto (2018), Reinforcement Learning:
+#'   An Introduction, second edition, MIT Press.
+#' @seealso [learn_q()], [learn_monte_carlo()], [learn_td()]
+#' @export
+#' @examples
+#' agent_sarsa(lambda = 0.9, features = tile_coding(8, 8))
+#' @examplesIf gym:::can_start_server()
+#' learn_sarsa("CliffWalking-v1", iterations = 5, learning_rate = 0.5, discount = 1, seed = 1)
+agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
+                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0) {
+  check_flag(expected)
+  check_count(n)
+  check_number(lambda, min = 0, max = 1)
+  settings <- list(
+    discount = discount, learning_rate = learning_rate, epsilon = epsilon,
+    temperature = temperature, initial = initial, features = features, expected = expected,
+    n = as.integer(n), lambda = lambda
+  )
+  check_learner(settings)
+  check_one_horizon(n, lambda)
+  new_learner("gym_agent_sarsa", settings)
+}
+
+check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {
+  if (n > 1 && lambda > 0) {
+    gym_abort(
+      "Either `n` is above 1 or `lambda` above 0, not both: each says how far to look ahead.",
+      class = "gym_error_argument", argument = "lambda", value = lambda, call = call
+    )
+  }
+}
+
+#' @export
+agent_observe.gym_agent_sarsa <- function(agent, transitions) {
+  column <- as.integer(transitions$action - agent$spaces$action_space$start) + 1L
+  n <- length(column)
+  present <- seen_by(agent, transitions$observation, column)
+  after <- seen_by(agent, transitions$next_observation, column)
+  agent <- with_known_weights(agent, present)
+  values <- values_of(agent, after)
+  following <- choose_actions(agent, values)
+  ahead <- if (agent$expected) {
+    rowSums(ifelse(values == -Inf, 0, values) * row_probabilities(exploration(agent), values))
+  } else {
+    values[cbind(seq_len(n), following)]
+  }
+  agent <- learn_from(agent, present, column, transitions, ahead)
+  # What was chosen is done, where the episode goes on.
+  ended <- transitions$terminated | transitions$truncated
+  agent$next_action[transitions$sub_env] <- ifelse(ended, NA_integer_, following)
+  agent
+}
+
+#' @export
+format.gym_agent_sarsa <- function(x, ...) {
+  name <- paste0(if (x$n > 1L) paste0(x$n, "-step "), "Sarsa", if (x$lambda > 0) "(lambda)")
+  if (x$expected) name <- paste("Expected", name)
+  learner_text(name, x, if (x$lambda > 0) list(lambda = x$lambda))
+}
+
+#' @rdname agent_sarsa
+#' @export
+learn_sarsa <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
+                        discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
+                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0, ...) {
+  agent <- agent_sarsa(discount, learning_rate, epsilon, temperature, initial, features, expected,
+                       n, lambda)
+  train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
+              target = target, ...)
+}

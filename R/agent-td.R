@@ -1,0 +1,81 @@
+#' Temporal-difference prediction
+#'
+#' Learns what each state is worth to a given policy, by moving its value, after each step, towards
+#' the reward and the value of the state that the step led to (Sutton and Barto 2018, section 6.1).
+#' `n` looks n steps ahead (section 7.1), and `lambda` over all numbers of steps, by eligibility
+#' traces (section 12.2).
+#'
+#' @inheritParams agent_sarsa
+#' @param policy The policy whose values are learned, and which plays: any that [rollout()] plays.
+#' @param initial The value that all states have at first, a number; the default is 0.
+#' @return `agent_td()` an agent of class `gym_agent_td`; `learn_td()` makes that agent, trains it
+#'   and returns what [train_agent()] does. [state_values()] gives the values.
+#' @inheritSection agent_q Errors
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press.
+#' @seealso [solve_mdp()], which calculates them where the model is known
+#' @export
+#' @examples
+#' walk <- gym_model(data.frame(
+#'   state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+#'   reward = c(0, 0, 0, 1)
+#' ), start = 1)
+#' learned <- learn_td(walk, policy_random(), iterations = 50, discount = 1, seed = 1)
+#' rbind(learned = state_values(learned), exact = solve_mdp(walk, policy_random())$values)
+agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL,
+                     n = 1, lambda = 0) {
+  check_policy(policy)
+  check_one_policy(policy, "policy", rlang::current_env())
+  check_count(n)
+  check_number(lambda, min = 0, max = 1)
+  settings <- list(
+    plays = policy, discount = discount, learning_rate = learning_rate, initial = initial,
+    features = features, n = as.integer(n), lambda = lambda
+  )
+  check_learner(settings)
+  check_one_horizon(n, lambda)
+  new_learner("gym_agent_td", settings)
+}
+
+#' @export
+agent_start.gym_agent_td <- function(agent, policy) {
+  agent <- NextMethod()
+  agent$plays <- policy_bind(agent$plays, policy)
+  agent
+}
+
+# A value for each state.
+#' @exportS3Method
+value_columns_of.gym_agent_td <- function(agent) 1L
+
+#' @export
+agent_act.gym_agent_td <- function(agent, observation, sub_env) {
+  act_batch(agent$plays, observation, length(sub_env), agent$spaces)
+}
+
+#' @export
+agent_observe.gym_agent_td <- function(agent, transitions) {
+  column <- rep(1L, length(transitions$reward))
+  present <- seen_by(agent, transitions$observation, column)
+  agent <- with_known_weights(agent, present)
+  after <- values_of(agent, seen_by(agent, transitions$next_observation, column))
+  learn_from(agent, present, column, transitions, after[, 1L])
+}
+
+#' @export
+agent_policy.gym_agent_td <- function(agent) agent$plays
+
+#' @export
+format.gym_agent_td <- function(x, ...) {
+  name <- if (x$lambda > 0) "TD(lambda)" else if (x$n > 1L) paste0(x$n, "-step TD") else "TD"
+  learner_text(name, x, if (x$lambda > 0) list(lambda = x$lambda))
+}
+
+#' @rdname agent_td
+#' @export
+learn_td <- function(env, policy, iterations = NULL, steps = NULL, episodes = 10, discount = 0.99,
+                     learning_rate = 0.1, initial = 0, features = NULL, n = 1, lambda = 0, ...) {
+  agent <- agent_td(policy, discount, learning_rate, initial, features, n, lambda)
+  train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
+              target = Inf, ...)
+}

@@ -1,0 +1,352 @@
+# What the learners of values have in common: how they begin, act, and move a value towards a
+# target.
+
+#' Make a learner of values
+#'
+#' @param class Its class.
+#' @param settings What the user has chosen, a list, among it `features`, `discount`,
+#'   `learning_rate`, `epsilon`, `temperature` and `initial`, and perhaps `n` and `lambda`.
+#' @return While it learns it has `basis`, see [basis_of()], and `weights`, a matrix with a row for
+#'   each feature and a column for each action; `taken`, how many steps it has observed;
+#'   `next_action`, the actions that were chosen already, by sub-environment; and `traces` or
+#'   `pending` of each sub-environment.
+#' @noRd
+new_learner <- function(class, settings) {
+  structure(settings, class = c(class, "gym_value_learner", "gym_learner", "gym_agent"))
+}
+
+check_learner <- function(settings, call = rlang::caller_env()) {
+  check_discount(settings$discount, "discount", call)
+  if (!is.null(settings$learning_rate)) {
+    check_schedule(settings$learning_rate, "learning_rate", 1, call)
+  }
+  if (!is.null(settings$epsilon)) check_schedule(settings$epsilon, "epsilon", 1, call)
+  if (!is.null(settings$temperature)) {
+    check_schedule(settings$temperature, "temperature", Inf, call)
+  }
+  check_number(settings$initial, arg = "initial", call = call)
+  features <- settings$features
+  if (!is.null(features) && !is.function(features) && !inherits(features, "gym_features")) {
+    must <- "NULL, what `tile_coding()` makes, or a function of observations"
+    abort_argument(features, must, "features", call)
+  }
+}
+
+check_schedule <- function(x, arg, max, call) {
+  if (!is.function(x) && !(is_number(x) && x >= 0 && x <= max)) {
+    must <- paste0("a number", range_text(0, max), ", or a function of the steps so far")
+    abort_argument(x, must, arg, call)
+  }
+}
+
+# A number that may change with the steps that were taken so far.
+scheduled <- function(x, taken) if (is.function(x)) x(taken) else x
+
+#' Change a number while an agent learns
+#'
+#' Makes a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of how
+#' many steps it has observed. Any function of this kind will do; these are the usual ones.
+#'
+#' @param from,to The number in the first step, and after `steps`, where it stays.
+#' @param steps How many steps it takes, a number of at least 1.
+#' @return A function of a number of steps. `schedule_linear()` goes in equal parts,
+#'   `schedule_exponential()` by equal factors (both numbers are above 0 then).
+#' @section Errors: `gym_error_argument`.
+#' @export
+#' @examples
+#' epsilon <- schedule_linear(1, 0.05, steps = 1000)
+#' epsilon(c(0, 500, 2000))
+schedule_linear <- function(from, to, steps) {
+  check_number(from)
+  check_number(to)
+  check_number(steps, min = 1)
+  function(taken) from + (to - from) * pmin(taken / steps, 1)
+}
+
+#' @rdname schedule_linear
+#' @export
+schedule_exponential <- function(from, to, steps) {
+  check_above_zero(from)
+  check_above_zero(to)
+  check_number(steps, min = 1)
+  function(taken) from * (to / from)^pmin(taken / steps, 1)
+}
+
+# Beginning ---------------------------------------------------------------------------
+
+#' @export
+agent_start.gym_value_learner <- function(agent, policy) {
+  call <- NULL
+  if (!inherits(policy$action_space, "gym_space_discrete")) {
+    gym_abort(
+      c(paste0("A learner of values needs actions that can be counted, not ",
+               format(policy$action_space), "."),
+        i = "`search_ars()` and `search_cem()` learn actions that are numbers of a range."),
+      class = "gym_error_argument", argument = "env", call = call
+    )
+  }
+  agent$spaces <- policy[c("observation_space", "action_space")]
+  agent$basis <- basis_of(agent$features, policy$observation_space, call)
+  agent$taken <- 0
+  agent$next_action <- integer()
+  agent["weights"] <- list(first_weights(agent, policy))
+  agent$traces <- list()
+  agent$pending <- list()
+  agent
+}
+
+# How many columns the weights have: one for each action.
+value_columns_of <- function(agent) UseMethod("value_columns_of")
+
+#' @exportS3Method
+value_columns_of.default <- function(agent) as.integer(agent$spaces$action_space$n)
+
+first_weights <- function(agent, policy) {
+  if (!is.null(policy$q) && is.null(agent$features)) {
+    return(policy$q)
+  }
+  if (is.na(agent$basis$count)) {
+    # A user's function has not been asked yet.
+    return(NULL)
+  }
+  each <- agent$basis$each
+  matrix(as.double(agent$initial) / each, agent$basis$count, value_columns_of(agent))
+}
+
+with_known_weights <- function(agent, present) {
+  if (is.null(agent$weights)) {
+    agent$weights <- matrix(0, ncol(present), value_columns_of(agent))
+  } else if (is.null(agent$basis$each) && ncol(present) != nrow(agent$weights)) {
+    gym_abort(
+      paste0("`features` returned ", count_of(nrow(agent$weights), "feature"),
+             " at first, and now ", ncol(present), "."),
+      class = "gym_error_argument", argument = "features", call = NULL
+    )
+  }
+  agent
+}
+
+# Acting ------------------------------------------------------------------------------
+
+#' @export
+agent_act.gym_value_learner <- function(agent, observation, sub_env) {
+  action <- agent$next_action[sub_env]
+  new <- is.na(action)
+  if (any(new)) {
+    values <- values_of(agent, seen_by(agent, observation, sub_env))
+    action[new] <- choose_actions(agent, values)[new]
+  }
+  action - 1L + agent$spaces$action_space$start
+}
+
+seen_by <- function(agent, observation, sub_env) agent$basis$of(observation, length(sub_env))
+
+values_of <- function(agent, present, weights = agent$weights) {
+  if (is.null(weights)) {
+    matrix(0, nrow(present), value_columns_of(agent))
+  } else {
+    linear_values(agent$basis, weights, present)
+  }
+}
+
+# How it explores at the moment.
+exploration <- function(agent) {
+  list(
+    epsilon = scheduled(agent$epsilon %||% 0, agent$taken),
+    temperature = if (!is.null(agent$temperature)) scheduled(agent$temperature, agent$taken)
+  )
+}
+
+# The numbers of the actions that are taken, from 1.
+choose_actions <- function(agent, values) draw_table_actions(exploration(agent), values)
+
+#' @export
+agent_policy.gym_value_learner <- function(agent) {
+  policy_of_values(agent, agent$weights)
+}
+
+# The policy that takes the action with the largest value.
+policy_of_values <- function(agent, weights) {
+  if (is.null(agent$features)) {
+    policy <- policy_table(weights)
+    policy[c("observation_space", "action_space")] <- agent$spaces
+    policy
+  } else {
+    weights <- weights %||% matrix(0, 0L, value_columns_of(agent))
+    new_feature_policy(agent$basis, weights, agent$spaces)
+  }
+}
+
+# Learning ----------------------------------------------------------------------------
+
+#' Move values towards what a step has come to
+#'
+#' @param present,column The features that were seen, and the columns of the weights whose values
+#'   are moved.
+#' @param transitions As [agent_observe()] gets them.
+#' @param ahead The value of what the step led to, as far as the episode goes on.
+#' @noRd
+learn_from <- function(agent, present, column, transitions, ahead) {
+  n <- length(column)
+  ahead[transitions$terminated] <- 0
+  if (isTRUE(agent$lambda > 0)) {
+    agent <- learn_by_traces(agent, present, column, transitions, ahead)
+  } else if (isTRUE(agent$n > 1L)) {
+    agent <- learn_by_steps(agent, present, column, transitions, ahead)
+  } else {
+    value <- values_of(agent, present)[cbind(seq_len(n), column)]
+    error <- transitions$reward + agent$discount * ahead - value
+    rate <- scheduled(agent$learning_rate, agent$taken)
+    agent$weights <- move_weights(agent$basis, agent$weights, present, column, rate, error)
+  }
+  agent$taken <- agent$taken + n
+  agent
+}
+
+#' Change weights so that values move by a share of their errors
+#'
+#' Errors of the same state and action move its value by their mean, as far as if they had come one
+#' after the other: k errors at a rate r by 1 - (1 - r)^k of it.
+#' @noRd
+move_weights <- function(basis, weights, present, column, rate, error) {
+  if (is.null(basis$each)) {
+    return(move_dense_weights(weights, present, column, rate, error))
+  }
+  cell <- as.vector(present + nrow(weights) * (column - 1L))
+  if (length(column) == 1L) {
+    weights[cell] <- weights[cell] + rate / basis$each * error
+    return(weights)
+  }
+  error <- rep(error, basis$each)
+  if (anyDuplicated(cell)) {
+    own <- unique(cell)
+    group <- match(cell, own)
+    count <- tabulate(group, length(own))
+    error <- rowsum(error, group)[, 1L] / count
+    weights[own] <- weights[own] + (1 - (1 - rate)^count) / basis$each * error
+  } else {
+    weights[cell] <- weights[cell] + rate / basis$each * error
+  }
+  weights
+}
+
+move_dense_weights <- function(weights, present, column, rate, error) {
+  for (action in unique(column)) {
+    own <- column == action
+    step <- colMeans(present[own, , drop = FALSE] * error[own])
+    weights[, action] <- weights[, action] + (1 - (1 - rate)^sum(own)) * step
+  }
+  weights
+}
+
+# Several steps at once, one sub-environment after the other -------------------------------
+
+#' Learn by eligibility traces
+#'
+#' Replacing traces for tables and tiles, accumulating ones for a user's features (Sutton and Barto
+#' 2018, sections 12.2 and 12.7).
+#' @noRd
+learn_by_traces <- function(agent, present, column, transitions, ahead) {
+  rate <- scheduled(agent$learning_rate, agent$taken) / (agent$basis$each %||% 1L)
+  decay <- agent$discount * agent$lambda
+  for (i in seq_along(column)) {
+    place <- transitions$sub_env[[i]]
+    own <- present[i, , drop = FALSE]
+    value <- values_of(agent, own)[[column[[i]]]]
+    error <- transitions$reward[[i]] + agent$discount * ahead[[i]] - value
+    trace <- if (transitions$first[[i]] || length(agent$traces) < place) {
+      array(0, dim(agent$weights))
+    } else {
+      decay * agent$traces[[place]]
+    }
+    if (is.null(agent$basis$each)) {
+      trace[, column[[i]]] <- trace[, column[[i]]] + own[1L, ]
+    } else {
+      trace[own[1L, ] + nrow(trace) * (column[[i]] - 1L)] <- 1
+    }
+    agent$weights <- agent$weights + rate * error * trace
+    agent$traces[[place]] <- trace
+  }
+  agent
+}
+
+#' Learn from what n steps came to (Sutton and Barto 2018, sections 7.1 and 7.2)
+#' @noRd
+learn_by_steps <- function(agent, present, column, transitions, ahead) {
+  rate <- scheduled(agent$learning_rate, agent$taken)
+  ended <- transitions$terminated | transitions$truncated
+  for (i in seq_along(column)) {
+    place <- transitions$sub_env[[i]]
+    steps <- if (!transitions$first[[i]] && length(agent$pending) >= place) agent$pending[[place]]
+    steps <- c(steps, list(list(
+      present = present[i, , drop = FALSE], column = column[[i]], reward = transitions$reward[[i]]
+    )))
+    # At the end of an episode all that are left have come to something.
+    while (length(steps) && (length(steps) == agent$n || ended[[i]])) {
+      rewards <- vapply(steps, function(step) step$reward, 0)
+      powers <- agent$discount^(seq_along(rewards) - 1L)
+      target <- sum(powers * rewards) + agent$discount^length(rewards) * ahead[[i]]
+      first <- steps[[1L]]
+      error <- target - values_of(agent, first$present)[[first$column]]
+      agent$weights <- move_weights(
+        agent$basis, agent$weights, first$present, first$column, rate, error
+      )
+      steps <- steps[-1L]
+      if (!ended[[i]]) break
+    }
+    agent$pending[place] <- list(steps)
+  }
+  agent
+}
+
+# Results -----------------------------------------------------------------------------
+
+#' Get the values that were learned
+#'
+#' @param x What `learn_q()` and the others returned, or their agent.
+#' @return A numeric vector with an element for each state, in the order of the table's rows: the
+#'   value of its best action, or of [learn_td()] of the state; of a Discrete with the states'
+#'   numbers as names.
+#' @section Errors: `gym_error_argument` for what was not learned by a table.
+#' @export
+#' @examples
+#' walk <- gym_model(data.frame(
+#'   state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+#'   reward = c(0, 0, 0, 1)
+#' ), start = 1)
+#' learned <- learn_td(walk, policy_random(), iterations = 50, seed = 1)
+#' state_values(learned)
+state_values <- function(x) {
+  agent <- if (inherits(x, "gym_training")) x$agent else x
+  if (!inherits(agent, "gym_value_learner") || !is.null(agent$features)) {
+    must <- "what was learned by a table, as `learn_q()` returns it"
+    abort_argument(x, must, "x", rlang::current_env())
+  }
+  values <- row_max(action_weights(agent))
+  space <- agent$spaces$observation_space
+  if (inherits(space, "gym_space_discrete")) names(values) <- state_numbers(space)
+  values
+}
+
+# The table of values that the greedy policy is by.
+action_weights <- function(agent) UseMethod("action_weights")
+
+#' @exportS3Method
+action_weights.default <- function(agent) agent$weights
+
+# The text of a schedule.
+schedule_text <- function(x) if (is.function(x)) "scheduled" else number_text(x)
+
+learner_text <- function(name, agent, settings = NULL) {
+  texts <- c(
+    if (length(settings)) paste(names(settings), vapply(settings, format, "")),
+    if (!is.null(agent$learning_rate)) paste("learning_rate", schedule_text(agent$learning_rate)),
+    if (!is.null(agent$temperature)) {
+      paste("temperature", schedule_text(agent$temperature))
+    } else if (!is.null(agent$epsilon)) {
+      paste("epsilon", schedule_text(agent$epsilon))
+    },
+    paste("discount", number_text(agent$discount))
+  )
+  paste0(name, ": ", paste(texts, collapse = ", "))
+}

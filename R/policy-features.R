@@ -1,0 +1,181 @@
+#' Describe observations by features
+#'
+#' A learner keeps values in a table with a row for each observation. Where observations are numbers
+#' of a range there are too many of them, and what is learned is a weight for each of some features
+#' instead: the value of an action is the sum of its weights, each times its feature (Sutton and
+#' Barto 2018, chapter 9). Any function that gives an observation's features can be given to a
+#' learner; `tile_coding()` makes one that serves well where observations have few numbers.
+#'
+#' Tile coding lays several grids over the range of observations, each a little beside the others
+#' (Sutton and Barto 2018, section 9.5.4). A feature is a tile: 1 for the one of each grid in which
+#' an observation lies, and 0 for all others. Numbers outside of the range lie in the tiles at its
+#' ends. The grids are displaced against each other by 1, 3, 5, ... parts of a tile in the first,
+#' second, third, ... number.
+#'
+#' @param tilings How many grids there are, a whole number of at least 1; the default is 8.
+#' @param bins How many tiles a grid has for each number of an observation: a whole number of at
+#'   least 1, 8 by default, or one for each number.
+#' @param low,high The range of each number, numeric vectors; `NULL`, the default, is that of the
+#'   observation space, where it has bounds.
+#' @return `tile_coding()` an object of class `gym_features`, for the argument `features` of
+#'   [learn_q()] and the others.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be; when it is
+#'   played in an environment whose observations have no bounds, or are no numbers.
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press.
+#' @export
+#' @examples
+#' tile_coding(tilings = 8, bins = 8)
+tile_coding <- function(tilings = 8, bins = 8, low = NULL, high = NULL) {
+  check_count(tilings)
+  if (!are_whole(bins, 1, .Machine$integer.max)) {
+    abort_argument(bins, "whole numbers of at least 1", "bins", rlang::current_env())
+  }
+  for (name in c("low", "high")) {
+    bound <- get(name)
+    if (!is.null(bound) && !(is.numeric(bound) && all(is.finite(bound)))) {
+      abort_argument(bound, "finite numbers or NULL", name, rlang::current_env())
+    }
+  }
+  structure(
+    list(tilings = as.integer(tilings), bins = as.integer(bins), low = low, high = high),
+    class = "gym_features"
+  )
+}
+
+#' @export
+format.gym_features <- function(x, ...) {
+  paste0("tile coding, ", count_of(x$tilings, "tiling"), " of ", paste(x$bins, collapse = " x "))
+}
+
+#' @export
+print.gym_features <- function(x, ...) {
+  cat("<features: ", format(x), ">\n", sep = "")
+  invisible(x)
+}
+
+# What values are linear in -----------------------------------------------------------
+
+#' Describe what the values of an environment's observations are linear in
+#'
+#' Of a table and of tiles only few features of an observation are 1 and all others 0: then `of()`
+#' returns a matrix with a row for each observation and the numbers of these in it, of which there
+#' are `each`. Of a user's function it returns the features themselves, and `each` is `NULL`.
+#' @param features `NULL` for a table, what [tile_coding()] makes, or a function.
+#' @return A list: `count`, how many features there are, `each`, `of`, a function of a batch of
+#'   observations and how many they are, and `features`, as given. `count` is `NA` for a function
+#'   that was not asked yet.
+#' @noRd
+basis_of <- function(features, space, call) {
+  if (is.null(features)) {
+    index <- table_index(space, "observations", call)
+    of <- function(observation, n) matrix(index$index(observation, n), n, 1L)
+    return(list(count = index$count, each = 1L, of = of, features = NULL))
+  }
+  if (is.function(features)) {
+    return(list(count = NA, each = NULL, of = function(observation, n) {
+      check_features(features(observation), n, call)
+    }, features = features))
+  }
+  tiles_of(features, space, call)
+}
+
+check_features <- function(values, n, call) {
+  if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) || nrow(values) != n ||
+        !all(is.finite(values))) {
+    gym_abort(
+      c(paste0("`features` must return a numeric matrix with a row for each of ",
+               count_of(n, "observation"), ", not ", describe_argument(values), "."),
+        i = "It gets many observations at once, as a policy does; see `act()`."),
+      class = "gym_error_argument", argument = "features", value = values, call = call
+    )
+  }
+  values
+}
+
+tiles_of <- function(features, space, call) {
+  if (!inherits(space, "gym_space_box") || length(space$shape) != 1L) {
+    gym_abort(
+      paste0("Tiles are for observations that are a Box of one dimension, not ", format(space),
+             "."),
+      class = "gym_error_argument", argument = "features", value = features, call = call
+    )
+  }
+  numbers <- space$shape[[1L]]
+  low <- rep_len(features$low %||% as.numeric(space$low), numbers)
+  high <- rep_len(features$high %||% as.numeric(space$high), numbers)
+  unbounded <- !is.finite(low) | !is.finite(high) | low >= high
+  if (any(unbounded)) {
+    gym_abort(
+      c(paste0("Number ", which(unbounded)[[1L]], " of an observation has no range: its bounds ",
+               "are ", low[unbounded][[1L]], " and ", high[unbounded][[1L]], "."),
+        i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."),
+      class = "gym_error_argument", argument = "features", value = features, call = call
+    )
+  }
+  bins <- rep_len(features$bins, numbers)
+  tilings <- features$tilings
+  # One tile more than bins, because all grids but the first are displaced.
+  weights <- c(1, cumprod(bins + 1))
+  per_tiling <- weights[[numbers + 1L]]
+  width <- (high - low) / bins
+  displaced <- outer(seq_len(tilings) - 1, 2 * seq_len(numbers) - 1) %% tilings / tilings
+  of <- function(observation, n) {
+    place <- t((t(matrix(observation, n)) - low) / width)
+    tiles <- matrix(0L, n, tilings)
+    for (tiling in seq_len(tilings)) {
+      at <- floor(t(t(place) + displaced[tiling, ]))
+      at <- pmin(pmax(at, 0), rep(bins, each = n))
+      number <- at %*% weights[seq_len(numbers)]
+      tiles[, tiling] <- as.integer(number + per_tiling * (tiling - 1) + 1)
+    }
+    tiles
+  }
+  list(count = per_tiling * tilings, each = tilings, of = of, features = features)
+}
+
+#' The value of each action for some observations
+#' @param weights A matrix with a row for each feature and a column for each action.
+#' @param present The features of the observations, as `of()` of the basis returns them.
+#' @noRd
+linear_values <- function(basis, weights, present) {
+  if (is.null(basis$each)) {
+    return(present %*% weights)
+  }
+  values <- weights[present[, 1L], , drop = FALSE]
+  for (column in seq_len(basis$each)[-1L]) {
+    values <- values + weights[present[, column], , drop = FALSE]
+  }
+  values
+}
+
+# A policy that is linear in features -------------------------------------------------
+
+new_feature_policy <- function(basis, weights, env) {
+  structure(
+    list(
+      basis = basis, weights = weights, epsilon = 0, temperature = NULL,
+      observation_space = env$observation_space, action_space = env$action_space
+    ),
+    class = c("gym_policy_features", "gym_policy")
+  )
+}
+
+#' @exportS3Method
+act_batch.gym_policy_features <- function(policy, observation, n, vector_env) {
+  values <- linear_values(policy$basis, policy$weights, policy$basis$of(observation, n))
+  as.integer(draw_table_actions(policy, values) - 1L + policy$action_space$start)
+}
+
+#' @export
+act.gym_policy_features <- function(policy, observation, ...) {
+  rows <- observation_rows(observation, policy$observation_space)
+  act_batch(policy, rows$values, nrow(rows$values), NULL)
+}
+
+#' @export
+format.gym_policy_features <- function(x, ...) {
+  features <- x$basis$features
+  paste0("linear in ", count_of(nrow(x$weights), "feature"),
+         if (inherits(features, "gym_features")) paste0(" (", format(features), ")"))
+}

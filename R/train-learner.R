@@ -1,0 +1,159 @@
+#' Write a learner of your own
+#'
+#' A learner is an agent that learns from each step, and not from what whole episodes came to. It is
+#' a plain list with a class of its own before `"gym_learner"` and `"gym_agent"`, made by a function
+#' such as [agent_q()], and plays and learns by two generics instead of [agent_ask()] and
+#' [agent_tell()]: it acts, the environment takes the step, it observes what came of it.
+#'
+#' One learner can play several sub-environments side by side, all of which feed the same table
+#' (`train_agent(num_envs = )`). Then `agent_observe()` gets several transitions at once. Where they
+#' concern the same state and action the learners of this package move its value towards their mean,
+#' as far as if they had come one after the other. What differs from one sub-environment is that all
+#' actions of a step are chosen before any of them has taught anything.
+#'
+#' @param agent The learner.
+#' @param observation The observations, a batch as a policy gets it; see [act()].
+#' @param sub_env The numbers of their sub-environments, integers.
+#' @param transitions What came of a step, a list with an element for each sub-environment in each
+#'   of
+#'   \describe{
+#'     \item{observation, action}{What was observed and done, batches.}
+#'     \item{reward}{A numeric vector.}
+#'     \item{next_observation}{What the step led to, a batch: at the end of an episode its last
+#'       observation, never the first one of the next.}
+#'     \item{terminated, truncated}{Whether the episode ended by the environment's own rules, or was
+#'       cut off, logical vectors. The value of `next_observation` counts after a truncation, and is
+#'       0 after a termination.}
+#'     \item{first}{Whether it was the first step of an episode, a logical vector.}
+#'     \item{sub_env}{The numbers of the sub-environments, integers.}
+#'   }
+#' @return `agent_act()` an action for each observation, `agent_observe()` the agent, wiser. Both
+#'   draw from R's generator, which training sets.
+#' @seealso [agent_start()], [agent_policy()], which a learner has methods of, too: `agent_start()`
+#'   gets the environment's spaces as `policy$observation_space` and `policy$action_space`.
+#' @export
+#' @examples
+#' # Keeps the mean reward of each action, whatever the state, and tries each 10 times.
+#' agent_mean <- function() structure(list(), class = c("mean_reward", "gym_learner", "gym_agent"))
+#' agent_start.mean_reward <- function(agent, policy) {
+#'   agent$total <- agent$count <- numeric(policy$action_space$n)
+#'   agent
+#' }
+#' agent_act.mean_reward <- function(agent, observation, sub_env) {
+#'   rare <- which(agent$count < 10)
+#'   best <- if (length(rare)) rare[[1]] else which.max(agent$total / agent$count)
+#'   rep(best - 1L, length(sub_env))
+#' }
+#' agent_observe.mean_reward <- function(agent, transitions) {
+#'   tried <- transitions$action[[1]] + 1
+#'   agent$total[[tried]] <- agent$total[[tried]] + sum(transitions$reward)
+#'   agent$count[[tried]] <- agent$count[[tried]] + length(transitions$reward)
+#'   agent
+#' }
+#' agent_policy.mean_reward <- function(agent) {
+#'   mean <- agent$total / pmax(agent$count, 1)
+#'   policy_table(rbind(mean, mean))
+#' }
+#'
+#' # One state, and the end.
+#' coin <- gym_model(data.frame(
+#'   state = 0, action = c(0, 1, 1), next_state = 1, probability = c(1, 0.5, 0.5),
+#'   reward = c(1, 0, 3)
+#' ), start = 0)
+#' train_agent(agent_mean(), coin, iterations = 50, seed = 1)
+agent_act <- function(agent, observation, sub_env) UseMethod("agent_act")
+
+#' @rdname agent_act
+#' @export
+agent_observe <- function(agent, transitions) UseMethod("agent_observe")
+
+#' @export
+agent_needs.gym_learner <- function(agent) "transitions"
+
+learns_online <- function(agent) inherits(agent, "gym_learner")
+
+# The policy that an agent begins with, where none was given: a learner makes its own.
+first_policy <- function(agent) if (!learns_online(agent)) policy_linear()
+
+# A learner plays in one sub-environment unless more are asked for. One that was made before has as
+# many as it has.
+learner_envs <- function(agent, env) {
+  made_here <- is.character(env) || inherits(env, c("gym_wrapped", "gym_model", "gym_r_env"))
+  if (learns_online(agent) && made_here) 1L
+}
+
+# What a learner's `agent_start()` gets: a policy that was given, with the spaces.
+spaces_policy <- function(policy, vector_env, call) {
+  if (!is.null(policy)) {
+    return(policy_bind(policy, vector_env, call = call))
+  }
+  structure(
+    list(observation_space = vector_env$observation_space, action_space = vector_env$action_space),
+    class = c("gym_policy_unknown", "gym_policy")
+  )
+}
+
+#' @export
+format.gym_policy_unknown <- function(x, ...) "the learner's own"
+
+# Playing an iteration ----------------------------------------------------------------
+
+#' Let a learner play the episodes of an iteration, and learn on the way
+#' @return A list: `agent`, wiser, `returns` and `lengths` of the episodes.
+#' @noRd
+learn_episodes <- function(state, vector_env, settings, call) {
+  agent <- state$agent
+  learner <- list(
+    act = function(observation, sub_env) agent_act(agent, observation, sub_env),
+    observe = function(transitions) {
+      agent <<- agent_observe(agent, transitions)
+      check_is_agent(agent, "agent_observe()", call)
+    }
+  )
+  history <- new_history(1L, settings$episodes, state$streams)
+  history$draw_seeds <- seed_drawer(settings)
+  play_batches(
+    vector_env, history, function(which) NULL, learner = learner,
+    report = function(ended) state$report(history$played_episodes + ended),
+    max_steps = settings$max_steps %||% Inf
+  )
+  each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
+  list(agent = agent, returns = each("return"), lengths = each("length"))
+}
+
+# Judging by a model ------------------------------------------------------------------
+
+#' The model by which a learner's policy is judged, `NULL` where there is none
+#'
+#' Whether an environment that is named by its id has one is asked where it is one of those that do.
+#' @noRd
+judging_model <- function(settings, client) {
+  env <- settings$env
+  if (inherits(env, "gym_model")) {
+    return(env)
+  }
+  with_model <- inherits(env, "gym_r_env") ||
+    rlang::is_string(env) && (is_registered(env) || grepl(modelled_ids, env))
+  if (learns_online(settings$agent) && with_model) {
+    tryCatch(
+      rlang::exec("env_model", env, !!!settings$kwargs, client = client),
+      gym_error = function(cnd) NULL
+    )
+  }
+}
+
+modelled_ids <- "^(FrozenLake|CliffWalking|Taxi)"
+
+#' Evaluate a policy by a model, exactly
+#' @return As [evaluate_episodes()], for no episodes.
+#' @noRd
+evaluate_exactly <- function(model, policy, max_steps) {
+  exact <- evaluate_policy(
+    model, policy, max_steps = max_steps %||% model$spec$max_episode_steps %||% Inf
+  )
+  value <- exact$mean_return
+  data.frame(
+    candidate = 1L, mean_return = value, se = 0, lower = value, upper = value, episodes = 0L,
+    steps = 0L
+  )
+}

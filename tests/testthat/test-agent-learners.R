@@ -1,0 +1,223 @@
+# Learners, one step at a time, against the formulas of Sutton and Barto (2018).
+
+spaces <- function(states = 3, actions = 2) {
+  structure(
+    list(observation_space = space_discrete(states), action_space = space_discrete(actions),
+         spec = list(id = "Three")),
+    class = c("gym_policy_unknown", "gym_policy")
+  )
+}
+
+step_of <- function(state, action, reward, next_state, terminated = FALSE, truncated = FALSE,
+                    first = FALSE, sub_env = seq_along(state)) {
+  n <- length(state)
+  list(
+    observation = as.integer(state), action = as.integer(action), reward = reward,
+    next_observation = as.integer(next_state), terminated = rep_len(terminated, n),
+    truncated = rep_len(truncated, n), first = rep_len(first, n), sub_env = sub_env
+  )
+}
+
+q <- rbind(c(1, 2), c(3, 5), c(7, 4))
+started <- function(agent, table = q) {
+  policy <- spaces()
+  policy$q <- table
+  agent_start(agent, policy)
+}
+
+test_that("Q-learning moves a value towards the reward and the best value that follows", {
+  agent <- started(agent_q(discount = 0.5, learning_rate = 0.1))
+  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  expected <- q
+  expected[1, 2] <- 2 + 0.1 * (10 + 0.5 * 5 - 2)
+  expect_equal(after$weights, expected)
+  expect_identical(after$taken, 1)
+})
+
+test_that("nothing follows on a termination, and what would follow on a truncation counts", {
+  for (agent in list(
+    agent_q(0.5, 0.1), agent_sarsa(0.5, 0.1, epsilon = 0),
+    agent_sarsa(0.5, 0.1, epsilon = 0, expected = TRUE),
+    agent_sarsa(0.5, 0.1, epsilon = 0, n = 3),
+    agent_sarsa(0.5, 0.1, epsilon = 0, lambda = 0.5)
+  )) {
+    agent <- started(agent)
+    ended <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE, first = TRUE))
+    expect_equal(ended$weights[1, 2], 2 + 0.1 * (10 - 2))
+    cut <- agent_observe(agent, step_of(0, 1, 10, 1, truncated = TRUE, first = TRUE))
+    expect_equal(cut$weights[1, 2], 2 + 0.1 * (10 + 0.5 * 5 - 2))
+  }
+})
+
+test_that("several steps of one state and action move its value by their mean, as if in turn", {
+  agent <- started(agent_q(discount = 0.5, learning_rate = 0.1))
+  after <- agent_observe(agent, step_of(c(0, 0, 2), c(1, 1, 0), c(10, 4, 1), c(1, 1, 0)))
+  expect_equal(after$weights[1, 2], 2 + (1 - 0.9^2) * (7 + 0.5 * 5 - 2))
+  expect_equal(after$weights[3, 1], 7 + 0.1 * (1 + 0.5 * 2 - 7))
+  # The same step twice is what two in a row come to.
+  twice <- agent_observe(agent, step_of(c(0, 0), c(1, 1), c(10, 10), c(1, 1)))
+  in_turn <- agent_observe(agent_observe(agent, step_of(0, 1, 10, 1)), step_of(0, 1, 10, 1))
+  expect_equal(twice$weights, in_turn$weights)
+  expect_identical(twice$taken, 2)
+})
+
+test_that("Sarsa does next what it has learned from", {
+  set.seed(1)
+  agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0.5))
+  chosen <- integer()
+  for (i in 1:50) {
+    after <- agent_observe(agent, step_of(0, 1, 10, 1))
+    action <- agent_act(after, 1L, 1L)
+    expect_equal(after$weights[1, 2], 2 + 0.1 * (10 + 0.5 * q[2, action + 1] - 2))
+    chosen <- c(chosen, action)
+  }
+  expect_setequal(chosen, 0:1)
+  # In a new episode it chooses anew.
+  ended <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
+  expect_identical(ended$next_action, NA_integer_)
+})
+
+test_that("expected Sarsa takes the mean over what it might do", {
+  agent <- started(agent_sarsa(0.5, 0.1, epsilon = 0.2, expected = TRUE))
+  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  expect_equal(after$weights[1, 2], 2 + 0.1 * (10 + 0.5 * (0.9 * 5 + 0.1 * 3) - 2))
+})
+
+test_that("n steps are looked ahead, and all that is left at the end", {
+  agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0, n = 2))
+  one <- agent_observe(agent, step_of(0, 0, 1, 1, first = TRUE))
+  expect_identical(one$weights, q)
+  two <- agent_observe(one, step_of(1, 1, 3, 2))
+  expect_equal(two$weights[1, 1], 1 + 0.1 * (1 + 0.5 * 3 + 0.25 * 7 - 1))
+  three <- agent_observe(two, step_of(2, 0, 8, 0, terminated = TRUE))
+  expect_equal(three$weights[2, 2], 5 + 0.1 * (3 + 0.5 * 8 - 5))
+  expect_equal(three$weights[3, 1], 7 + 0.1 * (8 - 7))
+  expect_length(three$pending[[1]], 0)
+})
+
+test_that("replacing traces fade by the discount and lambda", {
+  agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0, lambda = 0.8))
+  one <- agent_observe(agent, step_of(0, 0, 1, 1, first = TRUE))
+  first_error <- 1 + 0.5 * 5 - 1
+  expect_equal(one$weights[1, 1], 1 + 0.1 * first_error)
+  two <- agent_observe(one, step_of(1, 1, 3, 2))
+  error <- 3 + 0.5 * 7 - 5
+  expect_equal(two$weights[1, 1], 1 + 0.1 * first_error + 0.1 * 0.4 * error)
+  expect_equal(two$weights[2, 2], 5 + 0.1 * error)
+  # A new episode has no trace of the last one.
+  again <- agent_observe(two, step_of(2, 0, 1, 0, first = TRUE))
+  expect_identical(sum(again$traces[[1]] > 0), 1L)
+})
+
+test_that("TD learns a state's value, whatever the action", {
+  agent <- agent_td(function(state) state, discount = 0.5, learning_rate = 0.1, initial = 2)
+  agent <- agent_start(agent, spaces(states = 3, actions = 3))
+  expect_identical(agent_act(agent, c(1L, 2L), 1:2), c(1L, 2L))
+  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  expect_equal(after$weights[, 1], c(2 + 0.1 * (10 + 0.5 * 2 - 2), 2, 2))
+  expect_equal(state_values(after), c("0" = 2.9, "1" = 2, "2" = 2))
+})
+
+test_that("Monte Carlo averages the returns of first visits, or of every one", {
+  episode <- function(agent) {
+    agent <- agent_observe(agent, step_of(0, 1, 1, 1, first = TRUE))
+    agent <- agent_observe(agent, step_of(1, 0, 2, 0))
+    agent_observe(agent, step_of(0, 1, 4, 2, terminated = TRUE))
+  }
+  first <- episode(started(agent_monte_carlo(discount = 0.5)))
+  expect_equal(first$weights[1, 2], 1 + 0.5 * 2 + 0.25 * 4)
+  expect_equal(first$weights[2, 1], 2 + 0.5 * 4)
+  every <- episode(started(agent_monte_carlo(discount = 0.5, visits = "every")))
+  expect_equal(every$weights[1, 2], mean(c(3, 4)))
+  later <- started(agent_monte_carlo(discount = 0.5, learning_rate = 0.1))
+  expect_equal(episode(later)$weights[1, 2], 2 + 0.1 * (3 - 2))
+  expect_equal(episode(first)$visited[1, 2], 2)
+})
+
+test_that("exploring starts draw the first action of an episode, and only that", {
+  agent <- started(agent_monte_carlo(epsilon = 0, exploring_starts = TRUE))
+  set.seed(1)
+  first <- replicate(200, agent_act(agent, 2L, 1L))
+  expect_equal(mean(first), 0.5, tolerance = 0.2)
+  agent <- agent_observe(agent, step_of(2, 1, 0, 2, first = TRUE))
+  expect_true(all(replicate(50, agent_act(agent, 2L, 1L)) == 0L))
+})
+
+test_that("double Q-learning chooses by one table and values by the other", {
+  agent <- started(agent_q(discount = 0.5, learning_rate = 0.1, double = TRUE))
+  agent$second <- q[, 2:1]
+  set.seed(3)
+  seen <- replicate(40, {
+    after <- agent_observe(agent, step_of(0, 1, 10, 1))
+    first <- after$weights[1, 2]
+    if (first != 2) {
+      # The first table's best action is 1, which the second values at 3.
+      expect_equal(first, 2 + 0.1 * (10 + 0.5 * 3 - 2))
+      expect_identical(after$second, agent$second)
+      1
+    } else {
+      # The second's best is 0, which the first values at 3.
+      expect_equal(after$second[1, 2], 1 + 0.1 * (10 + 0.5 * 3 - 1))
+      2
+    }
+  })
+  expect_setequal(seen, 1:2)
+  expect_equal(action_weights(agent), (q + q[, 2:1]) / 2)
+})
+
+test_that("planning learns again from what is remembered, and counts no steps", {
+  agent <- started(agent_q(discount = 0.5, learning_rate = 0.1, planning = 3), 0 * q)
+  after <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
+  # Four times the same, of which three are remembered.
+  expect_equal(after$weights[1, 2], 10 * (1 - 0.9^4))
+  expect_identical(after$taken, 1)
+  expect_identical(after$memory$pair, 4L)
+  expect_error(agent_q(planning = 1, double = TRUE), class = "gym_error_argument")
+})
+
+test_that("a schedule changes with the steps", {
+  expect_equal(schedule_linear(1, 0, 10)(c(0, 5, 20)), c(1, 0.5, 0))
+  expect_equal(schedule_exponential(1, 0.01, 10)(c(0, 5, 20)), c(1, 0.1, 0.01))
+  agent <- started(agent_q(discount = 0.5, learning_rate = schedule_linear(0.5, 0.1, 1)))
+  one <- agent_observe(agent, step_of(0, 1, 10, 1))
+  expect_equal(one$weights[1, 2], 2 + 0.5 * 10.5)
+  two <- agent_observe(one, step_of(2, 1, 4, 1, terminated = TRUE))
+  expect_equal(two$weights[3, 2], 4)
+  three <- agent_observe(two, step_of(1, 0, 13, 1, terminated = TRUE))
+  expect_equal(three$weights[2, 1], 3 + 0.1 * 10)
+})
+
+test_that("a user's features have weights, which move by the features", {
+  features <- function(observation) cbind(1, observation)
+  agent <- agent_start(
+    agent_q(discount = 0.5, learning_rate = 0.1, features = features), spaces()
+  )
+  one <- agent_observe(agent, step_of(2, 1, 10, 0))
+  expect_equal(one$weights, cbind(c(0, 0), c(1, 2)))
+  expect_equal(values_of(one, features(c(0, 1, 2)))[, 2], c(1, 3, 5))
+  expect_identical(act(agent_policy(one), 1L), 1L)
+  changing <- agent_start(
+    agent_q(features = function(x) if (x[[1]] == 2) diag(2)[1, , drop = FALSE] else diag(1)),
+    spaces()
+  )
+  seen <- agent_observe(changing, step_of(2, 1, 10, 2))
+  expect_error(agent_observe(seen, step_of(1, 1, 10, 1)), "2 features at first, and now 1",
+               class = "gym_error_argument")
+})
+
+test_that("what cannot be learned so is refused", {
+  refused <- function(code, text) {
+    expect_error(code, text, class = "gym_error_argument", fixed = TRUE)
+  }
+  refused(agent_q(discount = 1.5), "`discount` must be a number above 0 and at most 1")
+  refused(agent_q(learning_rate = 2), "`learning_rate` must be a number from 0 to 1")
+  refused(agent_q(epsilon = -1), "`epsilon` must be a number from 0 to 1, or a function")
+  refused(agent_q(features = 3), "`features` must be NULL")
+  refused(agent_sarsa(n = 2, lambda = 0.5), "not both")
+  refused(agent_td(3), "`policy` must be a policy")
+  refused(agent_monte_carlo(visits = "last"), "one of \"first\", \"every\"")
+  box <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
+  refused(learn_q(box, iterations = 1), "observations that can be counted")
+  refused(learn_q(walk_model(), iterations = 1, policy = policy_random()), "a table of values")
+  refused(state_values(3), "what was learned by a table")
+})

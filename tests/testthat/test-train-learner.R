@@ -1,0 +1,117 @@
+test_that("a learner trains in the loop of all agents, exactly judged where there is a model", {
+  learned <- learn_q(walk_model(), iterations = 20, seed = 1)
+  expect_s3_class(learned, "gym_training")
+  expect_identical(nrow(learned$history), 20L)
+  expect_identical(learned$final$mean_return, 1)
+  expect_identical(c(learned$final$se, learned$final$episodes), c(0, 0))
+  expect_output(print(learned), "Expected return, by the model: 1", fixed = TRUE)
+  expect_output(print(summary(learned)), "The episodes of the last iteration", fixed = TRUE)
+  expect_identical(predict(learned, 1:2), c(1L, 1L))
+  expect_identical(predict(learned, 1:2, type = "output"), learned$agent$weights[2:3, ])
+  local_device()
+  expect_identical(plot(learned), learned)
+})
+
+test_that("a seed fixes what is learned, and another one gives another table", {
+  learn <- function(seed) learn_sarsa(walk_model(), iterations = 10, seed = seed)$agent$weights
+  set.seed(7)
+  first <- learn(1)
+  expect_identical(learn(1), first)
+  expect_false(identical(learn(2), first))
+})
+
+test_that("a learner goes on from its checkpoint to where an undisturbed one comes", {
+  for (learn in list(
+    function(...) learn_q(..., double = TRUE), function(...) learn_q(..., planning = 2),
+    function(...) learn_sarsa(..., lambda = 0.5), function(...) learn_monte_carlo(...)
+  )) {
+    file <- withr::local_tempfile(fileext = ".rds")
+    at_once <- learn(walk_model(), iterations = 12, seed = 3)
+    learn(walk_model(), iterations = 5, seed = 3, checkpoint = file)
+    gone_on <- suppressMessages(learn(walk_model(), iterations = 12, seed = 3, checkpoint = file))
+    expect_identical(gone_on$agent, at_once$agent)
+    expect_identical(gone_on$final, at_once$final)
+  }
+})
+
+test_that("prediction comes near to the exact values", {
+  exact <- solve_mdp(walk_model(), policy = policy_random())$values
+  for (how in list(list(), list(n = 3), list(lambda = 0.8))) {
+    learned <- rlang::exec(
+      "learn_td", walk_model(), policy_random(), iterations = 300, discount = 1, seed = 1,
+      learning_rate = schedule_exponential(0.5, 0.005, 5000), !!!how
+    )
+    expect_equal(state_values(learned)[2:3], exact[2:3], tolerance = 0.1)
+  }
+})
+
+test_that("many sub-environments feed one table", {
+  learned <- learn_q(walk_model(), iterations = 10, episodes = 64, num_envs = 16, seed = 1)
+  expect_identical(learned$final$mean_return, 1)
+  expect_identical(learned$provenance$num_envs, 16L)
+})
+
+test_that("a learner plays on the server, and judges by Gymnasium's own table", {
+  learned <- learn_q("CliffWalking-v1", iterations = 40, learning_rate = 0.5, discount = 1,
+                     seed = 1, num_envs = 8, client = test_client())
+  expect_identical(learned$final$mean_return, -13)
+  expect_identical(learned$final$episodes, 0L)
+})
+
+test_that("Tuples have tables, too, and are judged by playing", {
+  learned <- learn_monte_carlo("Blackjack-v1", iterations = 5, episodes = 100, num_envs = 32,
+                               discount = 1, seed = 1, eval_episodes = 50, client = test_client())
+  expect_identical(learned$final$episodes, 50L)
+  expect_identical(dim(learned$agent$weights), c(32L * 11L * 2L, 2L))
+  expect_identical(sum(learned$agent$visited > 0) > 50, TRUE)
+})
+
+test_that("`max_steps` truncates, and the value of what follows counts", {
+  # Going on pays 1 each step without an end: the value is 1 / (1 - 0.5).
+  model <- gym_model(data.frame(state = 0, action = 0, next_state = 0, reward = 1))
+  learned <- learn_q(model, iterations = 30, discount = 0.5, learning_rate = 0.5, max_steps = 4,
+                     seed = 1)
+  expect_equal(state_values(learned), c("0" = 2), tolerance = 1e-6)
+})
+
+test_that("the true next observation is learned from in all autoreset modes", {
+  # Each episode of the lake that does not slip ends at the goal or in a hole; a learner that took
+  # the first state of the next episode for what follows would add its value.
+  client <- test_client()
+  for (mode in c("NextStep", "SameStep", "Disabled")) {
+    env <- gym_make("FrozenLake-v1", num_envs = 4, autoreset_mode = mode, is_slippery = FALSE,
+                    max_episode_steps = 3, seed = 1, client = client)
+    withr::defer(env$close())
+    learned <- learn_td(env, function(state) rep(2L, length(state)), iterations = 40,
+                        learning_rate = 0.5, discount = 0.5, initial = 1, seed = 1)
+    # To the right: 0, 1, 2, 3, where it stays and is cut off with its value still 1, which halves
+    # with each step, as no reward comes.
+    values <- state_values(learned)
+    expect_lt(values[["2"]], 1)
+    expect_equal(values[["3"]], 1)
+    expect_equal(values[["2"]], 0.5 * values[["3"]], tolerance = 1e-3)
+    expect_equal(values[["0"]], 0.125 * values[["3"]], tolerance = 1e-3)
+  }
+})
+
+test_that("a learner of one's own is a class with two methods", {
+  counter <- structure(list(seen = 0), class = c("counter", "gym_learner", "gym_agent"))
+  registerS3method("agent_act", "counter", function(agent, observation, sub_env) {
+    rep(1L, length(sub_env))
+  }, envir = asNamespace("gym"))
+  registerS3method("agent_observe", "counter", function(agent, transitions) {
+    agent$seen <- agent$seen + length(transitions$reward)
+    agent
+  }, envir = asNamespace("gym"))
+  registerS3method("agent_policy", "counter", function(agent) c(1, 1, 1, 1),
+                   envir = asNamespace("gym"))
+  trained <- train_agent(counter, walk_model(), iterations = 3, episodes = 5, seed = 1)
+  expect_identical(trained$agent$seen, 30)
+  expect_identical(trained$steps, 30)
+  wrong <- structure(list(), class = c("wrong", "gym_learner", "gym_agent"))
+  registerS3method("agent_act", "wrong", function(agent, observation, sub_env) 1L,
+                   envir = asNamespace("gym"))
+  registerS3method("agent_observe", "wrong", function(agent, transitions) 3,
+                   envir = asNamespace("gym"))
+  expect_error(train_agent(wrong, walk_model(), iterations = 1), class = "gym_error_agent")
+})
