@@ -305,8 +305,8 @@ learn_by_steps <- function(agent, present, column, transitions, ahead) {
 #'
 #' @param x What `learn_q()` and the others returned, or their agent.
 #' @return A numeric vector with an element for each state, in the order of the table's rows: the
-#'   value of its best action, or of [learn_td()] of the state; of a Discrete with the states'
-#'   numbers as names.
+#'   value of its best action, or, from [learn_td()], that of the state. The elements are named by
+#'   the numbers of the states where observations are Discrete.
 #' @section Errors: `gym_error_argument` for what was not learned by a table.
 #' @export
 #' @examples

@@ -43,11 +43,11 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   counting$expected <- rep(1, length(backup$expected))
   rows <- lapply(seq_along(policies), function(i) {
     probabilities <- policy_matrix(policies[[i]], env, call)
-    value <- function(of, discount) start_mean(env, limited_values(of, probabilities, limit,
-                                                                   discount))
+    returns <- limited_values(backup, probabilities, limit, discount)
+    lengths <- limited_values(counting, probabilities, limit, 1)
     data.frame(
-      candidate = i, mean_return = value(backup, discount), mean_length = value(counting, 1),
-      max_steps = as.double(limit)
+      candidate = i, mean_return = start_mean(env, returns),
+      mean_length = start_mean(env, lengths), max_steps = as.double(limit)
     )
   })
   evaluated <- do.call(rbind, rows)

@@ -51,8 +51,8 @@ check_policy_matrix <- function(policy, possible, call) {
 rows_of_actions <- function(actions, model, arg, call) {
   columns <- action_columns(model, actions)
   count <- as.integer(model$action_space$n)
-  if (length(actions) != length(model$start) || anyNA(columns) || any(columns < 1L) ||
-        any(columns > count) || any(actions != trunc(actions))) {
+  known <- columns %in% seq_len(count) & actions == trunc(actions)
+  if (length(actions) != length(model$start) || !all(known)) {
     must <- paste("the number of an action for each of", count_of(length(model$start), "state"))
     abort_argument(actions, must, arg, call)
   }

@@ -20,8 +20,8 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   }
   if (!inherits(policy, "gym_policy_network")) {
     gym_abort(
-      paste0("`predict()` needs the policy to be a network, a table or a model, not ", policy_text(policy),
-             "."),
+      paste0("`predict()` needs the policy to be a network, a table or a model, not ",
+             policy_text(policy), "."),
       class = "gym_error_argument", argument = "object", value = policy, call = call
     )
   }
