@@ -1,0 +1,172 @@
+#' Learn in a bandit
+#'
+#' Lets many learners play a bandit, each one with arms of its own, and shows how their rewards grow
+#' in the mean: the ten-armed testbed of Sutton and Barto (2018, section 2.3). The learners know
+#' nothing of each other; that they play side by side only makes it quick.
+#'
+#' | `method` | which arm it takes | section |
+#' |---|---|---|
+#' | `"epsilon_greedy"` | the one with the largest mean reward so far, and with probability
+#' `epsilon` any | 2.2 |
+#' | `"ucb"` | the one with the largest upper confidence bound, the mean plus `confidence` times
+#' `sqrt(log(t) / n)` after n of t steps; first each once | 2.7 |
+#' | `"gradient"` | one drawn by a softmax of preferences, which rise with rewards above the mean |
+#' 2.8 |
+#'
+#' Of equal arms one is drawn.
+#'
+#' @param env What [bandit()] makes.
+#' @param method The method, a string.
+#' @param epsilon How often it explores, a number from 0 to 1; the default is 0.1.
+#' @param confidence How much an arm that was seldom taken is favoured by `"ucb"`, a number of at
+#'   least 0; the default is 2.
+#' @param learning_rate How far a value, or a preference, moves towards its target, a number above
+#'   0; `NULL`, the default, takes the mean of all rewards, and 0.1 for `"gradient"`.
+#' @param initial The value that all arms have at first, a number; the default is 0. With a constant
+#'   `learning_rate` a large one makes it try all arms (section 2.6).
+#' @param baseline Does `"gradient"` compare rewards with their mean so far? `TRUE`, the default, or
+#'   `FALSE`, with 0.
+#' @param learners How many learners there are, a whole number of at least 1; the default is 2,000.
+#' @param steps How many steps they take, a whole number; `NULL`, the default, is an episode of the
+#'   bandit's.
+#' @param seed A whole number that fixes all that is drawn, as for [rollout()].
+#' @return An object of class `gym_bandit_learning`, which [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_bandit_learning()] know; a list with the elements `curve`, a data frame of
+#'   `step` (integer), `mean_reward` (the mean over the learners) and `best_share` (how many of them
+#'   took an arm with the largest mean reward, from 0 to 1); `values`, a matrix with a row for each
+#'   learner and a column for each arm, its values or preferences at the end; and `label`,
+#'   `learners` and `seed`.
+#' @section Errors: `gym_error_argument`.
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press, chapter 2.
+#' @export
+#' @examples
+#' testbed <- bandit(arms = 10)
+#' greedy <- learn_bandit(testbed, epsilon = 0, learners = 200, seed = 1)
+#' explores <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
+#' explores
+#' plot(greedy, explores)
+learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), epsilon = 0.1,
+                         confidence = 2, learning_rate = NULL, initial = 0, baseline = TRUE,
+                         learners = 2000, steps = NULL, seed = NULL) {
+  problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
+  if (is.null(problem)) {
+    abort_argument(env, "a bandit, as `bandit()` makes it", "env", rlang::current_env())
+  }
+  method <- check_choice(method[1L], c("epsilon_greedy", "ucb", "gradient"), arg = "method")
+  check_number(epsilon, min = 0, max = 1)
+  check_number(confidence, min = 0)
+  if (!is.null(learning_rate)) check_above_zero(learning_rate)
+  check_number(initial)
+  check_flag(baseline)
+  check_count(learners)
+  check_count(steps, allow_null = TRUE)
+  check_seed(seed)
+  steps <- steps %||% env$spec$max_episode_steps
+  seed <- seed %||% draw_seed()
+  rule <- list(
+    method = method, epsilon = epsilon, confidence = confidence, learning_rate = learning_rate,
+    baseline = baseline
+  )
+  played <- with_generator(
+    new_generator(seed), play_bandits(problem, rule, initial, as.integer(learners), steps)
+  )
+  structure(
+    c(played, list(label = bandit_text(rule, initial), learners = learners, seed = seed,
+                   env_id = env$spec$id)),
+    class = "gym_bandit_learning"
+  )
+}
+
+play_bandits <- function(problem, rule, initial, learners, steps) {
+  means <- draw_means(problem, learners)
+  values <- matrix(as.double(initial), learners, problem$arms)
+  taken <- matrix(0, learners, problem$arms)
+  mean_so_far <- numeric(learners)
+  mean_reward <- best_share <- numeric(steps)
+  for (step in seq_len(steps)) {
+    arm <- choose_arms(rule, values, taken, step)
+    at <- cbind(seq_len(learners), arm)
+    best_share[[step]] <- mean(means[at] >= row_max(means))
+    paid <- pull(problem, means, arm)
+    means <- paid$means
+    mean_reward[[step]] <- mean(paid$reward)
+    taken[at] <- taken[at] + 1
+    if (rule$method == "gradient") {
+      # The mean of all rewards up to this one.
+      mean_so_far <- mean_so_far + (paid$reward - mean_so_far) / step
+      above <- paid$reward - if (rule$baseline) mean_so_far else 0
+      step_up <- -softmax_rows(values)
+      step_up[at] <- step_up[at] + 1
+      values <- values + (rule$learning_rate %||% 0.1) * above * step_up
+    } else {
+      rate <- rule$learning_rate %||% (1 / taken[at])
+      values[at] <- values[at] + rate * (paid$reward - values[at])
+    }
+  }
+  list(
+    curve = data.frame(
+      step = seq_len(steps), mean_reward = mean_reward, best_share = best_share
+    ),
+    values = values
+  )
+}
+
+choose_arms <- function(rule, values, taken, step) {
+  n <- nrow(values)
+  if (rule$method == "gradient") {
+    return(draw_by_row(softmax_rows(values)))
+  }
+  if (rule$method == "ucb") {
+    values <- values + rule$confidence * sqrt(log(step) / taken)
+    # An arm that was never taken comes first.
+    values[taken == 0] <- Inf
+  }
+  arm <- any_best_column(values)
+  if (rule$method == "epsilon_greedy" && rule$epsilon > 0) {
+    explores <- stats::runif(n) < rule$epsilon
+    arm[explores] <- sample.int(ncol(values), sum(explores), replace = TRUE)
+  }
+  arm
+}
+
+# The column of the largest number in each row; of several one is drawn.
+any_best_column <- function(values) {
+  best <- values == row_max(values)
+  max.col(best * (1 + stats::runif(length(values))), "first")
+}
+
+softmax_rows <- function(values) {
+  weight <- exp(values - row_max(values))
+  weight / rowSums(weight)
+}
+
+bandit_text <- function(rule, initial) {
+  parts <- c(
+    switch(
+      rule$method,
+      epsilon_greedy = paste("epsilon", number_text(rule$epsilon)),
+      ucb = paste("UCB, confidence", number_text(rule$confidence)),
+      gradient = paste0("gradient", if (!rule$baseline) " without baseline")
+    ),
+    if (!is.null(rule$learning_rate)) paste("learning_rate", number_text(rule$learning_rate)),
+    if (initial != 0) paste("initial", number_text(initial))
+  )
+  paste(parts, collapse = ", ")
+}
+
+#' @export
+print.gym_bandit_learning <- function(x, ...) {
+  last <- utils::tail(x$curve, 100L)
+  cat(
+    paste0(count_of(x$learners, "learner"), " in ", x$env_id, ": ", x$label),
+    paste0("Last ", count_of(nrow(last), "step"), " of ", number_text(nrow(x$curve)),
+           ": mean reward ", number_text(mean(last$mean_reward)), ", the best arm in ",
+           percent_text(mean(last$best_share))),
+    sep = "\n"
+  )
+  invisible(x)
+}
+
+#' @export
+as.data.frame.gym_bandit_learning <- function(x, row.names = NULL, optional = FALSE, ...) x$curve

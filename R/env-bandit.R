@@ -1,0 +1,78 @@
+#' Make a bandit
+#'
+#' A bandit has arms, each of which pays a reward drawn from a normal distribution of its own
+#' (Sutton and Barto 2018, chapter 2). Nothing is observed but that: the observation is always 0,
+#' and an action is the number of an arm, from 0. In each episode the arms' means are drawn anew,
+#' unless they are given, which makes the testbed of section 2.3.
+#'
+#' @param arms How many arms there are, a whole number of at least 1; the default is 10, or how many
+#'   means are given.
+#' @param mean The mean reward of each arm, a numeric vector with an element for each; `NULL`, the
+#'   default, draws them from the standard normal distribution, moved by `centre`.
+#' @param sd The standard deviation of rewards around the mean, a number of at least 0.
+#' @param centre The mean of the means that are drawn, a number; the default is 0.
+#' @param drift The standard deviation of the step by which each mean moves after each action, a
+#'   number of at least 0; the default, 0, leaves them where they are.
+#' @param steps How many actions make an episode, a whole number; the default is 1,000.
+#' @return An environment, as [gym_env()] makes them, in which [rollout()] plays 256
+#'   sub-environments side by side, each with arms of its own. [learn_bandit()] learns in it.
+#' @section Errors: `gym_error_argument`.
+#' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
+#'   edition, MIT Press.
+#' @export
+#' @examples
+#' bandit()
+#' rollout(bandit(3, mean = c(0, 1, 2), steps = 10), policy_random(), episodes = 100, seed = 1)
+bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
+                   steps = 1000) {
+  if (missing(arms) && !is.null(mean)) arms <- length(mean)
+  check_count(arms)
+  if (!is.null(mean) && !(is.numeric(mean) && length(mean) == arms && all(is.finite(mean)))) {
+    abort_argument(mean, paste("a finite number for each of", count_of(arms, "arm"), "or NULL"),
+                   "mean", rlang::current_env())
+  }
+  check_number(sd, min = 0)
+  check_number(centre)
+  check_number(drift, min = 0)
+  check_count(steps)
+  arms <- as.integer(arms)
+  gym_env(
+    reset = function(self) {
+      self$means <- draw_means(self$bandit, self$num_envs)
+      integer(self$num_envs)
+    },
+    step = function(self, action) {
+      paid <- pull(self$bandit, self$means, action + 1L)
+      self$means <- paid$means
+      list(
+        observation = integer(self$num_envs), reward = paid$reward,
+        terminated = logical(self$num_envs)
+      )
+    },
+    observation_space = space_discrete(1), action_space = space_discrete(arms), vectorized = TRUE,
+    bandit = list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift),
+    id = paste0("Bandit-", arms), max_episode_steps = steps
+  )
+}
+
+# The mean rewards of n bandits, a matrix with a row for each.
+draw_means <- function(bandit, n) {
+  if (is.null(bandit$mean)) {
+    matrix(stats::rnorm(n * bandit$arms, bandit$centre), n, bandit$arms)
+  } else {
+    matrix(bandit$mean, n, bandit$arms, byrow = TRUE)
+  }
+}
+
+# Pulls an arm of each bandit.
+pull <- function(bandit, means, arm) {
+  n <- nrow(means)
+  reward <- means[cbind(seq_len(n), arm)] + bandit$sd * stats::rnorm(n)
+  if (bandit$drift > 0) {
+    means <- means + bandit$drift * stats::rnorm(length(means))
+  }
+  list(reward = reward, means = means)
+}
+
+# What a bandit's environment was made of, `NULL` for any other environment.
+bandit_of <- function(env) definition_of(env)$parameters$bandit

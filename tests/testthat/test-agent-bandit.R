@@ -1,0 +1,95 @@
+test_that("a bandit pays each arm's mean, with the noise that it has", {
+  env <- bandit(mean = c(-1, 0, 2), sd = 0.5, steps = 20)
+  expect_identical(env$single_action_space$n, 3L)
+  played <- rollout(env, policy_random(), episodes = 500, seed = 1, steps = TRUE)
+  each <- tapply(played$steps$reward, played$steps$action, mean)
+  expect_equal(as.vector(each), c(-1, 0, 2), tolerance = 0.05)
+  spread <- tapply(played$steps$reward, played$steps$action, stats::sd)
+  expect_equal(as.vector(spread), rep(0.5, 3), tolerance = 0.05)
+  expect_true(all(played$episodes$length == 20))
+  expect_true(all(played$episodes$truncated))
+})
+
+test_that("without means each episode draws its own", {
+  played <- rollout(bandit(arms = 2, sd = 0, steps = 2), function(state) 0L * state,
+                    episodes = 400, seed = 1, steps = TRUE)
+  first <- played$steps$reward[played$steps$step == 1]
+  expect_identical(first, played$steps$reward[played$steps$step == 2])
+  expect_equal(stats::sd(first), 1, tolerance = 0.15)
+  moving <- rollout(bandit(mean = 0, sd = 0, drift = 1, steps = 30), function(state) 0L * state,
+                    episodes = 400, seed = 1, steps = TRUE)
+  steps <- diff(moving$steps$reward)[diff(moving$steps$episode) == 0]
+  expect_equal(stats::sd(steps), 1, tolerance = 0.05)
+})
+
+test_that("the testbed's curves are those of the book", {
+  # Sutton and Barto (2018), figures 2.2 and 2.4, to the eye: after 1,000 steps greedy gets about 1,
+  # epsilon 0.1 about 1.4 and the best arm in four fifths of the cases.
+  testbed <- bandit(arms = 10)
+  late <- function(...) {
+    utils::tail(learn_bandit(testbed, ..., seed = 1)$curve, 100)
+  }
+  greedy <- late(epsilon = 0)
+  explores <- late(epsilon = 0.1)
+  ucb <- late("ucb")
+  gradient <- late("gradient")
+  expect_equal(mean(greedy$mean_reward), 1.05, tolerance = 0.08)
+  expect_equal(mean(explores$mean_reward), 1.38, tolerance = 0.05)
+  expect_equal(mean(explores$best_share), 0.8, tolerance = 0.05)
+  expect_gt(mean(ucb$mean_reward), mean(explores$mean_reward))
+  expect_gt(mean(gradient$best_share), 0.7)
+})
+
+test_that("a seed fixes all that is drawn, and the session's generator stays as it was", {
+  testbed <- bandit(arms = 4, steps = 30)
+  set.seed(5)
+  state <- globalenv()$.Random.seed
+  first <- learn_bandit(testbed, learners = 20, seed = 3)
+  expect_identical(globalenv()$.Random.seed, state)
+  expect_identical(learn_bandit(testbed, learners = 20, seed = 3), first)
+  expect_false(identical(learn_bandit(testbed, learners = 20, seed = 4)$curve, first$curve))
+})
+
+test_that("one learner follows its method step by step", {
+  # Without noise: the value of an arm that was taken is its mean.
+  sure <- bandit(mean = c(1, 3, 2), sd = 0)
+  ucb <- learn_bandit(sure, "ucb", learners = 1, steps = 3, seed = 1)
+  expect_identical(ucb$values[1, ], c(1, 3, 2))
+  constant <- learn_bandit(sure, learning_rate = 0.5, initial = 8, epsilon = 0, learners = 1,
+                           steps = 3, seed = 1)
+  # Optimism makes it try each arm once.
+  expect_identical(constant$values[1, ], c(4.5, 5.5, 5))
+  one <- learn_bandit(sure, "gradient", learning_rate = 0.1, baseline = FALSE, learners = 1,
+                      steps = 1, seed = 1)
+  arm <- which.max(one$values[1, ])
+  expected <- rep(-1 / 3, 3)
+  expected[[arm]] <- 2 / 3
+  expect_equal(one$values[1, ], 0.1 * c(1, 3, 2)[[arm]] * expected)
+})
+
+test_that("what was learned prints and plots, several together", {
+  testbed <- bandit(arms = 3, steps = 20)
+  few <- learn_bandit(testbed, epsilon = 0, learners = 50, seed = 1)
+  ucb <- learn_bandit(testbed, "ucb", learners = 50, seed = 1)
+  expect_output(print(few), "50 learners in Bandit-3: epsilon 0\nLast 20 steps of 20")
+  expect_identical(names(as.data.frame(few)), c("step", "mean_reward", "best_share"))
+  local_device()
+  expect_leaves_session_alone(expect_identical(plot(few, ucb), few))
+  plot(few, bound = ucb, what = "best_share")
+  data <- bandit_plot_data(list(few, bound = ucb, few), "best_share")
+  expect_identical(levels(data$curves$learner), c("epsilon 0", "bound", "epsilon 0, again 1"))
+  expect_error(plot(few, 3), class = "gym_error_argument")
+  testthat::skip_if_not_installed("ggplot2")
+  expect_s3_class(ggplot2::autoplot(few, ucb), "ggplot")
+})
+
+test_that("what is no bandit, or no method, is refused", {
+  refused <- function(code, text) {
+    expect_error(code, text, class = "gym_error_argument", fixed = TRUE)
+  }
+  refused(bandit(2, mean = 1:3), "`mean` must be a finite number for each of 2 arms")
+  refused(bandit(sd = -1), "`sd` must be a number of at least 0")
+  refused(learn_bandit("CartPole-v1"), "`env` must be a bandit")
+  refused(learn_bandit(bandit(), "thompson"), "one of \"epsilon_greedy\"")
+  refused(learn_bandit(bandit(), epsilon = 2), "`epsilon` must be a number from 0 to 1")
+})
