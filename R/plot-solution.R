@@ -71,6 +71,9 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   check_count(step, max = x$horizon %||% 1, call = call)
   cells <- as.data.frame(x)
   if (is.matrix(x$actions)) cells$action <- x$actions[, step]
+  if (inherits(x$policy, "gym_policy_table")) {
+    cells$action <- state_numbers(x$model$action_space)[best_column(x$policy$q)]
+  }
   known <- known_grid(x$model$spec$id)
   directions <- check_directions(
     directions %||% known_directions[[known]], ncol(x$q), call
