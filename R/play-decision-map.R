@@ -12,6 +12,10 @@
 #'   as in [act()].
 #' - Actions that are a Box: the action, or of several numbers the one named by `action`.
 #'
+#' Where observations are Discrete the map has the action in each state, and the other arguments
+#' make no difference. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake,
+#' CliffWalking or Taxi.
+#'
 #' # Ranges
 #'
 #' `xlim` and `ylim` where they are given. Otherwise CartPole's parts have the ranges in
@@ -51,7 +55,7 @@
 #'       names, and `output` (double, from 0 to 1, where `kind` is `"output"`) or `action`
 #'       (integer or double). `as.data.frame()` gives it.}
 #'     \item{x, y}{The names of the two parts, strings.}
-#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"` or `"value"`.}
+#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"` or `"state"`.}
 #'     \item{at}{Where the other parts are held, a named numeric vector.}
 #'     \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
 #'     \item{actions}{The names of the actions, strings; of a Box the name of the number.}
@@ -97,6 +101,9 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   check_count(size, min = 2)
   check_seed(seed)
   place <- mapped_place(env, policy, client)
+  if (inherits(place$observation_space, "gym_space_discrete")) {
+    return(new_state_map(place, rlang::current_env()))
+  }
   observed <- mapped_observation(place)
   axes <- mapped_axes(observed, x, y)
   if (isTRUE(path)) {

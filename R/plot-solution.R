@@ -90,11 +90,15 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   cells$does[is.na(cells$does)] <- ""
   data <- list(title = solution_title(x), key = range(cells$value[is.finite(cells$value)]))
   if (known == "Taxi" && is.null(columns)) {
-    return(c(data, taxi_cells(x, cells, passenger, destination, call)))
+    return(c(data, taxi_cells(cells, passenger, destination, taxi_walls(x$model), call)))
   }
-  columns <- columns %||% if (known != "") grid_columns(x$model)
+  c(data, grid_cells(cells, columns %||% if (known != "") grid_columns(x$model), call))
+}
+
+# Puts states into rows and columns, where it is known how many columns there are.
+grid_cells <- function(cells, columns, call) {
   if (is.null(columns)) {
-    return(c(data, list(cells = cells)))
+    return(list(cells = cells))
   }
   count <- nrow(cells)
   if (count %% columns != 0) {
@@ -103,7 +107,7 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   }
   cells$row <- (seq_len(count) - 1L) %/% columns + 1L
   cells$column <- (seq_len(count) - 1L) %% columns + 1L
-  c(data, list(cells = cells, columns = columns, rows = count / columns))
+  list(cells = cells, columns = columns, rows = count / columns)
 }
 
 solution_title <- function(x) {
@@ -151,8 +155,8 @@ grid_columns <- function(model) {
 }
 
 # The states of Taxi number the row, the column, the passenger and the destination, see its
-# documentation. Walls are where a move stays in its place.
-taxi_cells <- function(x, cells, passenger, destination, call) {
+# documentation.
+taxi_cells <- function(cells, passenger, destination, walls, call) {
   check_count(passenger, min = 0, max = 4, call = call)
   check_count(destination, min = 0, max = 3, call = call)
   state <- cells$state
@@ -160,14 +164,17 @@ taxi_cells <- function(x, cells, passenger, destination, call) {
   cells$row <- state %/% 100L + 1L
   cells$column <- state %/% 20L %% 5L + 1L
   cells <- cells[shown, ]
-  # At its destination the passenger has been brought there.
-  right <- x$model$transitions[x$model$transitions$action == 2L, ]
-  stays <- right$state[right$state == right$next_state & right$probability == 1]
   list(
     cells = cells, columns = 5L, rows = 5L,
-    walls = cells[cells$column < 5L & cells$state %in% stays, c("row", "column")],
+    walls = cells[cells$column < 5L & cells$state %in% walls, c("row", "column")],
     stands = taxi_stands, from = passenger, to = destination
   )
+}
+
+# The states from which a move to the right stays in its place.
+taxi_walls <- function(model) {
+  right <- model$transitions[model$transitions$action == 2L, ]
+  right$state[right$state == right$next_state & right$probability == 1]
 }
 
 # Drawing ---------------------------------------------------------------------------
@@ -176,6 +183,9 @@ value_palette <- function(n = 101L) grDevices::hcl.colors(n, "viridis")
 
 # The colours of values, and those of what is written on them.
 cell_colours <- function(data) {
+  if (!is.null(data$fill)) {
+    return(list(fill = data$fill, ink = rep("black", nrow(data$cells))))
+  }
   span <- diff(data$key)
   share <- if (span > 0) (data$cells$value - data$key[[1L]]) / span else rep(1, nrow(data$cells))
   share <- pmin(pmax(share, 0), 1)
@@ -271,9 +281,7 @@ autoplot.gym_solution <- function(object, ..., columns = NULL, directions = NULL
   check_dots_empty(...)
   data <- solution_plot_data(object, columns, directions, passenger, destination, step)
   cells <- data$cells
-  symbols <- c(left = "\u2190", right = "\u2192", up = "\u2191", down = "\u2193")
-  known <- cells$does %in% names(symbols)
-  cells$does[known] <- symbols[cells$does[known]]
+  cells$does <- with_arrow_signs(cells$does)
   cells$does[cells$ends] <- "\u00d7"
   cells$text[is.na(cells$value)] <- ""
   cells$ink <- cell_colours(data)$ink
@@ -295,4 +303,11 @@ autoplot.gym_solution <- function(object, ..., columns = NULL, directions = NULL
     ggplot2::coord_fixed() +
     ggplot2::theme_void() +
     ggplot2::labs(title = data$title)
+}
+
+with_arrow_signs <- function(does) {
+  signs <- c(left = "\u2190", right = "\u2192", up = "\u2191", down = "\u2193")
+  known <- does %in% names(signs)
+  does[known] <- signs[does[known]]
+  does
 }
