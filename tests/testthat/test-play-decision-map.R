@@ -164,7 +164,8 @@ test_that("what cannot be mapped says why", {
                           action_space = box_space(-1, 1))
   bad(policy_network(c(1, 1), c("tanh", "tanh")), one, 1, 1, message = "observes only one")
   pairs <- fake_environment(observation_space = space_multi_discrete(c(4, 4)), id = "Pairs-v0")
-  bad(function(observation) rep(0L, nrow(observation)), pairs, message = "what is observed in Pairs-v0 is of")
+  bad(function(observation) rep(0L, nrow(observation)), pairs,
+      message = "what is observed in Pairs-v0 is of")
   several <- fake_environment(action_space = new_space(
     list(name = "MultiBinary", shape = list(2L), dtype = "int8")
   ))
