@@ -18,7 +18,9 @@ with contextlib.suppress(ImportError):
 REGISTERED = [
     spec
     for spec in gymnasium.registry.values()
-    if not isinstance(spec.entry_point, type) and not spec.id.startswith("faulty")
+    if not isinstance(spec.entry_point, type)
+    and not getattr(spec.entry_point, "__module__", "").startswith("faulty_envs.")
+    and not spec.id.startswith("faulty")
 ]
 
 

@@ -166,6 +166,12 @@ class CallPipe:
                 if self._is_closed:
                     self._pipe.close()
 
+    def drop_first_result(self) -> None:
+        """Let ``close()`` close the pipe although nobody has read the first result."""
+        self._first_result_is_due = False
+        if self._is_closed:
+            self._pipe.close()
+
     def _receive(self, timeout: float | None) -> Ready | Result:
         while True:
             if timeout is not None and not self._pipe.poll(timeout):

@@ -187,6 +187,7 @@ class WorkerProcess:
         """End it at once; every call that waits for it raises the reason."""
         with self._lock:
             self._our_reason = self._our_reason or why
+        self._calls.drop_first_result()
         self._send_kill()
 
     def begin_close(self) -> None:

@@ -107,6 +107,17 @@ def test_a_first_result_is_read_after_the_pipe_was_closed():
         pipe.call("step")
 
 
+@pytest.mark.parametrize("closed_first", [True, False])
+def test_a_first_result_that_nobody_wants_leaves_no_pipe_open(closed_first):
+    ours, theirs = multiprocessing.Pipe()
+    pipe = CallPipe(ours, first_result=True)
+    for end in [pipe.close, pipe.drop_first_result][:: 1 if closed_first else -1]:
+        end()
+    theirs.close()
+    with pytest.raises(OSError):
+        pipe.first_result()
+
+
 @pytest.mark.parametrize("forged", FORGED)
 def test_what_is_no_result_is_refused(ends, forged):
     pipe, other = ends
