@@ -37,7 +37,7 @@ agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL
     temperature = temperature, initial = initial, features = NULL, visits = visits,
     exploring_starts = exploring_starts
   )
-  check_learner(settings)
+  check_learner(settings[!vapply(settings, is.null, NA)])
   new_learner("gym_agent_monte_carlo", settings)
 }
 
@@ -50,12 +50,12 @@ agent_start.gym_agent_monte_carlo <- function(agent, policy) {
 
 #' @export
 agent_act.gym_agent_monte_carlo <- function(agent, observation, sub_env) {
-  column <- choose_actions(agent, values_of(agent, seen_by(agent, observation, sub_env)))
+  values <- values_of(agent, seen_by(agent, observation, sub_env))
+  column <- choose_actions(agent, values)
   if (agent$exploring_starts) {
     known <- lengths(agent$pending)
     starts <- is.na(known[sub_env]) | known[sub_env] == 0L
-    anything <- sample.int(value_columns_of(agent), length(column), replace = TRUE)
-    column[starts] <- anything[starts]
+    column[starts] <- draw_table_actions(list(epsilon = 1), values)[starts]
   }
   column - 1L + agent$spaces$action_space$start
 }
@@ -91,7 +91,7 @@ learn_episode <- function(agent, episode) {
     rate <- if (is.null(agent$learning_rate)) {
       1 / agent$visited[[at]]
     } else {
-      scheduled(agent$learning_rate, agent$taken)
+      scheduled(agent$learning_rate, agent$taken, "learning_rate")
     }
     agent$weights[[at]] <- agent$weights[[at]] + rate * (returns[[i]] - agent$weights[[at]])
   }

@@ -9,18 +9,23 @@
 #' remembered steps are learned from again after each real one (Dyna-Q; section 8.2), where the last
 #' outcome of each state and action is remembered.
 #'
+#' Of actions with equal values the first is taken. Where the model is known, an action that a state
+#' does not have is never taken.
+#'
 #' Where the model of the environment is known (see [env_model()]) the policy is judged by it,
 #' exactly and without playing; the evaluations then have 0 episodes and a standard error of 0.
 #'
 #' @param discount The discount, a number above 0 and at most 1; the default is 0.99.
 #' @param learning_rate How far a value moves towards its target, a number from 0 to 1, or a
-#'   function of the steps so far, such as [schedule_linear()]. With features the value moves by
-#'   this, whatever number of tiles it is made of.
+#'   function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this,
+#'   whatever number of tiles it is made of; with features of a function by this times the sum of
+#'   their squares.
 #' @param epsilon How often it explores, a number from 0 to 1, or a function of the steps so far.
 #' @param temperature The temperature of softmax exploration, in place of `epsilon`, a number above
 #'   0 or a function of the steps so far; `NULL`, the default, for none. See [policy_table()].
 #' @param initial The value that all actions have at first, a number; a large one makes it try
-#'   everything ("optimistic"). The default is 0.
+#'   everything ("optimistic"). The default is 0. With features of a function all weights are 0 at
+#'   first.
 #' @param features `NULL`, the default, for a table with a row for each state; what [tile_coding()]
 #'   makes; or a function of a batch of observations that returns a numeric matrix with a row of
 #'   features for each.
@@ -96,7 +101,7 @@ agent_observe.gym_agent_q <- function(agent, transitions) {
 learn_double <- function(agent, present, column, transitions, after) {
   agent$second <- agent$second %||% agent$weights
   first <- stats::runif(length(column)) < 0.5
-  rate <- scheduled(agent$learning_rate, agent$taken)
+  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
   learns <- function(own, choosing, valuing) {
     if (!any(own)) {
       return(choosing)
@@ -137,6 +142,8 @@ plan_again <- function(agent, n) {
   taken <- agent$taken
   count <- nrow(agent$weights)
   for (again in seq_len(agent$planning)) {
+    # No steps of the environment: schedules stay where they are.
+    agent$taken <- taken
     pair <- agent$memory$pair[sample.int(length(agent$memory$pair), n, replace = TRUE)]
     outcome <- agent$memory$outcome[pair, , drop = FALSE]
     ahead <- row_max(values_of(agent, outcome[, 2L, drop = FALSE]))

@@ -17,12 +17,11 @@ new_learner <- function(class, settings) {
 
 check_learner <- function(settings, call = rlang::caller_env()) {
   check_discount(settings$discount, "discount", call)
-  if (!is.null(settings$learning_rate)) {
-    check_schedule(settings$learning_rate, "learning_rate", 1, call)
+  for (name in intersect(c("learning_rate", "epsilon"), names(settings))) {
+    check_schedule(settings[[name]], name, 0, 1, call)
   }
-  if (!is.null(settings$epsilon)) check_schedule(settings$epsilon, "epsilon", 1, call)
   if (!is.null(settings$temperature)) {
-    check_schedule(settings$temperature, "temperature", Inf, call)
+    check_schedule(settings$temperature, "temperature", lowest_temperature, Inf, call)
   }
   check_number(settings$initial, arg = "initial", call = call)
   features <- settings$features
@@ -32,15 +31,28 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
 }
 
-check_schedule <- function(x, arg, max, call) {
-  if (!is.function(x) && !(is_number(x) && x >= 0 && x <= max)) {
-    must <- paste0("a number", range_text(0, max), ", or a function of the steps so far")
+check_schedule <- function(x, arg, min, max, call) {
+  if (!is.function(x) && !(is_number(x) && x >= min && x <= max)) {
+    must <- paste0("a number", range_text(min, max), ", or a function of the steps so far")
     abort_argument(x, must, arg, call)
   }
 }
 
 # A number that may change with the steps that were taken so far.
-scheduled <- function(x, taken) if (is.function(x)) x(taken) else x
+scheduled <- function(x, taken, arg, min = 0, max = 1) {
+  if (!is.function(x)) {
+    return(x)
+  }
+  value <- x(taken)
+  if (!is_number(value) || value < min || value > max) {
+    gym_abort(
+      paste0("The function `", arg, "` must return a number", range_text(min, max), ", and after ",
+             number_text(taken), " steps it returned ", describe_argument(value), "."),
+      class = "gym_error_argument", argument = arg, value = value, call = NULL
+    )
+  }
+  value
+}
 
 #' Change a number while an agent learns
 #'
@@ -60,7 +72,7 @@ schedule_linear <- function(from, to, steps) {
   check_number(from)
   check_number(to)
   check_number(steps, min = 1)
-  function(taken) from + (to - from) * pmin(taken / steps, 1)
+  new_schedule(from, to, steps, function(taken) from + (to - from) * pmin(taken / steps, 1))
 }
 
 #' @rdname schedule_linear
@@ -69,8 +81,23 @@ schedule_exponential <- function(from, to, steps) {
   check_above_zero(from)
   check_above_zero(to)
   check_number(steps, min = 1)
-  function(taken) from * (to / from)^pmin(taken / steps, 1)
+  new_schedule(from, to, steps, function(taken) from * (to / from)^pmin(taken / steps, 1))
 }
+
+# A checkpoint tells two schedules apart by their numbers, not by what a function has kept.
+new_schedule <- function(from, to, steps, f) {
+  structure(f, from = from, to = to, steps = steps, class = c("gym_schedule", "function"))
+}
+
+#' @export
+print.gym_schedule <- function(x, ...) {
+  cat("<schedule: from ", number_text(attr(x, "from")), " to ", number_text(attr(x, "to")), " in ",
+      count_of(attr(x, "steps"), "step"), ">\n", sep = "")
+  invisible(x)
+}
+
+# Below this a softmax is the choice of the best.
+lowest_temperature <- 1e-12
 
 # Beginning ---------------------------------------------------------------------------
 
@@ -102,7 +129,8 @@ value_columns_of <- function(agent) UseMethod("value_columns_of")
 value_columns_of.default <- function(agent) as.integer(agent$spaces$action_space$n)
 
 first_weights <- function(agent, policy) {
-  if (!is.null(policy$q) && is.null(agent$features)) {
+  if (!is.null(policy$q)) {
+    check_first_table(agent, policy)
     return(policy$q)
   }
   if (is.na(agent$basis$count)) {
@@ -110,18 +138,26 @@ first_weights <- function(agent, policy) {
     return(NULL)
   }
   each <- agent$basis$each
-  matrix(as.double(agent$initial) / each, agent$basis$count, value_columns_of(agent))
+  weights <- matrix(as.double(agent$initial) / each, agent$basis$count, value_columns_of(agent))
+  if (is.null(agent$features) && identical(dim(weights), dim(policy$possible))) {
+    # What a state does not have is never taken; of an end no action is.
+    weights[!policy$possible & rowSums(policy$possible) > 0] <- -Inf
+  }
+  weights
+}
+
+check_first_table <- function(agent, policy) {
+  if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
+    gym_abort(
+      "A table to begin with is for learners of a table with a column for each action.",
+      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    )
+  }
 }
 
 with_known_weights <- function(agent, present) {
   if (is.null(agent$weights)) {
     agent$weights <- matrix(0, ncol(present), value_columns_of(agent))
-  } else if (is.null(agent$basis$each) && ncol(present) != nrow(agent$weights)) {
-    gym_abort(
-      paste0("`features` returned ", count_of(nrow(agent$weights), "feature"),
-             " at first, and now ", ncol(present), "."),
-      class = "gym_error_argument", argument = "features", call = NULL
-    )
   }
   agent
 }
@@ -139,7 +175,19 @@ agent_act.gym_value_learner <- function(agent, observation, sub_env) {
   action - 1L + agent$spaces$action_space$start
 }
 
-seen_by <- function(agent, observation, sub_env) agent$basis$of(observation, length(sub_env))
+# The features of observations, of which there is one for each sub-environment.
+seen_by <- function(agent, observation, sub_env) {
+  present <- agent$basis$of(observation, length(sub_env))
+  weights <- agent$weights
+  if (is.null(agent$basis$each) && !is.null(weights) && ncol(present) != nrow(weights)) {
+    gym_abort(
+      paste0("`features` returned ", count_of(nrow(weights), "feature"), " at first, and now ",
+             ncol(present), "."),
+      class = "gym_error_argument", argument = "features", call = NULL
+    )
+  }
+  present
+}
 
 values_of <- function(agent, present, weights = agent$weights) {
   if (is.null(weights)) {
@@ -152,8 +200,10 @@ values_of <- function(agent, present, weights = agent$weights) {
 # How it explores at the moment.
 exploration <- function(agent) {
   list(
-    epsilon = scheduled(agent$epsilon %||% 0, agent$taken),
-    temperature = if (!is.null(agent$temperature)) scheduled(agent$temperature, agent$taken)
+    epsilon = scheduled(agent$epsilon %||% 0, agent$taken, "epsilon"),
+    temperature = if (!is.null(agent$temperature)) {
+      scheduled(agent$temperature, agent$taken, "temperature", lowest_temperature, Inf)
+    }
   )
 }
 
@@ -191,12 +241,12 @@ learn_from <- function(agent, present, column, transitions, ahead) {
   ahead[transitions$terminated] <- 0
   if (isTRUE(agent$lambda > 0)) {
     agent <- learn_by_traces(agent, present, column, transitions, ahead)
-  } else if (isTRUE(agent$n > 1L)) {
+  } else if (isTRUE(agent[["n"]] > 1L)) {
     agent <- learn_by_steps(agent, present, column, transitions, ahead)
   } else {
     value <- values_of(agent, present)[cbind(seq_len(n), column)]
     error <- transitions$reward + agent$discount * ahead - value
-    rate <- scheduled(agent$learning_rate, agent$taken)
+    rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
     agent$weights <- move_weights(agent$basis, agent$weights, present, column, rate, error)
   }
   agent$taken <- agent$taken + n
@@ -247,7 +297,7 @@ move_dense_weights <- function(weights, present, column, rate, error) {
 #' 2018, sections 12.2 and 12.7).
 #' @noRd
 learn_by_traces <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken) / (agent$basis$each %||% 1L)
+  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate") / (agent$basis$each %||% 1L)
   decay <- agent$discount * agent$lambda
   for (i in seq_along(column)) {
     place <- transitions$sub_env[[i]]
@@ -273,7 +323,7 @@ learn_by_traces <- function(agent, present, column, transitions, ahead) {
 #' Learn from what n steps came to (Sutton and Barto 2018, sections 7.1 and 7.2)
 #' @noRd
 learn_by_steps <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken)
+  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
   ended <- transitions$terminated | transitions$truncated
   for (i in seq_along(column)) {
     place <- transitions$sub_env[[i]]
@@ -306,7 +356,8 @@ learn_by_steps <- function(agent, present, column, transitions, ahead) {
 #' @param x What `learn_q()` and the others returned, or their agent.
 #' @return A numeric vector with an element for each state, in the order of the table's rows: the
 #'   value of its best action, or, from [learn_td()], that of the state. The elements are named by
-#'   the numbers of the states where observations are Discrete.
+#'   the numbers of the states where observations are Discrete. States that were never left, such as
+#'   ends, have the value that all had at first.
 #' @section Errors: `gym_error_argument` for what was not learned by a table.
 #' @export
 #' @examples
@@ -318,7 +369,8 @@ learn_by_steps <- function(agent, present, column, transitions, ahead) {
 #' state_values(learned)
 state_values <- function(x) {
   agent <- if (inherits(x, "gym_training")) x$agent else x
-  if (!inherits(agent, "gym_value_learner") || !is.null(agent$features)) {
+  if (!inherits(agent, "gym_value_learner") || is.null(agent$weights) ||
+        !is.null(agent$features)) {
     must <- "what was learned by a table, as `learn_q()` returns it"
     abort_argument(x, must, "x", rlang::current_env())
   }

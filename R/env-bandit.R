@@ -50,7 +50,10 @@ bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
       )
     },
     observation_space = space_discrete(1), action_space = space_discrete(arms), vectorized = TRUE,
-    bandit = list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift),
+    bandit = structure(
+      list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift),
+      class = "gym_bandit"
+    ),
     id = paste0("Bandit-", arms), max_episode_steps = steps
   )
 }
@@ -75,4 +78,7 @@ pull <- function(bandit, means, arm) {
 }
 
 # What a bandit's environment was made of, `NULL` for any other environment.
-bandit_of <- function(env) definition_of(env)$parameters$bandit
+bandit_of <- function(env) {
+  bandit <- definition_of(env)$parameters[["bandit"]]
+  if (inherits(bandit, "gym_bandit")) bandit
+}

@@ -109,6 +109,11 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
     check_takes(render, "self")
   }
   check_flag(vectorized)
+  if (!is.null(model) && !is.data.frame(model) && !is.function(model) &&
+        !inherits(model, "gym_model")) {
+    must <- "a model, a data frame of transitions, a function that returns one, or NULL"
+    abort_argument(model, must, "model", rlang::current_env())
+  }
   parameters <- list(...)
   check_dots_named(parameters, "size = 5")
   # A space that was left out is refused as one that is NULL is.

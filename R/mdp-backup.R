@@ -42,7 +42,10 @@ action_columns <- function(model, action) as.integer(action - model$action_space
 # The value of each action in each state, a matrix, given the value of each state: Bellman's
 # equation. Actions that cannot be taken have -Inf.
 action_values <- function(backup, values, discount) {
-  ahead <- backup$weight * values[backup$next_state]
+  ahead <- values[backup$next_state]
+  # Where nothing leads an infinite value counts nothing.
+  if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
+  ahead <- backup$weight * ahead
   q <- backup$expected + discount * .rowSums(ahead, nrow(backup$weight), ncol(backup$weight))
   q[!backup$possible] <- -Inf
   dim(q) <- c(backup$states, backup$actions)

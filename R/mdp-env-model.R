@@ -11,7 +11,8 @@
 #' @param client The client of the server where an environment named by its id is made; the default
 #'   is the session's own, [gym_client()].
 #' @return An object of class [gym_model].
-#' @section Errors: `gym_error_argument` for an environment in R without a model;
+#' @section Errors: `gym_error_no_model`, a kind of `gym_error_argument`, for an environment in R without a
+#'   model;
 #'   `gym_error_http_400` for one of Gymnasium's that has none, that is a vector environment, or
 #'   that has wrappers, which may change what the model says.
 #' @seealso [solve_mdp()], [gym_model()]
@@ -22,6 +23,7 @@
 #' head(as.data.frame(lake))
 env_model <- function(env, ..., client = gym_client()) {
   if (inherits(env, "gym_model")) {
+    check_dots_empty(...)
     return(env)
   }
   check_environment(env)
@@ -92,7 +94,8 @@ abort_without_model <- function(env, call) {
   gym_abort(
     c(paste0(environment_label(env), " has no model."),
       i = "`gym_env(model = )` gives an environment one, `estimate_model()` makes one of steps."),
-    class = "gym_error_argument", argument = "env", value = env, call = call
+    class = c("gym_error_no_model", "gym_error_argument"), argument = "env", value = env,
+    call = call
   )
 }
 

@@ -7,7 +7,9 @@
 #'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`, and perhaps
 #'   `episode`, by whose first rows it is known where episodes start.
 #' @param ... For methods.
-#' @return A model, see [gym_model()]. A state that was reached but never left, because episodes
+#' @return A model, see [gym_model()], whose states and actions are all of the environment's, where
+#'   the rollout's policy knows them, and otherwise those from the lowest to the highest number that
+#'   was seen. A state that was reached but never left, because episodes
 #'   were cut off there, counts as an end; a message says so.
 #' @section Errors: `gym_error_argument` for steps that were not kept, or whose observations are not
 #'   Discrete.
@@ -51,6 +53,9 @@ estimate_model.gym_rollout <- function(x, ...) {
     next_state = steps[[after]], reward = steps$reward,
     terminated = steps$terminated
   )
+  # What the policy knows of the environment; a function knows nothing.
+  spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
+  attr(table, "spaces") <- spaces
   model <- estimate_model(table)
   model$spec$id <- paste(x$env_id, "(estimated)")
   model
@@ -59,24 +64,23 @@ estimate_model.gym_rollout <- function(x, ...) {
 #' @export
 estimate_model.data.frame <- function(x, ...) {
   call <- rlang::current_env()
-  if (is.null(x$terminated)) x$terminated <- FALSE
-  x$probability <- NULL
+  if (is.null(x[["terminated"]])) x[["terminated"]] <- FALSE
+  x[["probability"]] <- NULL
   steps <- check_transitions(x, "x", call)
   steps$terminated <- end_at_unknown(steps)
-  first <- if (is.null(x$episode)) 1L else !duplicated(x$episode)
+  first <- if (is.null(x[["episode"]])) 1L else !duplicated(x[["episode"]])
   key <- do.call(paste, steps[c("state", "action", "next_state", "reward", "terminated")])
   count <- rowsum(rep(1, nrow(steps)), key, reorder = FALSE)[, 1L]
   table <- steps[!duplicated(key), ]
   pair <- paste(table$state, table$action)
   tried <- rowsum(count, pair, reorder = FALSE)[, 1L]
   table$probability <- unname(count / tried[pair])
-  states <- range(table$state, table$next_state)
-  actions <- range(table$action)
-  numbers <- seq.int(states[[1L]], states[[2L]])
-  starts <- tabulate(match(steps$state[first], numbers), length(numbers))
+  spaces <- attr(x, "spaces")
+  states <- spaces$observation_space %||% spanned_space(c(table$state, table$next_state), "states")
+  actions <- spaces$action_space %||% spanned_space(table$action, "actions")
+  starts <- tabulate(match(steps$state[first], state_numbers(states)), as.integer(states$n))
   new_model(
-    table, space_discrete(length(numbers), states[[1L]]),
-    space_discrete(diff(actions) + 1, actions[[1L]]), starts / sum(starts),
+    table, states, actions, starts / sum(starts),
     list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
   )
 }

@@ -62,18 +62,40 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
     max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
   )
   table <- check_transitions(transitions)
-  states <- range(table$state, table$next_state)
-  actions <- range(table$action)
-  new_model(
-    table,
-    space_discrete(states[[2L]] - states[[1L]] + 1, states[[1L]]),
-    space_discrete(actions[[2L]] - actions[[1L]] + 1, actions[[1L]]),
-    start, spec
-  )
+  states <- spanned_space(c(table$state, table$next_state), "states")
+  if (is_number(start)) {
+    start <- start_in(start, table, states)
+  }
+  new_model(table, states, spanned_space(table$action, "actions"), start, spec)
+}
+
+# The space of all numbers from the lowest to the highest one.
+spanned_space <- function(numbers, what, call = rlang::caller_env()) {
+  ends <- range(numbers)
+  count <- as.double(ends[[2L]]) - ends[[1L]] + 1
+  if (count > most_values) {
+    gym_abort(
+      c(paste0("The ", what, " are numbered from ", ends[[1L]], " to ", ends[[2L]],
+               ", which makes ", format(count, big.mark = ",", scientific = FALSE),
+               " of them; at most ", format(most_values, big.mark = ",", scientific = FALSE), " are possible."),
+        i = "Number them without gaps."),
+      class = "gym_error_argument", argument = "transitions", call = call
+    )
+  }
+  space_discrete(count, ends[[1L]])
+}
+
+# How likely each state is the first one, where it is always this one.
+start_in <- function(start, table, states, call = rlang::caller_env()) {
+  if (!start %in% table$state) {
+    abort_argument(start, "the number of a state that some row leaves", "start", call)
+  }
+  as.double(state_numbers(states) == start)
 }
 
 #' Make a model of a table
 #'
+#' @param start How likely each state is the first one, or `NULL`.
 #' @param table As [check_transitions()] returns it.
 #' @param call The user's call.
 #' @noRd
@@ -109,11 +131,10 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
     check_column(x, name, "whole numbers", are_whole_numbers, arg, call)
   }
   check_column(x, "reward", "finite numbers", are_finite, arg, call)
-  probability <- x$probability %||% rep(1, nrow(x))
-  x$probability <- probability
+  # Not `$`, which takes the beginnings of names, too, and warns of a tibble's.
+  x[["probability"]] <- probability <- x[["probability"]] %||% rep(1, nrow(x))
   check_column(x, "probability", "numbers from 0 to 1", are_probabilities, arg, call)
-  terminated <- x$terminated %||% !x$next_state %in% x$state
-  x$terminated <- terminated
+  x[["terminated"]] <- terminated <- x[["terminated"]] %||% !x$next_state %in% x$state
   check_column(x, "terminated", "TRUE or FALSE", are_flags, arg, call)
   data.frame(
     state = as.integer(x$state), action = as.integer(x$action),
@@ -181,11 +202,6 @@ start_probabilities <- function(start, table, states, call) {
   left <- numbers %in% table$state
   if (is.null(start)) {
     start <- left / sum(left)
-  } else if (is_number(start)) {
-    if (!start %in% numbers[left]) {
-      abort_argument(start, "the number of a state that some row leaves", "start", call)
-    }
-    start <- as.double(numbers == start)
   }
   if (length(start) != length(numbers) || !all(are_probabilities(start)) ||
         abs(sum(start) - 1) > sum_tolerance) {

@@ -16,6 +16,7 @@ policy_matrix <- function(policy, model, call) {
     check_one_policy(policy, "policy", call)
     policy_probabilities(policy_bind(policy, model, call = call), model, call)
   }
+  probabilities[rowSums(possible) == 0, ] <- 0
   barred <- probabilities > 0 & !possible
   if (any(barred & rowSums(possible) > 0)) {
     at <- which(barred & rowSums(possible) > 0, arr.ind = TRUE)[1L, ]
@@ -74,10 +75,21 @@ policy_probabilities.default <- function(policy, model, call) {
     observation_space = model$observation_space, action_space = model$action_space,
     spec = model$spec, call = call
   )
+  # Twice, from different streams, to see whether it draws.
+  ask <- function(seed) {
+    as.integer(with_generator(new_generator(seed), act_batch(policy, asked, length(asked), here)))
+  }
   actions <- rep(as.integer(model$action_space$start), length(states))
-  actions[possible] <- as.integer(
-    keep_random_state(act_batch(policy, asked, length(asked), here))
-  )
+  actions[possible] <- ask(1)
+  if (!identical(ask(2), actions[possible])) {
+    gym_abort(
+      c("The policy draws its actions, so what it comes to cannot be calculated.",
+        i = paste("Give the probabilities, a matrix with a row for each state and a column for",
+                  "each action, or play it: `rollout()`.")),
+      class = c("gym_error_draws", "gym_error_argument"), argument = "policy", value = policy,
+      call = call
+    )
+  }
   rows_of_actions(actions, model, "policy", call)
 }
 
@@ -89,5 +101,8 @@ policy_probabilities.gym_policy_random <- function(policy, model, call) {
 
 #' @exportS3Method
 policy_probabilities.gym_policy_table <- function(policy, model, call) {
-  row_probabilities(policy, policy$q)
+  # A row without an action is that of a state in which none is taken.
+  q <- policy$q
+  q[row_max(q) == -Inf, ] <- 0
+  row_probabilities(policy, q)
 }

@@ -10,24 +10,29 @@
 #'
 #' - The endless one, as if episodes were never cut off. It is what `solve_mdp(model)` calculates.
 #' - That of the same policy when episodes are cut off after the model's `max_episode_steps`: what
-#'   playing it comes to. A policy that looks only at the state is meant, as all policies here do.
+#'   playing it comes to.
 #' - That of the best policy that also counts the steps, and acts otherwise when few are left. It
 #'   is what `solve_mdp(model, horizon = )` calculates, and no policy comes to more.
 #'
-#' Gymnasium does not count steps in the observation, so the second is what an agent can hope for,
-#' and its best policy is in general neither that of the first nor of the third.
+#' Gymnasium does not count steps in the observation, so what an agent learns looks only at the
+#' state. The best policy of this kind lies between the second and the third; no method here finds
+#' it for certain.
 #'
 #' # Methods
 #'
 #' Value iteration applies Bellman's equation to all states at once until the values no longer
-#' change (by more than a part in 10^13). Policy iteration solves the linear equations of a policy,
-#' improves it, and so on. Where several actions are worth the same, which is common with a discount
-#' of 1, some may lead in circles for ever; those are taken that end episodes in the fewest steps.
+#' change; then, or after 20,000 sweeps, the linear equations of the best policy are solved. Policy
+#' iteration solves those of a policy, improves it, and so on. Without a discount a state that can
+#' stay for ever where no reward comes is worth at least 0, and one from which no policy comes to an
+#' end for sure is worth `-Inf`. Where several actions are worth the same, which is common with a
+#' discount of 1, some may lead in circles for ever; those are taken that end episodes in the fewest
+#' steps.
 #'
 #' @param model A model, see [gym_model()], or an environment that has one, as for [env_model()].
-#' @param policy The policy to value: a [policy_table()] or another policy, a vector with the number
-#'   of an action for each state, or a matrix of probabilities with a row for each state and a
-#'   column for each action. `NULL`, the default, for the best one.
+#' @param policy The policy to value: a [policy_table()], [policy_random()], or another policy that
+#'   draws nothing, a vector with the number of an action for each state, or a matrix of
+#'   probabilities with a row for each state and a column for each action. `NULL`, the default, for
+#'   the best one.
 #' @param discount The discount, by which a reward counts less with each step that it is away, a
 #'   number above 0 and at most 1, the default.
 #' @param horizon After how many steps everything ends, a whole number; `NULL`, the default, for
@@ -87,17 +92,16 @@ solve_mdp <- function(model, policy = NULL, discount = 1, horizon = NULL,
   call <- rlang::current_env()
   backup <- backup_of(model)
   probabilities <- if (!is.null(policy)) policy_matrix(policy, model, call)
-  if (is.null(horizon) && is.null(policy) && discount == 1) {
-    check_has_end(backup, model, call)
-  }
   notes <- new_sweep_notes(backup, trace)
   found <- if (!is.null(horizon)) {
     solve_horizon(backup, horizon, discount, probabilities, notes)
   } else if (!is.null(policy)) {
     list(values = policy_values(backup, probabilities, discount), sweeps = 0L)
   } else {
-    iterate <- if (method == "value_iteration") iterate_values else iterate_policies
-    iterate(backup, discount, notes$see, call)
+    best_endless_values(backup, discount, method, notes$see, call)
+  }
+  if (is.null(policy) && !is.finite(start_mean(model, found$values))) {
+    abort_no_end(model, call)
   }
   new_solution(model, backup, found, policy, probabilities, discount, horizon, method, notes)
 }
@@ -108,18 +112,13 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   }
 }
 
-check_has_end <- function(backup, model, call) {
-  ends <- any(backup$probability > 0 & backup$terminated) || any(rowSums(
-    array(backup$possible, c(backup$states, backup$actions))
-  ) == 0)
-  if (!ends && any(backup$expected != 0)) {
-    gym_abort(
-      c(paste0("Episodes of ", model$spec$id, " have no end, and without a discount their values ",
-               "have none either."),
-        i = "Give a `discount` below 1, or a `horizon`."),
-      class = "gym_error_argument", argument = "discount", value = 1, call = call
-    )
-  }
+abort_no_end <- function(model, call) {
+  gym_abort(
+    c(paste0("Episodes of ", model$spec$id, " have no end, whatever is done, and without a ",
+             "discount their values have none either."),
+      i = "Give a `discount` below 1, or a `horizon`."),
+    class = "gym_error_argument", argument = "discount", value = 1, call = call
+  )
 }
 
 # Keeps the values of each sweep, where they are wanted, and the actions.
@@ -144,9 +143,7 @@ solve_horizon <- function(backup, horizon, discount, probabilities, notes) {
 }
 
 # The number of the best action in each state, from 1; of equal ones, up to rounding, the first.
-best_choice <- function(q) max.col(q >= row_max(q) - tie_tolerance(q), "first")
-
-tie_tolerance <- function(q) 1e-9 * max(1, abs(q[is.finite(q)]))
+best_choice <- function(q) max.col(tied_actions(q) + 0, "first")
 
 new_solution <- function(model, backup, found, policy, probabilities, discount, horizon, method,
                          notes) {
@@ -154,12 +151,7 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   first_action <- as.integer(model$action_space$start)
   actions <- NULL
   if (is.null(policy)) {
-    choice <- if (is.null(horizon)) {
-      tied <- q >= row_max(q) - tie_tolerance(q) & q > -Inf
-      ending_choice(backup, tied)
-    } else {
-      do.call(cbind, rev(notes$choices))
-    }
+    choice <- found$choice %||% do.call(cbind, rev(notes$choices))
     actions <- choice + first_action - 1L
     if (is.null(horizon)) {
       probabilities <- choice_probabilities(backup, choice)

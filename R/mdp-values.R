@@ -1,9 +1,9 @@
 # Values of a given policy, and best ones: within a number of steps, and without a limit.
 
 # When sweeps end: the values are off by less than this, relative to the largest of them, as far as
-# the discount tells.
+# the discount tells. Where they take longer than this, policy iteration goes on.
 sweep_tolerance <- 1e-13
-most_sweeps <- 1e5
+most_sweeps <- 20000L
 
 # Within a number of steps ------------------------------------------------------------
 
@@ -23,7 +23,7 @@ horizon_values <- function(backup, horizon, discount, values_of, see = function(
   values
 }
 
-# Without a limit ---------------------------------------------------------------------
+# Of a policy, without a limit -----------------------------------------------------------
 
 #' The values of a policy
 #'
@@ -43,16 +43,15 @@ policy_values <- function(backup, probabilities, discount) {
   leads <- function(reached) drop(weight %*% reached) > 0
   resting <- never_rewarded(chain)
   good <- closure(leads, chain$ends | resting)
+  # Also from a state that can come to the end one that never does may be reached.
+  endless <- if (all(good)) !good else closure(leads, !good)
   values <- numeric(backup$states)
-  equations <- good & !resting
+  equations <- good & !resting & !endless
   if (any(equations)) {
-    # From a state with an equation states that never end can be reached, too.
-    lost <- equations & closure(leads, !good)
-    values[equations & !lost] <- solved(equations & !lost)
-    endless <- lost | !good
-    values[endless] <- endless_values(weight, chain$reward, endless, good)
-  } else {
-    values[!good] <- endless_values(weight, chain$reward, !good, good)
+    values[equations] <- solved(equations)
+  }
+  if (any(endless)) {
+    values[endless] <- endless_values(weight, chain$reward, endless, !good)
   }
   values
 }
@@ -69,77 +68,177 @@ never_rewarded <- function(chain) {
   }
 }
 
-endless_values <- function(weight, reward, endless, good) {
+# What comes for ever are the rewards of the states that are always come back to: those that are
+# reached again from wherever they lead.
+endless_values <- function(weight, reward, endless, never_ends) {
+  reach <- reachable(weight > 0)
+  returns <- vapply(seq_along(reward), function(state) {
+    never_ends[[state]] && all(reach[reach[state, ], state])
+  }, NA)
   vapply(which(endless), function(state) {
-    after <- seq_along(reward) == state
-    after <- closure(function(reached) drop(reached %*% weight) > 0, after)
-    signs <- unique(sign(reward[after & !good]))
+    signs <- unique(sign(reward[reach[state, ] & returns]))
     signs <- signs[signs != 0]
     if (length(signs) == 1L) signs * Inf else NaN
   }, 0)
 }
 
-#' Best values by value iteration
+# Which states are reached from which, in at least one step, a logical matrix.
+reachable <- function(leads) {
+  repeat {
+    further <- leads | (leads %*% leads) > 0
+    if (identical(further, leads)) {
+      return(leads)
+    }
+    leads <- further
+  }
+}
+
+# The best, without a limit --------------------------------------------------------------
+
+#' Find the best values
 #'
-#' @param see As for [horizon_values()].
-#' @return A list: `values` and `sweeps`.
+#' Without a discount two kinds of states are special. Some can rest: stay for ever where no reward
+#' comes, which is worth 0. They get one more action, the last one, that ends the episode for 0. And
+#' from some no policy comes to an end or to rest for sure: these have the value `-Inf`, and no
+#' action that may lead there is taken.
+#' @return A list: `values`, `choice` (the number of an action for each state, from 1) and `sweeps`.
 #' @noRd
-iterate_values <- function(backup, discount, see, call) {
+best_endless_values <- function(backup, discount, method, see, call) {
+  task <- if (discount < 1) list(backup = backup) else with_rest(backup)
+  if (any(task$hopeless)) {
+    check_hopeless(backup, task$hopeless, call)
+  }
+  sweeps <- 0L
+  if (method == "value_iteration") {
+    swept <- iterate_values(task$backup, discount, see)
+    sweeps <- swept$sweeps
+    choice <- ending_choice(task$backup, tied_actions(swept$q))
+  } else {
+    choice <- ending_choice(task$backup, possible_of(task$backup))
+  }
+  found <- iterate_policies(task$backup, choice, discount, if (sweeps) NULL else see, call)
+  values <- found$values
+  values[task$hopeless] <- -Inf
+  list(
+    values = values, sweeps = if (sweeps) sweeps else found$sweeps,
+    choice = if (discount < 1) found$choice else without_rest(found$choice, backup, task)
+  )
+}
+
+iterate_values <- function(backup, discount, see) {
   values <- numeric(backup$states)
+  enough <- sweep_tolerance * max(1 - discount, 0.01)
   for (sweep in seq_len(most_sweeps)) {
     q <- action_values(backup, values, discount)
     new <- best_values(q)
     see(new, q)
     change <- max(abs(new - values))
     values <- new
-    if (change <= sweep_tolerance * max(1 - discount, 0.01) * max(1, abs(values))) {
-      return(list(values = values, sweeps = sweep))
-    }
+    if (change <= enough * max(1, abs(values))) break
   }
-  abort_endless(backup, values, call)
+  list(q = action_values(backup, values, discount), sweeps = sweep)
 }
 
-abort_endless <- function(backup, values, call) {
-  gym_abort(
-    c(paste0("The values do not settle within ", format(most_sweeps, scientific = FALSE),
-             " sweeps: with a discount of 1 there are states from which episodes never end and ",
-             "rewards go on."),
-      i = "Give a `discount` below 1, or a `horizon`."),
-    class = "gym_error_argument", argument = "discount", call = call
-  )
-}
-
-#' Best values by policy iteration
-#'
-#' Begins with a policy by which episodes end, where there is one, and changes an action only where
-#' another is better by more than rounding.
-#' @return As [iterate_values()].
+#' Improve a policy until no action is better by more than rounding
+#' @param see `NULL`, or as for [horizon_values()].
 #' @noRd
-iterate_policies <- function(backup, discount, see, call) {
-  choice <- ending_choice(backup, array(backup$possible, c(backup$states, backup$actions)))
+iterate_policies <- function(backup, choice, discount, see, call) {
   for (sweep in seq_len(1000L)) {
     values <- policy_values(backup, choice_probabilities(backup, choice), discount)
     if (!all(is.finite(values))) {
-      abort_endless(backup, values, call)
+      abort_endless(which(!is.finite(values))[[1L]], call)
     }
     q <- action_values(backup, values, discount)
-    see(values, q)
+    if (!is.null(see)) see(values, q)
     own <- q[cbind(seq_along(choice), choice)]
-    best <- best_values(q)
-    better <- best > own + 1e-9 * pmax(1, abs(best)) & rowSums(q > -Inf) > 0
+    better <- own < best_values(q) - tie_tolerance(q) & own > -Inf
     if (!any(better)) {
-      return(list(values = values, sweeps = sweep))
+      # Of equal actions those that end episodes soonest.
+      choice <- ending_choice(backup, tied_actions(q))
+      return(list(values = values, choice = choice, sweeps = sweep))
     }
-    choice[better] <- max.col(q, "first")[better]
+    choice[better] <- best_column(q)[better]
   }
-  abort_endless(backup, values, call)
+  abort_endless(which.max(abs(values)), call)
 }
+
+# Actions that are worth the same as the best one of their state, up to rounding.
+tied_actions <- function(q) q >= row_max(q) - tie_tolerance(q) & q > -Inf
+
+tie_tolerance <- function(q) 1e-9 * pmax(1, abs(best_values(q)))
+
+possible_of <- function(backup) array(backup$possible, c(backup$states, backup$actions))
 
 choice_probabilities <- function(backup, choice) {
   probabilities <- matrix(0, backup$states, backup$actions)
   probabilities[cbind(seq_along(choice), choice)] <- 1
   probabilities[!backup$possible] <- 0
   probabilities
+}
+
+abort_endless <- function(state, call) {
+  gym_abort(
+    c(paste0("With a discount of 1 some values are infinite, as that of row ", state, " of the ",
+             "states: rewards go on there for ever."),
+      i = "Give a `discount` below 1, or a `horizon`."),
+    class = "gym_error_argument", argument = "discount", call = call
+  )
+}
+
+# Rest, and no end ----------------------------------------------------------------------
+
+with_rest <- function(backup) {
+  rest <- resting_actions(backup)
+  rested <- backup
+  more <- function(matrix, value) rbind(matrix, matrix(value, backup$states, ncol(matrix)))
+  rested$actions <- backup$actions + 1L
+  rested$next_state <- more(backup$next_state, 1L)
+  rested$weight <- more(backup$weight, 0)
+  rested$terminated <- more(backup$terminated, TRUE)
+  certain <- matrix(0, backup$states, ncol(backup$weight))
+  certain[, 1L] <- 1
+  rested$probability <- rbind(backup$probability, certain)
+  rested$expected <- c(backup$expected, numeric(backup$states))
+  rested$possible <- c(backup$possible, rest$states)
+  ending <- surely_ending(rested, possible_of(rested))
+  rested$possible <- as.vector(ending$allowed)
+  leaves <- rowSums(possible_of(backup)) > 0
+  list(backup = rested, stays = rest$actions, hopeless = !ending$states & leaves)
+}
+
+# The states that can stay for ever where no reward comes, and the actions by which they do.
+resting_actions <- function(backup) {
+  shape <- c(backup$states, backup$actions)
+  ends <- rowSums(backup$probability * backup$terminated) > 0
+  calm <- array(backup$possible & backup$expected == 0 & !ends, shape)
+  states <- rep(TRUE, backup$states)
+  repeat {
+    leaves <- array(rowSums(backup$weight > 0 & !states[backup$next_state]) > 0, shape)
+    actions <- calm & !leaves
+    stay <- states & rowSums(actions) > 0
+    if (identical(stay, states)) {
+      return(list(states = states, actions = actions & states))
+    }
+    states <- stay
+  }
+}
+
+# To rest is to take an action that stays where no reward comes.
+without_rest <- function(choice, backup, task) {
+  rests <- choice > backup$actions
+  choice[rests] <- best_column(task$stays + 0)[rests]
+  # Where nothing ends all actions are as good.
+  choice[task$hopeless] <- best_column(possible_of(backup) + 0)[task$hopeless]
+  choice
+}
+
+# Rewards above 0 that go on for ever are worth more than anything.
+check_hopeless <- function(backup, hopeless, call) {
+  gains <- array(backup$expected > 0, c(backup$states, backup$actions)) & possible_of(backup)
+  endless <- hopeless & rowSums(gains) > 0
+  if (any(endless)) {
+    abort_endless(which(endless)[[1L]], call)
+  }
 }
 
 # Choosing among equals ---------------------------------------------------------------

@@ -88,7 +88,8 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   cells$does <- (directions %||% state_numbers(x$model$action_space))[place]
   cells$does[cells$ends | is.na(cells$value)] <- ""
   cells$does[is.na(cells$does)] <- ""
-  data <- list(title = solution_title(x), key = range(cells$value[is.finite(cells$value)]))
+  finite <- cells$value[is.finite(cells$value)]
+  data <- list(title = solution_title(x), key = if (length(finite)) range(finite) else c(0, 0))
   if (known == "Taxi" && is.null(columns)) {
     return(c(data, taxi_cells(cells, passenger, destination, taxi_walls(x$model), call)))
   }
@@ -151,7 +152,7 @@ state_kinds <- function(model) {
 grid_columns <- function(model) {
   further <- with(model$transitions, next_state - state)
   further <- further[further > 1L]
-  as.integer(names(which.max(table(further))))
+  if (length(further)) as.integer(names(which.max(table(further))))
 }
 
 # The states of Taxi number the row, the column, the passenger and the destination, see its
@@ -214,10 +215,12 @@ draw_state_grid <- function(data) {
   draw_actions(cells, colours$ink)
   cex <- min(1, 9 / max(data$columns, data$rows))
   shown <- !over & !is.na(cells$value)
-  graphics::text(
-    cells$column[shown], cells$row[shown] + 0.33, cells$text[shown], cex = 0.7 * cex,
-    col = colours$ink[shown]
-  )
+  if (any(shown)) {
+    graphics::text(
+      cells$column[shown], cells$row[shown] + 0.33, cells$text[shown], cex = 0.7 * cex,
+      col = colours$ink[shown]
+    )
+  }
   draw_taxi(data)
 }
 
@@ -263,7 +266,7 @@ draw_taxi <- function(data) {
 draw_state_points <- function(data) {
   cells <- data$cells
   open_plot(
-    list(x = cells$state, y = cells$value[is.finite(cells$value)], xlab = "state", ylab = "value",
+    list(x = range(cells$state), y = data$key, xlab = "state", ylab = "value",
          xlim = range(cells$state), ylim = data$key),
     list()
   )

@@ -28,7 +28,7 @@
 #' tile_coding(tilings = 8, bins = 8)
 tile_coding <- function(tilings = 8, bins = 8, low = NULL, high = NULL) {
   check_count(tilings)
-  if (!are_whole(bins, 1, .Machine$integer.max)) {
+  if (!length(bins) || !are_whole(bins, 1, .Machine$integer.max)) {
     abort_argument(bins, "whole numbers of at least 1", "bins", rlang::current_env())
   }
   for (name in c("low", "high")) {
@@ -102,6 +102,12 @@ tiles_of <- function(features, space, call) {
     )
   }
   numbers <- space$shape[[1L]]
+  for (name in c("bins", "low", "high")) {
+    if (!length(features[[name]]) %in% c(0L, 1L, numbers)) {
+      must <- paste("one number, or one for each of the", numbers, "of an observation")
+      abort_argument(features[[name]], must, paste0("tile_coding(", name, " = )"), call)
+    }
+  }
   low <- rep_len(features$low %||% as.numeric(space$low), numbers)
   high <- rep_len(features$high %||% as.numeric(space$high), numbers)
   unbounded <- !is.finite(low) | !is.finite(high) | low >= high
@@ -118,14 +124,24 @@ tiles_of <- function(features, space, call) {
   # One tile more than bins, because all grids but the first are displaced.
   weights <- c(1, cumprod(bins + 1))
   per_tiling <- weights[[numbers + 1L]]
+  if (per_tiling * tilings > most_values) {
+    gym_abort(
+      c(paste0("The tilings would have ", format(per_tiling * tilings, big.mark = ","),
+               " tiles; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+               " are possible."),
+        i = "Take fewer `bins`, or features of your own, of fewer numbers."),
+      class = "gym_error_argument", argument = "features", value = features, call = call
+    )
+  }
   width <- (high - low) / bins
   displaced <- outer(seq_len(tilings) - 1, 2 * seq_len(numbers) - 1) %% tilings / tilings
   of <- function(observation, n) {
-    place <- t((t(matrix(observation, n)) - low) / width)
+    # In tiles from the lower bound, within the range.
+    place <- (t(matrix(observation, n)) - low) / width
+    place <- t(pmin(pmax(place, 0), bins * (1 - 1e-12)))
     tiles <- matrix(0L, n, tilings)
     for (tiling in seq_len(tilings)) {
       at <- floor(t(t(place) + displaced[tiling, ]))
-      at <- pmin(pmax(at, 0), rep(bins, each = n))
       number <- at %*% weights[seq_len(numbers)]
       tiles[, tiling] <- as.integer(number + per_tiling * (tiling - 1) + 1)
     }

@@ -10,7 +10,8 @@
 #' in the order of a Discrete's numbers; of several numbers the last one changes first.
 #'
 #' @param q A numeric matrix with a row for each state and a column for each action: values, or
-#'   anything else of which larger is better. `-Inf` for an action that cannot be taken.
+#'   anything else of which larger is better. `-Inf` for an action that cannot be taken; a row in
+#'   which none can is an error when it is asked for.
 #' @param epsilon How often it explores, a number from 0, the default, to 1.
 #' @param temperature The temperature of the softmax, a number above 0; `NULL`, the default, for
 #'   none.
@@ -31,13 +32,6 @@ policy_table <- function(q, epsilon = 0, temperature = NULL) {
   }
   check_number(epsilon, min = 0, max = 1)
   if (!is.null(temperature)) check_above_zero(temperature)
-  nowhere <- rowSums(q > -Inf) == 0
-  if (any(nowhere)) {
-    gym_abort(
-      paste0("Row ", which(nowhere)[[1L]], " of `q` leaves no action: all its values are -Inf."),
-      class = "gym_error_argument", argument = "q", value = q
-    )
-  }
   structure(
     list(
       q = unname(q), epsilon = epsilon, temperature = temperature,
@@ -78,7 +72,15 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "observation", value = observation, call = call
     )
   }
-  policy$q[number, , drop = FALSE]
+  rows <- policy$q[number, , drop = FALSE]
+  if (any(rows[, 1L] == -Inf) && any(row_max(rows) == -Inf)) {
+    gym_abort(
+      paste0("Row ", number[row_max(rows) == -Inf][[1L]],
+             " of the policy's table leaves no action: all its values are -Inf."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+  rows
 }
 
 # The numbers, from 1, of the actions that are taken.

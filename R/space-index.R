@@ -34,7 +34,7 @@ digits_index <- function(nvec, start, rank) {
     count = prod(nvec),
     index = function(batch, n) {
       # Row by row, as `nvec` is.
-      if (rank > 1L) batch <- aperm(batch, c(1L, rank:2 + 1L))
+      if (rank > 1L) batch <- aperm(batch, c(1L, rev(seq_len(rank)) + 1L))
       digits <- matrix(batch, n) - rep(start, each = if (length(start) > 1L) n else 1L)
       as.integer(drop(digits %*% weights) + 1)
     }

@@ -1,7 +1,8 @@
 #' Train an agent
 #'
 #' Asks the agent for candidates, plays each of them, and tells it what came of it, iteration after
-#' iteration, until the target is reached or the budget used up.
+#' iteration, until the target is reached or the budget used up. A learner such as [agent_q()] has
+#' no candidates: it plays the episodes of an iteration itself, and learns from each step.
 #'
 #' # When training ends
 #'
@@ -12,6 +13,9 @@
 #' policy plays `eval_episodes` further episodes, once, whose seeds nothing has seen before: their
 #' mean return is what the training has come to. Steps of evaluations are not counted as steps of
 #' the training.
+#'
+#' A learner's policy is calculated instead of played where the model of the environment is known
+#' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
 #'
 #' # Going on
 #'
@@ -30,8 +34,8 @@
 #' @param iterations,steps After how many iterations, or steps of the environment, to end, whole
 #'   numbers of at least 1. The iteration in which the steps are used up is played to its end. One
 #'   of the two must be given.
-#' @param episodes How many episodes each candidate plays in an iteration, a whole number of at
-#'   least 1; the default is 1.
+#' @param episodes How many episodes each candidate, or the learner, plays in an iteration, a whole
+#'   number of at least 1; the default is 1.
 #' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
 #'   environment's own, where it has one; `Inf` goes on until the budget is used up.
 #' @param max_steps After how many steps to cut an episode short, as for [rollout()].
@@ -58,7 +62,7 @@
 #'   which begins anew and replaces it.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_envs,num_workers How many sub-environments to play in, and how many processes run
-#'   them, as for [rollout()].
+#'   them, as for [rollout()]. A learner plays in one unless more are given, see [agent_observe()].
 #' @param client The client of the server where an environment named by its id is made; the default
 #'   is the session's own, [gym_client()].
 #' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()],
@@ -158,7 +162,7 @@ train_in <- function(vector_env, settings, file, log, progress, call) {
   settings$env_id <- environment_label(vector_env)
   settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)
   bound <- if (learns_online(settings$agent)) {
-    spaces_policy(settings$policy, vector_env, call)
+    spaces_policy(settings$policy, vector_env, settings$model, call)
   } else {
     bind_with_seed(settings$policy, vector_env, settings$seed, call)
   }

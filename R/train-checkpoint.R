@@ -47,6 +47,8 @@ environment_traits <- function(env) {
     list(env_id = env)
   } else if (inherits(env, "gym_wrapped")) {
     list(env_id = env$env_id, wrappers = env$wrappers)
+  } else if (inherits(env, "gym_model")) {
+    list(env_id = env$spec$id, model = rlang::hash(list(env$transitions, env$start)))
   } else {
     list(
       env_id = env$spec$id, num_envs = env$num_envs,

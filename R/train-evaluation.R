@@ -51,11 +51,10 @@ finish_training.gym_training_settings <- function(settings, state, vector_env) {
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   policy <- agent_policy(state$agent)
   final <- kind == "final"
-  played <- if (!is.null(settings$model)) {
+  exact <- if (!is.null(settings$model)) {
     evaluate_exactly(settings$model, policy, settings$max_steps)
-  } else {
-    play_evaluation(state, vector_env, settings, policy, episodes, final)
   }
+  played <- exact %||% play_evaluation(state, vector_env, settings, policy, episodes, final)
   row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
   row.names(row) <- NULL
   state$evaluations[[length(state$evaluations) + 1L]] <- row

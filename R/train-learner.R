@@ -67,9 +67,6 @@ agent_act <- function(agent, observation, sub_env) UseMethod("agent_act")
 #' @export
 agent_observe <- function(agent, transitions) UseMethod("agent_observe")
 
-#' @export
-agent_needs.gym_learner <- function(agent) "transitions"
-
 learns_online <- function(agent) inherits(agent, "gym_learner")
 
 # The policy that an agent begins with, where none was given: a learner makes its own.
@@ -82,13 +79,17 @@ learner_envs <- function(agent, env) {
   if (learns_online(agent) && made_here) 1L
 }
 
-# What a learner's `agent_start()` gets: a policy that was given, with the spaces.
-spaces_policy <- function(policy, vector_env, call) {
+# What a learner's `agent_start()` gets: a policy that was given, with the spaces, and with a model
+# which actions each state has.
+spaces_policy <- function(policy, vector_env, model, call) {
   if (!is.null(policy)) {
     return(policy_bind(policy, vector_env, call = call))
   }
   structure(
-    list(observation_space = vector_env$observation_space, action_space = vector_env$action_space),
+    list(
+      observation_space = vector_env$observation_space, action_space = vector_env$action_space,
+      possible = if (!is.null(model)) possible_actions(model)
+    ),
     class = c("gym_policy_unknown", "gym_policy")
   )
 }
@@ -118,7 +119,15 @@ learn_episodes <- function(state, vector_env, settings, call) {
     max_steps = settings$max_steps %||% Inf
   )
   each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
-  list(agent = agent, returns = each("return"), lengths = each("length"))
+  returns <- each("return")
+  if (!all(is.finite(returns))) {
+    gym_abort(
+      paste0("The return of an episode is ", returns[!is.finite(returns)][[1L]],
+             ": a reward of the environment was no finite number."),
+      class = "gym_error_agent", call = call
+    )
+  }
+  list(agent = agent, returns = returns, lengths = each("length"))
 }
 
 # Judging by a model ------------------------------------------------------------------
@@ -129,28 +138,45 @@ learn_episodes <- function(state, vector_env, settings, call) {
 #' @noRd
 judging_model <- function(settings, client) {
   env <- settings$env
-  if (inherits(env, "gym_model")) {
-    return(env)
+  if (!learns_online(settings$agent)) {
+    return(NULL)
   }
-  with_model <- inherits(env, "gym_r_env") ||
-    rlang::is_string(env) && (is_registered(env) || grepl(modelled_ids, env))
-  if (learns_online(settings$agent) && with_model) {
-    tryCatch(
-      rlang::exec("env_model", env, !!!settings$kwargs, client = client),
-      gym_error = function(cnd) NULL
-    )
+  if (inherits(env, c("gym_model", "gym_r_env"))) {
+    return(model_or_null(env_model(env)))
+  }
+  if (!rlang::is_string(env)) {
+    return(NULL)
+  }
+  if (is_registered(env)) {
+    model_or_null(rlang::exec("env_model", env, !!!settings$kwargs))
+  } else if (grepl(modelled_ids, env)) {
+    model_or_null(rlang::exec("env_model", env, !!!settings$kwargs, client = client))
   }
 }
 
 modelled_ids <- "^(FrozenLake|CliffWalking|Taxi)"
 
+model_or_null <- function(code) {
+  tryCatch(
+    code, gym_error_no_model = function(cnd) NULL,
+    gym_error_http_400 = function(cnd) {
+      # Taxi with a fickle passenger, for one, has no table that holds.
+      if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
+    }
+  )
+}
+
 #' Evaluate a policy by a model, exactly
-#' @return As [evaluate_episodes()], for no episodes.
+#' @return As [evaluate_episodes()], for no episodes; `NULL` for a policy that draws its actions.
 #' @noRd
 evaluate_exactly <- function(model, policy, max_steps) {
-  exact <- evaluate_policy(
-    model, policy, max_steps = max_steps %||% model$spec$max_episode_steps %||% Inf
+  limit <- min(max_steps %||% Inf, model$spec$max_episode_steps %||% Inf)
+  exact <- tryCatch(
+    evaluate_policy(model, policy, max_steps = limit), gym_error_draws = function(cnd) NULL
   )
+  if (is.null(exact)) {
+    return(NULL)
+  }
   value <- exact$mean_return
   data.frame(
     candidate = 1L, mean_return = value, se = 0, lower = value, upper = value, episodes = 0L,

@@ -17,7 +17,7 @@ log_row <- function(state) {
     `rollout/ep_rew_max` = row$max_return,
     `rollout/ep_len_mean` = row$mean_length,
     `eval/mean_reward` = if (is.null(last)) NA else last$mean_return,
-    `eval/mean_ep_length` = if (is.null(last)) NA else last$steps / last$episodes,
+    `eval/mean_ep_length` = if (is.null(last) || is_exact(last)) NA else last$steps / last$episodes,
     check.names = FALSE
   )
 }
@@ -77,7 +77,8 @@ write_config <- function(file, settings) {
   config <- c(
     list(
       agent = format(settings$agent), env = settings$env_id,
-      kwargs = empty_as_object(settings$kwargs), policy = policy_text(settings$policy)
+      kwargs = empty_as_object(settings$kwargs),
+      policy = if (is.null(settings$policy)) "the learner's own" else policy_text(settings$policy)
     ),
     unclass(settings)[numbers],
     list(provenance = plain_provenance(settings$provenance))

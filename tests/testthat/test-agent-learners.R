@@ -175,6 +175,17 @@ test_that("planning learns again from what is remembered, and counts no steps", 
   expect_error(agent_q(planning = 1, double = TRUE), class = "gym_error_argument")
 })
 
+test_that("planning takes no steps of a schedule", {
+  asked <- c()
+  rate <- function(taken) {
+    asked <<- c(asked, taken)
+    0.1
+  }
+  agent <- started(agent_q(learning_rate = rate, planning = 3))
+  agent_observe(agent, step_of(0, 1, 10, 1))
+  expect_identical(asked, c(0, 1, 1, 1))
+})
+
 test_that("a schedule changes with the steps", {
   expect_equal(schedule_linear(1, 0, 10)(c(0, 5, 20)), c(1, 0.5, 0))
   expect_equal(schedule_exponential(1, 0.01, 10)(c(0, 5, 20)), c(1, 0.1, 0.01))
@@ -215,6 +226,14 @@ test_that("what cannot be learned so is refused", {
   refused(agent_q(features = 3), "`features` must be NULL")
   refused(agent_sarsa(n = 2, lambda = 0.5), "not both")
   refused(agent_td(3), "`policy` must be a policy")
+  refused(agent_q(learning_rate = NULL), "`learning_rate` must be a number from 0 to 1")
+  refused(agent_q(temperature = 0), "`temperature` must be a number of at least")
+  refused(agent_act(started(agent_q(epsilon = function(taken) 2)), 0L, 1L),
+          "The function `epsilon` must return a number from 0 to 1, and after 0 steps")
+  refused(state_values(agent_q()), "what was learned by a table")
+  begin <- policy_table(matrix(0, 4, 2))
+  refused(learn_q(walk_model(), iterations = 1, policy = begin, features = function(x) cbind(x)),
+          "A table to begin with is for learners of a table")
   refused(agent_monte_carlo(visits = "last"), "one of \"first\", \"every\"")
   box <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
   refused(learn_q(box, iterations = 1), "observations that can be counted")

@@ -96,7 +96,8 @@ test_that("an environment in R has the model that it was given", {
     expect_identical(found$spec$id, "Walk-v0")
     expect_identical(found$spec$max_episode_steps, 9L)
   }
-  expect_error(env_model(make(NULL)), "Walk-v0 has no model", class = "gym_error_argument")
+  expect_error(env_model(make(NULL)), "Walk-v0 has no model", class = "gym_error_no_model")
+  expect_error(make(5), "`model` must be a model", class = "gym_error_argument")
   expect_error(env_model(make(walk_table()[1:2, ])), "observation space",
                class = "gym_error_argument")
   gym_register("OwnWalk-v0", make(walk_table()))

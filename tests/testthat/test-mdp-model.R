@@ -107,3 +107,27 @@ test_that("an estimated model comes near to the one that was played", {
                "steps = TRUE, next_observation = TRUE", class = "gym_error_argument")
   expect_error(estimate_model(3), class = "gym_error_argument")
 })
+
+test_that("one state is a model, too, and so is one of a tibble", {
+  one <- estimate_model(data.frame(
+    state = 3, action = 0:1, next_state = 3, reward = 0:1, terminated = TRUE
+  ))
+  expect_identical(one$start, c("3" = 1))
+  testthat::skip_if_not_installed("tibble")
+  expect_silent(model <- gym_model(tibble::as_tibble(walk_table()), start = 1))
+  expect_identical(as.data.frame(model), as.data.frame(walk_model()))
+})
+
+test_that("an estimated model has all states of the environment that was played", {
+  q <- matrix(c(1, 0), 4, 2, byrow = TRUE)
+  played <- rollout(walk_model(), policy_table(q), episodes = 5, seed = 1, steps = TRUE,
+                    next_observation = TRUE)
+  expect_length(estimate_model(played)$start, 4)
+})
+
+test_that("numbers with gaps that no memory holds are refused", {
+  far <- walk_table()
+  far$next_state[[4]] <- 3e8
+  expect_error(gym_model(far, start = 1), "numbered from 0 to 300000000",
+               class = "gym_error_argument")
+})

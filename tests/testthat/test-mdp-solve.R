@@ -33,12 +33,14 @@ test_that("rewards that go on for ever have no finite value, and are told apart"
 
 test_that("values without an end are refused, with what to give", {
   circle <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = 1))
-  expect_error(solve_mdp(circle), "have no end.*`discount` below 1, or a `horizon`",
+  expect_error(solve_mdp(circle), "rewards go on.*`discount` below 1, or a `horizon`",
                class = "gym_error_argument")
+  costs <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = -1))
+  expect_error(solve_mdp(costs), "have no end, whatever is done", class = "gym_error_argument")
   expect_equal(solve_mdp(circle, discount = 0.5)$start_value, 2)
   expect_equal(solve_mdp(circle, horizon = 7)$start_value, 7)
   for (method in c("value_iteration", "policy_iteration")) {
-    expect_error(solve_mdp(endless_model(2), method = method), "do not settle",
+    expect_error(solve_mdp(endless_model(2), method = method), "some values are infinite",
                  class = "gym_error_argument")
   }
 })
@@ -127,4 +129,79 @@ test_that("a policy is evaluated exactly, several together", {
   explores <- evaluate_policy(walk_model(), policy_table(q, epsilon = 1))
   expect_equal(explores$mean_return, 1 / 3)
   expect_error(evaluate_policy(walk_model(), list()), class = "gym_error_argument")
+})
+
+# The best values, the same by both methods and by the policy itself.
+expect_solved <- function(model, values, ...) {
+  for (method in c("value_iteration", "policy_iteration")) {
+    solved <- solve_mdp(model, method = method, ...)
+    expect_equal(unname(solved$values), values, tolerance = 1e-9)
+    own <- solve_mdp(model, policy = solved$policy, ...)
+    expect_equal(own$start_value, solved$start_value, tolerance = 1e-9)
+  }
+}
+
+model_of <- function(...) gym_model(data.frame(...), start = 0)
+
+test_that("to stay for ever where no reward comes is worth 0, and no more", {
+  # Going round in state 0 ties with what may win, but wins nothing.
+  expect_solved(model_of(
+    state = c(0, 0, 0, 1), action = c(0, 1, 1, 0), next_state = c(0, 2, 1, 1),
+    probability = c(1, 0.5, 0.5, 1), reward = c(0, 1, 0, 0),
+    terminated = c(FALSE, TRUE, FALSE, FALSE)
+  ), c(0.5, 0, 0))
+  # To end costs 1, to stay nothing.
+  expect_solved(model_of(
+    state = 0, action = c(0, 1), next_state = c(0, 1), reward = c(0, -1),
+    terminated = c(FALSE, TRUE)
+  ), c(0, 0))
+  # A goal that is never left, as other packages write it.
+  expect_solved(model_of(
+    state = c(0, 0, 1), action = c(0, 1, 0), next_state = c(0, 1, 1), reward = c(-1, -1, 0)
+  ), c(-1, 0))
+})
+
+test_that("a state without an end is worth -Inf, and does not keep the others from their values", {
+  apart <- model_of(state = c(0, 2), action = 0, next_state = c(1, 2), reward = c(1, -1))
+  expect_solved(apart, c(1, 0, -Inf))
+  # Nobody goes there.
+  choice <- model_of(state = c(0, 0, 1), action = c(0, 1, 0), next_state = c(1, 2, 1),
+                     reward = c(100, 1, -1))
+  expect_solved(choice, c(1, -Inf, 0))
+})
+
+test_that("a large number elsewhere makes no two actions equal", {
+  expect_solved(model_of(
+    state = c(0, 0, 1), action = c(0, 1, 0), next_state = 2, reward = c(1, 1.5, -1e9)
+  ), c(1.5, -1e9, 0))
+})
+
+test_that("slow models are solved, too", {
+  n <- 200
+  walk <- data.frame(
+    state = rep(seq_len(n - 1), each = 2), action = 0,
+    next_state = rep(seq_len(n - 1), each = 2) + c(-1, 1), probability = 0.5, reward = 0
+  )
+  walk$reward[walk$next_state == n] <- 1
+  solved <- solve_mdp(gym_model(walk, start = 100))
+  expect_equal(unname(solved$values[-(n + 1)]), (0:(n - 1)) / n, tolerance = 1e-9)
+  expect_solved(endless_model(-1), c(5, 0), discount = 0.9999)
+})
+
+test_that("what comes once does not decide the sign of what comes for ever", {
+  model <- model_of(
+    state = 0:2, action = 0, next_state = c(1, 1, 3), reward = c(5, -1, 0),
+    terminated = c(FALSE, FALSE, TRUE)
+  )
+  expect_identical(unname(solve_mdp(model, policy = rep(0, 4))$values), c(-Inf, -Inf, 0, 0))
+  both <- model_of(state = c(0, 0, 1, 2), action = 0, next_state = c(1, 2, 1, 2),
+                   probability = c(0.5, 0.5, 1, 1), reward = c(0, 0, 1, -1))
+  expect_identical(unname(solve_mdp(both, policy = rep(0, 3))$values), c(NaN, Inf, -Inf))
+})
+
+test_that("a policy that draws its actions is not taken for one that does not", {
+  draws <- function(state) sample(0:1, length(state), replace = TRUE)
+  expect_error(evaluate_policy(walk_model(), draws), "draws its actions",
+               class = "gym_error_draws")
+  expect_error(solve_mdp(walk_model(), policy = draws), class = "gym_error_argument")
 })

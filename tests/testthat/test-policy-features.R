@@ -26,7 +26,8 @@ test_that("near points share tiles, and the nearer the more", {
 test_that("numbers outside of the range lie in the tiles at its ends", {
   basis <- tiles(tilings = 2, bins = 3)
   expect_identical(basis$of(rbind(c(-9, -9)), 1), basis$of(rbind(c(0, 0)), 1))
-  expect_true(all(basis$of(rbind(c(99, 99)), 1) <= basis$count))
+  expect_identical(basis$of(rbind(c(99, 99)), 1), basis$of(rbind(c(1 - 1e-9, 2 - 1e-9)), 1))
+  expect_identical(basis$of(rbind(c(1, 2)), 1), basis$of(rbind(c(99, 99)), 1))
 })
 
 test_that("ranges without bounds must be given", {
@@ -38,6 +39,12 @@ test_that("ranges without bounds must be given", {
   expect_error(basis_of(tile_coding(), space_discrete(3), NULL), "a Box of one dimension",
                class = "gym_error_argument")
   expect_error(tile_coding(bins = 0), class = "gym_error_argument")
+  expect_error(tile_coding(bins = integer()), class = "gym_error_argument")
+  expect_error(tiles(bins = c(2, 3, 4)), "one number, or one for each of the 2",
+               class = "gym_error_argument")
+  wide <- box_space(rep(0, 20), rep(1, 20))
+  expect_error(basis_of(tile_coding(), wide, NULL), "The tilings would have",
+               class = "gym_error_argument")
   expect_output(print(tile_coding(4, 8)), "<features: tile coding, 4 tilings of 8>", fixed = TRUE)
 })
 

@@ -35,12 +35,21 @@ test_that("a table with rows for pairs is asked about Tuple and MultiDiscrete", 
   expect_identical(act_batch(policy, list(c(0L, 1L), c(2L, 2L)), 2L, NULL), c(2L, 5L))
 })
 
+test_that("values of several dimensions are numbered as their array is written row by row", {
+  index <- space_index(space_multi_binary(c(2, 2)))
+  batch <- array(0L, c(2, 2, 2))
+  batch[1, 1, 2] <- 1L
+  batch[2, 2, 1] <- 1L
+  expect_identical(index$index(batch, 2L), c(1L + 4L, 1L + 2L))
+  expect_identical(index$count, 16)
+})
+
 test_that("tables that do not fit are refused", {
   refused <- function(code, text) {
     expect_error(code, text, class = "gym_error_argument", fixed = TRUE)
   }
   refused(policy_table(1:3), "`q` must be a numeric matrix")
-  refused(policy_table(rbind(c(-Inf, -Inf))), "Row 1 of `q` leaves no action")
+  refused(act(policy_table(rbind(c(-Inf, -Inf))), 0L), "Row 1 of the policy's table leaves no")
   refused(policy_table(diag(2), epsilon = 2), "`epsilon` must be a number from 0 to 1")
   refused(policy_table(diag(2), temperature = 0), "`temperature` must be a number above 0")
   refused(rollout(walk_model(), policy_table(diag(3))),

@@ -115,3 +115,58 @@ test_that("a learner of one's own is a class with two methods", {
                    envir = asNamespace("gym"))
   expect_error(train_agent(wrong, walk_model(), iterations = 1), class = "gym_error_agent")
 })
+
+test_that("a checkpoint tells schedules and models apart", {
+  file <- withr::local_tempfile(fileext = ".rds")
+  learn <- function(model, from) {
+    learn_q(model, iterations = 2, seed = 1, checkpoint = file,
+            epsilon = schedule_linear(from, 0.05, 10))
+  }
+  learn(walk_model(), 1)
+  expect_error(learn(walk_model(), 0.5), "`agent` is another", class = "gym_error_checkpoint")
+  other <- walk_table()
+  other$reward <- 2 * other$reward
+  expect_error(learn(gym_model(other, start = 1), 1), "`env` is another",
+               class = "gym_error_checkpoint")
+})
+
+test_that("an exact evaluation keeps to the environment's own limit", {
+  endless <- gym_model(data.frame(state = 0, action = 0, next_state = 0, reward = 1),
+                       max_episode_steps = 10)
+  learned <- suppressWarnings(learn_q(endless, iterations = 1, max_steps = 100, seed = 1))
+  expect_identical(learned$final$mean_return, 10)
+})
+
+test_that("a policy that draws is judged by playing", {
+  draws <- function(state) sample(0:1, length(state), replace = TRUE)
+  learned <- learn_td(walk_model(), draws, iterations = 2, seed = 1, eval_episodes = 20)
+  expect_identical(learned$final$episodes, 20L)
+})
+
+test_that("an action that a state does not have is never taken", {
+  bets <- do.call(rbind, lapply(1:9, function(capital) {
+    stake <- seq_len(min(capital, 10 - capital))
+    data.frame(
+      state = capital, action = rep(stake, 2),
+      probability = rep(c(0.4, 0.6), each = length(stake)),
+      next_state = c(capital + stake, capital - stake)
+    )
+  }))
+  bets$reward <- as.numeric(bets$next_state == 10)
+  gambler <- gym_model(bets, start = 5)
+  for (learn in list(learn_q, learn_sarsa, function(...) learn_q(..., double = TRUE))) {
+    learned <- learn(gambler, iterations = 5, seed = 1, discount = 1, epsilon = 0.5)
+    expect_identical(learned$agent$weights == -Inf, !possible_actions(gambler) & 0:10 %in% 1:9)
+  }
+  explores <- learn_monte_carlo(gambler, iterations = 5, seed = 1, exploring_starts = TRUE)
+  expect_gt(explores$steps, 0)
+})
+
+test_that("rewards that are no numbers end the training by name", {
+  wrong <- gym_env(
+    reset = function(self) 0L,
+    step = function(self, action) list(observation = 0L, reward = Inf, terminated = TRUE),
+    observation_space = space_discrete(2), action_space = space_discrete(2)
+  )
+  expect_error(learn_q(wrong, iterations = 1), class = "gym_error_agent")
+})
