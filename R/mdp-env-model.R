@@ -11,10 +11,9 @@
 #' @param client The client of the server where an environment named by its id is made; the default
 #'   is the session's own, [gym_client()].
 #' @return An object of class [gym_model].
-#' @section Errors: `gym_error_no_model`, a kind of `gym_error_argument`, for an environment in R without a
-#'   model;
-#'   `gym_error_http_400` for one of Gymnasium's that has none, that is a vector environment, or
-#'   that has wrappers, which may change what the model says.
+#' @section Errors: `gym_error_no_model`, a kind of `gym_error_argument`, for an environment in R
+#'   without a model; `gym_error_http_400` for one of Gymnasium's that has none, that is a vector
+#'   environment, or that has wrappers, which may change what the model says.
 #' @seealso [solve_mdp()], [gym_model()]
 #' @export
 #' @examplesIf gym:::can_start_server()

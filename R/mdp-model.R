@@ -77,7 +77,8 @@ spanned_space <- function(numbers, what, call = rlang::caller_env()) {
     gym_abort(
       c(paste0("The ", what, " are numbered from ", ends[[1L]], " to ", ends[[2L]],
                ", which makes ", format(count, big.mark = ",", scientific = FALSE),
-               " of them; at most ", format(most_values, big.mark = ",", scientific = FALSE), " are possible."),
+               " of them; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+               " are possible."),
         i = "Number them without gaps."),
       class = "gym_error_argument", argument = "transitions", call = call
     )

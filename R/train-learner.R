@@ -107,6 +107,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
   learner <- list(
     act = function(observation, sub_env) agent_act(agent, observation, sub_env),
     observe = function(transitions) {
+      check_rewards(transitions$reward, call)
       agent <<- agent_observe(agent, transitions)
       check_is_agent(agent, "agent_observe()", call)
     }
@@ -119,15 +120,18 @@ learn_episodes <- function(state, vector_env, settings, call) {
     max_steps = settings$max_steps %||% Inf
   )
   each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
-  returns <- each("return")
-  if (!all(is.finite(returns))) {
+  list(agent = agent, returns = each("return"), lengths = each("length"))
+}
+
+# A value that has become infinite stays so.
+check_rewards <- function(reward, call) {
+  if (!all(is.finite(reward))) {
     gym_abort(
-      paste0("The return of an episode is ", returns[!is.finite(returns)][[1L]],
-             ": a reward of the environment was no finite number."),
+      paste0("A reward of the environment is ", reward[!is.finite(reward)][[1L]],
+             ", and not a finite number."),
       class = "gym_error_agent", call = call
     )
   }
-  list(agent = agent, returns = returns, lengths = each("length"))
 }
 
 # Judging by a model ------------------------------------------------------------------
