@@ -31,74 +31,6 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
 }
 
-check_schedule <- function(x, arg, min, max, call) {
-  if (!is.function(x) && !(is_number(x) && x >= min && x <= max)) {
-    must <- paste0("a number", range_text(min, max), ", or a function of the steps so far")
-    abort_argument(x, must, arg, call)
-  }
-}
-
-# A number that may change with the steps that were taken so far.
-scheduled <- function(x, taken, arg, min = 0, max = 1) {
-  if (!is.function(x)) {
-    return(x)
-  }
-  value <- x(taken)
-  if (!is_number(value) || value < min || value > max) {
-    gym_abort(
-      paste0("The function `", arg, "` must return a number", range_text(min, max), ", and after ",
-             number_text(taken), " steps it returned ", describe_argument(value), "."),
-      class = "gym_error_argument", argument = arg, value = value, call = NULL
-    )
-  }
-  value
-}
-
-#' Change a number while an agent learns
-#'
-#' Makes a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of how
-#' many steps it has observed. Any function of this kind will do; these are the usual ones.
-#'
-#' @param from,to The number in the first step, and after `steps`, where it stays.
-#' @param steps How many steps it takes, a number of at least 1.
-#' @return A function of a number of steps. `schedule_linear()` goes in equal parts,
-#'   `schedule_exponential()` by equal factors (both numbers are above 0 then).
-#' @section Errors: `gym_error_argument`.
-#' @export
-#' @examples
-#' epsilon <- schedule_linear(1, 0.05, steps = 1000)
-#' epsilon(c(0, 500, 2000))
-schedule_linear <- function(from, to, steps) {
-  check_number(from)
-  check_number(to)
-  check_number(steps, min = 1)
-  new_schedule(from, to, steps, function(taken) from + (to - from) * pmin(taken / steps, 1))
-}
-
-#' @rdname schedule_linear
-#' @export
-schedule_exponential <- function(from, to, steps) {
-  check_above_zero(from)
-  check_above_zero(to)
-  check_number(steps, min = 1)
-  new_schedule(from, to, steps, function(taken) from * (to / from)^pmin(taken / steps, 1))
-}
-
-# A checkpoint tells two schedules apart by their numbers, not by what a function has kept.
-new_schedule <- function(from, to, steps, f) {
-  structure(f, from = from, to = to, steps = steps, class = c("gym_schedule", "function"))
-}
-
-#' @export
-print.gym_schedule <- function(x, ...) {
-  cat("<schedule: from ", number_text(attr(x, "from")), " to ", number_text(attr(x, "to")), " in ",
-      count_of(attr(x, "steps"), "step"), ">\n", sep = "")
-  invisible(x)
-}
-
-# Below this a softmax is the choice of the best.
-lowest_temperature <- 1e-12
-
 # Beginning ---------------------------------------------------------------------------
 
 #' @export
@@ -289,66 +221,6 @@ move_dense_weights <- function(weights, present, column, rate, error) {
   weights
 }
 
-# Several steps at once, one sub-environment after the other -------------------------------
-
-#' Learn by eligibility traces
-#'
-#' Replacing traces for tables and tiles, accumulating ones for a user's features (Sutton and Barto
-#' 2018, sections 12.2 and 12.7).
-#' @noRd
-learn_by_traces <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate") / (agent$basis$each %||% 1L)
-  decay <- agent$discount * agent$lambda
-  for (i in seq_along(column)) {
-    place <- transitions$sub_env[[i]]
-    own <- present[i, , drop = FALSE]
-    value <- values_of(agent, own)[[column[[i]]]]
-    error <- transitions$reward[[i]] + agent$discount * ahead[[i]] - value
-    trace <- if (transitions$first[[i]] || length(agent$traces) < place) {
-      array(0, dim(agent$weights))
-    } else {
-      decay * agent$traces[[place]]
-    }
-    if (is.null(agent$basis$each)) {
-      trace[, column[[i]]] <- trace[, column[[i]]] + own[1L, ]
-    } else {
-      trace[own[1L, ] + nrow(trace) * (column[[i]] - 1L)] <- 1
-    }
-    agent$weights <- agent$weights + rate * error * trace
-    agent$traces[[place]] <- trace
-  }
-  agent
-}
-
-#' Learn from what n steps came to (Sutton and Barto 2018, sections 7.1 and 7.2)
-#' @noRd
-learn_by_steps <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
-  ended <- transitions$terminated | transitions$truncated
-  for (i in seq_along(column)) {
-    place <- transitions$sub_env[[i]]
-    steps <- if (!transitions$first[[i]] && length(agent$pending) >= place) agent$pending[[place]]
-    steps <- c(steps, list(list(
-      present = present[i, , drop = FALSE], column = column[[i]], reward = transitions$reward[[i]]
-    )))
-    # At the end of an episode all that are left have come to something.
-    while (length(steps) && (length(steps) == agent$n || ended[[i]])) {
-      rewards <- vapply(steps, function(step) step$reward, 0)
-      powers <- agent$discount^(seq_along(rewards) - 1L)
-      target <- sum(powers * rewards) + agent$discount^length(rewards) * ahead[[i]]
-      first <- steps[[1L]]
-      error <- target - values_of(agent, first$present)[[first$column]]
-      agent$weights <- move_weights(
-        agent$basis, agent$weights, first$present, first$column, rate, error
-      )
-      steps <- steps[-1L]
-      if (!ended[[i]]) break
-    }
-    agent$pending[place] <- list(steps)
-  }
-  agent
-}
-
 # Results -----------------------------------------------------------------------------
 
 #' Get the values that were learned
@@ -385,9 +257,6 @@ action_weights <- function(agent) UseMethod("action_weights")
 
 #' @exportS3Method
 action_weights.default <- function(agent) agent$weights
-
-# The text of a schedule.
-schedule_text <- function(x) if (is.function(x)) "scheduled" else number_text(x)
 
 learner_text <- function(name, agent, settings = NULL) {
   texts <- c(

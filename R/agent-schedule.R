@@ -1,0 +1,74 @@
+# Numbers of a learner that may change with the steps that it has taken.
+
+#' Change a number while an agent learns
+#'
+#' Makes a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of how
+#' many steps it has observed. Any function of this kind will do; these are the usual ones.
+#'
+#' @param from,to The number in the first step, and after `steps`, where it stays.
+#' @param steps How many steps it takes, a number of at least 1.
+#' @return A function of a number of steps. `schedule_linear()` goes in equal parts,
+#'   `schedule_exponential()` by equal factors (both numbers are above 0 then).
+#' @section Errors: `gym_error_argument`.
+#' @export
+#' @examples
+#' epsilon <- schedule_linear(1, 0.05, steps = 1000)
+#' epsilon(c(0, 500, 2000))
+schedule_linear <- function(from, to, steps) {
+  check_number(from)
+  check_number(to)
+  check_number(steps, min = 1)
+  new_schedule(from, to, steps, function(taken) from + (to - from) * pmin(taken / steps, 1))
+}
+
+#' @rdname schedule_linear
+#' @export
+schedule_exponential <- function(from, to, steps) {
+  check_above_zero(from)
+  check_above_zero(to)
+  check_number(steps, min = 1)
+  new_schedule(from, to, steps, function(taken) from * (to / from)^pmin(taken / steps, 1))
+}
+
+# A checkpoint tells two schedules apart by their numbers, not by what a function has kept.
+new_schedule <- function(from, to, steps, f) {
+  structure(f, from = from, to = to, steps = steps, class = c("gym_schedule", "function"))
+}
+
+#' @export
+print.gym_schedule <- function(x, ...) {
+  cat("<schedule: from ", number_text(attr(x, "from")), " to ", number_text(attr(x, "to")), " in ",
+      count_of(attr(x, "steps"), "step"), ">\n", sep = "")
+  invisible(x)
+}
+
+# Inside of learners ------------------------------------------------------------------------
+
+# Below this a softmax is the choice of the best.
+lowest_temperature <- 1e-12
+
+check_schedule <- function(x, arg, min, max, call) {
+  if (!is.function(x) && !(is_number(x) && x >= min && x <= max)) {
+    must <- paste0("a number", range_text(min, max), ", or a function of the steps so far")
+    abort_argument(x, must, arg, call)
+  }
+}
+
+# A number that may change with the steps that were taken so far.
+scheduled <- function(x, taken, arg, min = 0, max = 1) {
+  if (!is.function(x)) {
+    return(x)
+  }
+  value <- x(taken)
+  if (!is_number(value) || value < min || value > max) {
+    gym_abort(
+      paste0("The function `", arg, "` must return a number", range_text(min, max), ", and after ",
+             number_text(taken), " steps it returned ", describe_argument(value), "."),
+      class = "gym_error_argument", argument = arg, value = value, call = NULL
+    )
+  }
+  value
+}
+
+# The text of a schedule.
+schedule_text <- function(x) if (is.function(x)) "scheduled" else number_text(x)
