@@ -8,6 +8,7 @@
 #' @inheritParams agent_sarsa
 #' @param policy The policy whose values are learned, and which plays: any that [rollout()] plays.
 #' @param initial The value that all states have at first, a number; the default is 0.
+#' @param iterations,steps The budget, as for [train_agent()]. An iteration are `episodes` episodes.
 #' @return `agent_td()` an agent of class `gym_agent_td`; `learn_td()` makes that agent, trains it
 #'   and returns what [train_agent()] does. [state_values()] gives the values.
 #' @inheritSection agent_q Errors

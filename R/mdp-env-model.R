@@ -59,7 +59,7 @@ model_of_env.default <- function(env, call) abort_without_model(env, call)
 model_of_env.gym_server_env <- function(env, call) {
   route <- paste0(instance_route(env$instance_id), "model/")
   described <- get_answer(env$client, route, call = call)$model
-  column <- function(name, type) methods::as(unlist(described[[name]]), type)
+  column <- function(name, type) as.vector(unlist(described[[name]]), type)
   table <- data.frame(
     state = column("state", "integer"), action = column("action", "integer"),
     next_state = column("next_state", "integer"),
