@@ -136,11 +136,6 @@ any_best_column <- function(values) {
   max.col(best * (1 + stats::runif(length(values))), "first")
 }
 
-softmax_rows <- function(values) {
-  weight <- exp(values - row_max(values))
-  weight / rowSums(weight)
-}
-
 bandit_text <- function(rule, initial) {
   parts <- c(
     switch(

@@ -62,7 +62,7 @@ agent_act.gym_agent_monte_carlo <- function(agent, observation, sub_env) {
 
 #' @export
 agent_observe.gym_agent_monte_carlo <- function(agent, transitions) {
-  column <- as.integer(transitions$action - agent$spaces$action_space$start) + 1L
+  column <- action_columns(agent$spaces, transitions$action)
   row <- seen_by(agent, transitions$observation, column)[, 1L]
   cell <- row + nrow(agent$weights) * (column - 1L)
   ended <- transitions$terminated | transitions$truncated

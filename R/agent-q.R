@@ -83,7 +83,7 @@ agent_start.gym_agent_q <- function(agent, policy) {
 
 #' @export
 agent_observe.gym_agent_q <- function(agent, transitions) {
-  column <- as.integer(transitions$action - agent$spaces$action_space$start) + 1L
+  column <- action_columns(agent$spaces, transitions$action)
   present <- seen_by(agent, transitions$observation, column)
   after <- seen_by(agent, transitions$next_observation, column)
   agent <- with_known_weights(agent, present)
@@ -160,15 +160,6 @@ plan_again <- function(agent, n) {
 action_weights.gym_agent_q <- function(agent) {
   if (agent$double && !is.null(agent$second)) (agent$weights + agent$second) / 2 else agent$weights
 }
-
-#' @export
-agent_act.gym_agent_q <- function(agent, observation, sub_env) {
-  values <- values_of(agent, seen_by(agent, observation, sub_env), action_weights(agent))
-  choose_actions(agent, values) - 1L + agent$spaces$action_space$start
-}
-
-#' @export
-agent_policy.gym_agent_q <- function(agent) policy_of_values(agent, action_weights(agent))
 
 #' @export
 format.gym_agent_q <- function(x, ...) {

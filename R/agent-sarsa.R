@@ -51,7 +51,7 @@ check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {
 
 #' @export
 agent_observe.gym_agent_sarsa <- function(agent, transitions) {
-  column <- as.integer(transitions$action - agent$spaces$action_space$start) + 1L
+  column <- action_columns(agent$spaces, transitions$action)
   n <- length(column)
   present <- seen_by(agent, transitions$observation, column)
   after <- seen_by(agent, transitions$next_observation, column)

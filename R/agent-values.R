@@ -101,7 +101,7 @@ agent_act.gym_value_learner <- function(agent, observation, sub_env) {
   action <- agent$next_action[sub_env]
   new <- is.na(action)
   if (any(new)) {
-    values <- values_of(agent, seen_by(agent, observation, sub_env))
+    values <- values_of(agent, seen_by(agent, observation, sub_env), action_weights(agent))
     action[new] <- choose_actions(agent, values)[new]
   }
   action - 1L + agent$spaces$action_space$start
@@ -144,11 +144,7 @@ choose_actions <- function(agent, values) draw_table_actions(exploration(agent),
 
 #' @export
 agent_policy.gym_value_learner <- function(agent) {
-  policy_of_values(agent, agent$weights)
-}
-
-# The policy that takes the action with the largest value.
-policy_of_values <- function(agent, weights) {
+  weights <- action_weights(agent)
   if (is.null(agent$features)) {
     policy <- policy_table(weights)
     policy[c("observation_space", "action_space")] <- agent$spaces

@@ -14,7 +14,7 @@ backup_of <- function(model) {
   table <- model$transitions
   states <- length(model$start)
   actions <- as.integer(model$action_space$n)
-  row <- state_rows(model, table$state) + states * action_columns(model, table$action) - states
+  row <- pair_rows(model, state_rows(model, table$state), table$action)
   table <- table[order(row, method = "radix"), ]
   row <- sort(row)
   place <- sequence(rle(row)$lengths)
@@ -38,6 +38,11 @@ backup_of <- function(model) {
 # Numbers of states and actions, counted from 1.
 state_rows <- function(model, state) as.integer(state - model$observation_space$start + 1L)
 action_columns <- function(model, action) as.integer(action - model$action_space$start + 1L)
+
+# The number of the pair of a state, given by its row, and an action.
+pair_rows <- function(model, row, action) {
+  row + length(model$start) * (action_columns(model, action) - 1L)
+}
 
 # The value of each action in each state, a matrix, given the value of each state: Bellman's
 # equation. Actions that cannot be taken have -Inf.

@@ -216,9 +216,6 @@ start_probabilities <- function(start, table, states, call) {
   stats::setNames(as.double(start), numbers)
 }
 
-# The numbers of a Discrete space: those of states, or of actions.
-state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
-
 # Methods -----------------------------------------------------------------------------
 
 #' @export

@@ -34,7 +34,7 @@ model_env <- function(model, num_envs = NULL) {
         moves$states[self$row]
       },
       step = function(self, action) {
-        pair <- self$row + moves$count * (action_columns(model, action) - 1L)
+        pair <- pair_rows(model, self$row, action)
         check_possible(moves, model, self$row, action, pair)
         drawn <- draw_transition(moves, pair)
         self$row <- moves$next_row[drawn]
@@ -68,7 +68,7 @@ moves_of <- function(model) {
   table <- model$transitions
   table <- table[table$probability > 0, ]
   count <- length(model$start)
-  pair <- state_rows(model, table$state) + count * (action_columns(model, table$action) - 1L)
+  pair <- pair_rows(model, state_rows(model, table$state), table$action)
   table <- table[order(pair, method = "radix"), ]
   pair <- sort(pair)
   until <- cumsum(table$probability)

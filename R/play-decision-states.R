@@ -9,7 +9,7 @@ new_state_map <- function(place, call) {
     )
   }
   space <- place$observation_space
-  states <- seq.int(as.integer(space$start), length.out = as.integer(space$n))
+  states <- state_numbers(space)
   place$call <- call
   actions <- keep_random_state(act_batch(place$policy, states, length(states), place))
   structure(

@@ -102,14 +102,18 @@ draw_table_actions <- function(policy, rows) {
 # How likely each action is, a row for each state.
 row_probabilities <- function(policy, rows) {
   if (!is.null(policy$temperature)) {
-    weight <- exp((rows - row_max(rows)) / policy$temperature)
-    return(weight / rowSums(weight))
+    return(softmax_rows(rows, policy$temperature))
   }
   possible <- rows > -Inf
   p <- policy$epsilon * possible / rowSums(possible)
   best <- cbind(seq_len(nrow(rows)), best_column(rows))
   p[best] <- p[best] + 1 - policy$epsilon
   p
+}
+
+softmax_rows <- function(values, temperature = 1) {
+  weight <- exp((values - row_max(values)) / temperature)
+  weight / rowSums(weight)
 }
 
 # Draws a column for each row of a matrix of probabilities.

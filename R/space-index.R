@@ -63,6 +63,9 @@ parts_index <- function(space) {
   )
 }
 
+# The numbers of a Discrete's values, in order.
+state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
+
 # The index of a space that a table is to have rows for.
 table_index <- function(space, what, call) {
   index <- space_index(space)
