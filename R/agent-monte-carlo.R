@@ -29,13 +29,13 @@
 #' learn_monte_carlo("Blackjack-v1", iterations = 10, discount = 1, seed = 1, sab = TRUE)
 agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
                               visits = c("first", "every"), exploring_starts = FALSE,
-                              learning_rate = NULL) {
+                              learning_rate = NULL, mask = NULL) {
   visits <- check_choice(visits[1L], c("first", "every"), arg = "visits")
   check_flag(exploring_starts)
   settings <- list(
     discount = discount, learning_rate = learning_rate, epsilon = epsilon,
     temperature = temperature, initial = initial, features = NULL, visits = visits,
-    exploring_starts = exploring_starts
+    exploring_starts = exploring_starts, mask = mask
   )
   check_learner(settings[!vapply(settings, is.null, NA)])
   new_learner("gym_agent_monte_carlo", settings)
@@ -115,9 +115,9 @@ format.gym_agent_monte_carlo <- function(x, ...) {
 learn_monte_carlo <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
                               discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
                               visits = c("first", "every"), exploring_starts = FALSE,
-                              learning_rate = NULL, ...) {
+                              learning_rate = NULL, mask = NULL, ...) {
   agent <- agent_monte_carlo(discount, epsilon, temperature, initial, visits, exploring_starts,
-                             learning_rate)
+                             learning_rate, mask)
   train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
               target = target, ...)
 }

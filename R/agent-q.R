@@ -32,6 +32,10 @@
 #' @param double Double Q-learning? `FALSE`, the default, or `TRUE`.
 #' @param planning How many remembered steps to learn from after each real one, a whole number;
 #'   tables only. The default is 0.
+#' @param mask The name of the element of the environment's info that says which actions can be
+#'   taken, such as `"action_mask"` of Taxi: a number for each action, 0 for one that must not be.
+#'   What it forbids at an observation is never taken there again, and its value is `-Inf`; tables
+#'   only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()].
 #' @param iterations,steps,target The budget and the target, as for [train_agent()]. An iteration
 #'   are `episodes` episodes.
@@ -55,13 +59,13 @@
 #' learned <- learn_q("FrozenLake-v1", iterations = 20, seed = 1, is_slippery = FALSE, initial = 1)
 #' learned
 agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                    initial = 0, features = NULL, double = FALSE, planning = 0) {
+                    initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL) {
   check_flag(double)
   check_count(planning, min = 0)
   settings <- list(
     discount = discount, learning_rate = learning_rate, epsilon = epsilon,
     temperature = temperature, initial = initial, features = features, double = double,
-    planning = as.integer(planning)
+    planning = as.integer(planning), mask = mask
   )
   check_learner(settings)
   if (planning > 0 && (double || !is.null(features))) {
@@ -171,9 +175,9 @@ format.gym_agent_q <- function(x, ...) {
 #' @export
 learn_q <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
                     discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                    initial = 0, features = NULL, double = FALSE, planning = 0, ...) {
+                    initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL, ...) {
   agent <- agent_q(discount, learning_rate, epsilon, temperature, initial, features, double,
-                   planning)
+                   planning, mask)
   train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
               target = target, ...)
 }

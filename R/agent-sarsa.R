@@ -26,14 +26,15 @@
 #' @examplesIf gym:::can_start_server()
 #' learn_sarsa("CliffWalking-v1", iterations = 5, learning_rate = 0.5, discount = 1, seed = 1)
 agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0) {
+                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0,
+                        mask = NULL) {
   check_flag(expected)
   check_count(n)
   check_number(lambda, min = 0, max = 1)
   settings <- list(
     discount = discount, learning_rate = learning_rate, epsilon = epsilon,
     temperature = temperature, initial = initial, features = features, expected = expected,
-    n = as.integer(n), lambda = lambda
+    n = as.integer(n), lambda = lambda, mask = mask
   )
   check_learner(settings)
   check_one_horizon(n, lambda)
@@ -81,9 +82,10 @@ format.gym_agent_sarsa <- function(x, ...) {
 #' @export
 learn_sarsa <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
                         discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0, ...) {
+                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0,
+                        mask = NULL, ...) {
   agent <- agent_sarsa(discount, learning_rate, epsilon, temperature, initial, features, expected,
-                       n, lambda)
+                       n, lambda, mask)
   train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
               target = target, ...)
 }

@@ -29,6 +29,13 @@ check_learner <- function(settings, call = rlang::caller_env()) {
     must <- "NULL, what `tile_coding()` makes, or a function of observations"
     abort_argument(features, must, "features", call)
   }
+  check_string(settings$mask, arg = "mask", allow_null = TRUE, call = call)
+  if (!is.null(settings$mask) && !is.null(features)) {
+    gym_abort(
+      "`mask` is for a table, not for features: a table keeps what is forbidden where.",
+      class = "gym_error_argument", argument = "mask", value = settings$mask, call = call
+    )
+  }
 }
 
 # Beginning ---------------------------------------------------------------------------

@@ -58,6 +58,9 @@
 #'       where no frames are wanted.}
 #'     \item{remembers}{The names of wrappers that remember something over episodes, strings; then
 #'       the episodes are never split over batches.}
+#'     \item{env}{The environment that it plays, with the functions `reset()` and `step()` of
+#'       [gym_make()], which return infos; `NULL` where there is no such one, as with several
+#'       sub-environments in R.}
 #'     \item{client}{The client of the server, `NULL` where there is none.}
 #'     \item{close(wait)}{A function that closes what was made here, and nothing else; with
 #'       `wait = FALSE` without waiting for the server.}
@@ -157,6 +160,7 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
   }
   vector_env$spec <- env$spec
   vector_env$client <- env$client
+  vector_env$env <- env
   vector_env$batch_size <- if (vector_env$one_seed || is.null(env$num_envs)) {
     vector_env$num_envs
   } else {

@@ -73,6 +73,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
   stack <- result_stacker(task)
   new_r_vector_env(
     task, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
+    env = if (length(sub_envs) == 1L) checked_methods(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
       call <- rlang::current_env()
       which <- which %||% all

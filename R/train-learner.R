@@ -112,6 +112,10 @@ learn_episodes <- function(state, vector_env, settings, call) {
       check_is_agent(agent, "agent_observe()", call)
     }
   )
+  if (!is.null(agent$mask)) {
+    note <- function(observation, mask) agent <<- bar_actions(agent, observation, mask, call)
+    vector_env <- with_masks(vector_env, agent$mask, note, call)
+  }
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- seed_drawer(settings)
   play_batches(

@@ -1,0 +1,145 @@
+# Masks: which actions can be taken, as an environment's infos say.
+
+#' Let a vector environment tell a learner which actions can be taken
+#'
+#' Its `reset()` and `step()` ask for infos, which [as_vector_env()] otherwise leaves out.
+#' @param name The name of the info's element that is the mask.
+#' @param note A function of a batch of observations and their masks, a logical matrix with a row
+#'   for each observation and a column for each action, which is called whenever some are known.
+#' @noRd
+with_masks <- function(vector_env, name, note, call) {
+  env <- vector_env$env
+  if (vector_env$one_seed || !"return_info" %in% names(formals(env$reset))) {
+    gym_abort(
+      c(paste0("`mask` needs the infos of ", environment_label(vector_env),
+               ", which cannot be had as it is played here."),
+        i = paste("A single environment gives them, and one that `gym_make()` makes with",
+                  "vectorization_mode \"sync\".")),
+      class = "gym_error_argument", argument = "mask", value = name, call = call
+    )
+  }
+  masked <- if (is.null(env$num_envs)) masked_single_env else masked_sub_envs
+  vector_env[c("reset", "step")] <- masked(env, vector_env, name, note, call)
+  # The info of an episode that an environment begins by itself would take the place of its last.
+  vector_env$begins_next <- FALSE
+  vector_env
+}
+
+masked_single_env <- function(env, vector_env, name, note, call) {
+  batch <- function(value) batch_of(vector_env$observation_space, list(value))
+  actions <- vector_env$action_space
+  list(
+    reset = function(seeds, which = 1L) {
+      out <- env$reset(seed = seeds, return_info = TRUE)
+      observation <- batch(out$observation)
+      mask <- mask_in(out$info, name, 1L, actions, call)
+      if (!is.null(mask)) note(observation, mask)
+      observation
+    },
+    step = function(action, which = 1L) {
+      out <- env$step(batch_value(actions, action, 1L))
+      out$observation <- batch(out$observation)
+      out$next_observation <- out$observation
+      mask <- needed_mask(out$info, name, 1L, actions, call)
+      if (!out$terminated) note(out$observation, mask)
+      out
+    }
+  )
+}
+
+masked_sub_envs <- function(env, vector_env, name, note, call) {
+  n <- env$num_envs
+  space <- vector_env$observation_space
+  actions <- vector_env$action_space
+  was_reset <- FALSE
+  list(
+    reset = function(seeds, which) {
+      some <- was_reset && length(which) < n
+      seed <- rep(if (some) NA_real_ else seeds, length.out = n)
+      seed[which] <- seeds
+      resets <- if (some) list(mask = seq_len(n) %in% which)
+      out <- rlang::exec(env$reset, seed = seed, !!!resets, return_info = TRUE)
+      was_reset <<- TRUE
+      observation <- batch_rows(space, out$observation, which)
+      mask <- mask_in(out$info, name, n, actions, call)
+      if (!is.null(mask)) note(observation, mask[which, , drop = FALSE])
+      observation
+    },
+    step = function(action, which) {
+      count <- length(which)
+      out <- if (count < n) env$step(action, which = which) else env$step(action)
+      out$next_observation <- out$next_observation %||% out$observation
+      mask <- needed_mask(out$info, name, count, actions, call)
+      final <- mask_in(out$info$final_info, name, count, actions, call)
+      ended <- out$terminated | out$truncated
+      if (!is.null(final)) mask[ended, ] <- final[ended, ]
+      goes_on <- which(!out$terminated)
+      if (length(goes_on)) {
+        note(batch_rows(space, out$next_observation, goes_on), mask[goes_on, , drop = FALSE])
+      }
+      out
+    }
+  )
+}
+
+#' The mask in an info
+#' @param n For how many sub-environments.
+#' @return A logical matrix, `NULL` where the info has no such element.
+#' @noRd
+mask_in <- function(info, name, n, actions, call) {
+  mask <- info[[name]]
+  if (is.null(mask)) {
+    return(NULL)
+  }
+  count <- as.integer(actions$n)
+  right <- (is.numeric(mask) || is.logical(mask)) && length(mask) == n * count &&
+    (n == 1L || identical(dim(mask), c(n, count)))
+  if (!right) {
+    gym_abort(
+      paste0("The info's `", name, "` must be a number or TRUE or FALSE for each of ",
+             count_of(count, "action"), if (n > 1L) paste(" and of", n, "sub-environments"),
+             ", not ", describe_argument(mask), "."),
+      class = "gym_error_argument", argument = "mask", value = mask, call = call
+    )
+  }
+  matrix(mask != 0, n, count)
+}
+
+needed_mask <- function(info, name, n, actions, call) {
+  mask <- mask_in(info, name, n, actions, call)
+  if (is.null(mask)) {
+    has <- names(info)
+    gym_abort(
+      c(paste0("`mask` names \"", name, "\", but the environment's info has no such element."),
+        i = if (length(has)) paste0("It has ", paste0("\"", has, "\"", collapse = ", "), ".")),
+      class = "gym_error_argument", argument = "mask", value = name, call = call
+    )
+  }
+  mask
+}
+
+#' Let a learner never again take the actions that a mask bars
+#'
+#' Their values become -Inf, so that its policy does not take them either.
+#' @param mask As [with_masks()] notes it.
+#' @noRd
+bar_actions <- function(agent, observation, mask, call) {
+  row <- agent$basis$of(observation, nrow(mask))[, 1L]
+  barred <- which(!mask, arr.ind = TRUE)
+  at <- cbind(row[barred[, 1L]], barred[, 2L])
+  if (any(agent$weights[at] > -Inf)) {
+    agent$weights[at] <- -Inf
+    if (!is.null(agent$second)) agent$second[at] <- -Inf
+  }
+  empty <- row_max(agent$weights[row, , drop = FALSE]) == -Inf
+  if (any(empty)) {
+    at_first <- which(empty)[[1L]]
+    gym_abort(
+      paste0("The info's `", agent$mask, "` forbids every action at the observation ",
+             describe_value(batch_value(agent$spaces$observation_space, observation, at_first)),
+             "."),
+      class = "gym_error_argument", argument = "mask", value = mask[at_first, ], call = call
+    )
+  }
+  agent
+}
