@@ -7,15 +7,10 @@
 # It takes hours. What the tables have already is not trained again, so that it may be stopped at
 # any time; a row that is to be made anew is deleted from both first. At the end the short table of
 # README.md is written.
+source("tools/processes.R")
 source("tools/solve/jobs.R")
 source("tools/solve/readme.R")
 
-given <- strsplit(commandArgs(trailingOnly = TRUE), "=", fixed = TRUE)
-option <- function(name, default) {
-  found <- Filter(function(one) one[[1L]] == name, given)
-  if (length(found)) found[[1L]][[2L]] else default
-}
-processes <- as.integer(option("processes", "2"))
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
 
 table_file <- "inst/extdata/solve-table.csv"
@@ -45,41 +40,15 @@ todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
 todo <- todo[todo$env_id %in% only & !key(todo) %in% key(read_rows(table_file)), ]
 cat(nrow(todo), "trainings to come\n")
 
-start <- function(one) {
-  file <- tempfile(fileext = ".rds")
-  process <- processx::process$new(
-    file.path(R.home("bin"), "Rscript"),
-    c("--no-init-file", "tools/solve/train.R", one$row, one$seed, file),
-    stderr = paste0(file, ".txt"), cleanup_tree = TRUE
-  )
-  list(process = process, file = file, one = one)
-}
-
-finish <- function(running) {
-  name <- key(running$one)
-  if (!file.exists(running$file)) {
-    # The others go on; this one is trained when the script runs again.
-    cat(name, "failed:", readLines(paste0(running$file, ".txt")), sep = "\n")
-    return(invisible())
+run_side_by_side(
+  "tools/solve/train.R", Map(c, todo$row, todo$seed), as.integer(option("processes", "2")),
+  function(made, task) {
+    add_rows(table_file, made$table)
+    add_rows(curve_file, made$curve)
+    cat(sprintf(
+      "%s: %.1f after %.0f steps, %.0f s\n", key(made$table), made$table$mean_return,
+      made$table$steps, made$table$seconds
+    ))
   }
-  made <- readRDS(running$file)
-  add_rows(table_file, made$table)
-  add_rows(curve_file, made$curve)
-  cat(sprintf(
-    "%s: %.1f after %.0f steps, %.0f s\n", name, made$table$mean_return, made$table$steps,
-    made$table$seconds
-  ))
-}
-
-running <- list()
-while (nrow(todo) || length(running)) {
-  while (nrow(todo) && length(running) < processes) {
-    running <- c(running, list(start(todo[1L, ])))
-    todo <- todo[-1L, ]
-  }
-  Sys.sleep(0.5)
-  ended <- !vapply(running, function(one) one$process$is_alive(), NA)
-  for (one in running[ended]) finish(one)
-  running <- running[!ended]
-}
+)
 write_readme_rows()

@@ -12,7 +12,7 @@ Acrobot-v1,,ars,-100,registered,1,20
 MountainCarContinuous-v0,,ars,90,registered,1,20
 LunarLander-v3,continuous,ars,200,registered,1,20
 LunarLander-v3,,ars,200,registered,1,20
-Swimmer-v5,,ars,325,paper (registered 360),1,20
+Swimmer-v5,,cem,325,paper (registered 360),3,20
 HalfCheetah-v5,,ars,3430,paper (registered 4800),1,10
 Pendulum-v1,,cem,-200,ours,2,10
 Hopper-v5,,ars,3120,paper (registered 3800),1,1
