@@ -103,10 +103,12 @@ check_fits_env <- function(model, env, call) {
     abort_argument(model, "a model or its table of transitions", "gym_env(model = )", call)
   }
   for (name in c("observation_space", "action_space")) {
-    if (!identical(format(model[[name]]), format(env[[name]]))) {
+    # One of several sub-environments counts.
+    space <- env[[paste0("single_", name)]] %||% env[[name]]
+    if (!identical(format(model[[name]]), format(space))) {
       gym_abort(
         paste0("The model of ", environment_label(env), " has the ", sub("_", " ", name), " ",
-               format(model[[name]]), ", but the environment has ", format(env[[name]]), "."),
+               format(model[[name]]), ", but the environment has ", format(space), "."),
         class = "gym_error_argument", argument = "model", value = model, call = call
       )
     }

@@ -7,7 +7,7 @@
 #' @param ... More of them, which may have names for the legend.
 #' @param what What is shown, a string: `"mean_reward"`, the default, or `"best_share"`.
 #' @param main The title; `NULL`, the default, names the bandit.
-#' @return `x`, invisibly; `autoplot()` a ggplot.
+#' @return The first of them, invisibly; `autoplot()` a ggplot.
 #' @export
 #' @examples
 #' testbed <- bandit(arms = 10, steps = 200)
@@ -15,7 +15,9 @@
 #' many <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
 #' plot(few, many, what = "best_share")
 plot.gym_bandit_learning <- function(x, ..., what = c("mean_reward", "best_share"), main = NULL) {
-  data <- bandit_plot_data(list(x, ...), what)
+  # All of them may be named.
+  runs <- if (missing(x)) list(...) else list(x, ...)
+  data <- bandit_plot_data(runs, what)
   open_plot(
     list(x = range(data$curves$step), y = data$range, xlab = "step", ylab = data$label), list()
   )
@@ -27,7 +29,7 @@ plot.gym_bandit_learning <- function(x, ..., what = c("mean_reward", "best_share
   title_above(main %||% data$title)
   each <- rep(1L, length(colours))
   legend_above(names(colours), col = unname(colours), pch = NA, lty = each)
-  invisible(x)
+  invisible(runs[[1L]])
 }
 
 bandit_colours <- function(data) {

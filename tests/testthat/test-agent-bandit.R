@@ -93,3 +93,12 @@ test_that("what is no bandit, or no method, is refused", {
   refused(learn_bandit(bandit(), "thompson"), "one of \"epsilon_greedy\"")
   refused(learn_bandit(bandit(), epsilon = 2), "`epsilon` must be a number from 0 to 1")
 })
+
+test_that("all learners of a plot may be named", {
+  local_device()
+  testbed <- bandit(arms = 3, steps = 20)
+  greedy <- learn_bandit(testbed, epsilon = 0, learners = 5, seed = 1)
+  often <- learn_bandit(testbed, epsilon = 0.1, learners = 5, seed = 1)
+  expect_identical(plot(never = greedy, sometimes = often), greedy)
+  expect_identical(plot(greedy, sometimes = often), greedy)
+})

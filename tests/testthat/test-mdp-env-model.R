@@ -104,3 +104,11 @@ test_that("an environment in R has the model that it was given", {
   withr::defer(gym_unregister("OwnWalk-v0"))
   expect_equal(solve_mdp("OwnWalk-v0", policy = policy_random())$values[["1"]], 1 / 3)
 })
+
+test_that("an environment in R with sub-environments has the model of one of them", {
+  model <- walk_model()
+  env <- model_env(model, num_envs = 4)
+  expect_identical(env_model(env)$transitions, model$transitions)
+  learned <- learn_q(env, iterations = 20, seed = 1)
+  expect_identical(c(learned$final$mean_return, learned$final$episodes), c(1, 0))
+})
