@@ -42,6 +42,8 @@
 #'     \item{begins_next}{`TRUE` where a sub-environment that has ended begins its next episode by
 #'       itself, in the same step, as long as it has seeds. `FALSE` or `NULL` where it must be
 #'       reset.}
+#'     \item{endless}{`TRUE` where it is known that no episode ever ends, so that it is played with
+#'       `max_steps` only. `FALSE` or `NULL` elsewhere.}
 #'     \item{reset(seeds, which)}{A function that starts episodes and returns the first
 #'       observations, a row for each: with `one_seed` in all sub-environments, `seeds` being one
 #'       whole number; otherwise in the sub-environments with the numbers `which`, in increasing

@@ -55,7 +55,22 @@ model_env <- function(model, num_envs = NULL) {
 as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
                                     client = NULL, num_workers = NULL) {
   check_made_before(NULL, c(list(...), num_workers = num_workers), x)
-  as_vector_env(model_env(x, num_envs %||% vectorized_sub_envs), num_envs, frames = frames)
+  env <- model_env(x, num_envs %||% vectorized_sub_envs)
+  vector_env <- as_vector_env(env, num_envs, frames = frames)
+  vector_env$endless <- is.null(x$spec$max_episode_steps) && !can_end(x)
+  vector_env
+}
+
+# Is there a way from the start to the end of an episode?
+can_end <- function(model) {
+  table <- model$transitions[model$transitions$probability > 0, ]
+  from <- state_rows(model, table$state)
+  to <- state_rows(model, table$next_state)
+  leads <- function(reached) {
+    seq_along(reached) %in% to[reached[from] & !table$terminated]
+  }
+  reached <- closure(leads, model$start > 0)
+  any(table$terminated & reached[from])
 }
 
 #' Prepare the drawing of a model's transitions

@@ -67,11 +67,24 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #' @param report A function that is called with how many episodes have ended in the present batch.
 #' @param ... Further arguments of [play_batch()].
 #' @noRd
-play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...) {
+play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...,
+                         max_steps = Inf) {
+  check_ends(vector_env, max_steps)
   while (!is.null(batch <- next_batch(vector_env, history))) {
-    played <- play_drawn_batch(vector_env, batch, policy_of, report, ...)
+    played <- play_drawn_batch(vector_env, batch, policy_of, report, ..., max_steps = max_steps)
     # An interrupt finds the batch entered completely, or not at all.
     suspendInterrupts(enter_batch(history, played))
+  }
+}
+
+# Where it is known that no episode ever ends, nothing would come of playing.
+check_ends <- function(vector_env, max_steps) {
+  if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
+    gym_abort(
+      c(paste0("Episodes of ", environment_label(vector_env), " have no end, whatever is done."),
+        i = "Give `max_steps`, after which an episode is cut off."),
+      class = "gym_error_argument", argument = "max_steps", call = vector_env$call
+    )
   }
 }
 

@@ -62,3 +62,20 @@ test_that("probabilities that are tiny, or 0, are drawn as such", {
                     seed = 1, steps = TRUE, next_observation = TRUE)
   expect_identical(unique(played$steps$next_obs_1), 3L)
 })
+
+test_that("a model whose episodes have no end is played with a limit of steps only", {
+  # The end cannot be reached from the start.
+  ring <- gym_model(data.frame(
+    state = c(0, 1, 2), action = 0, next_state = c(1, 0, 3), reward = 1
+  ), start = 0, id = "Ring")
+  for (play in list(
+    function(...) rollout(ring, policy_random(), seed = 1, ...),
+    function(...) learn_q(ring, iterations = 1, seed = 1, ...)
+  )) {
+    expect_error(play(), "Episodes of Ring have no end.*max_steps", class = "gym_error_argument")
+    expect_no_error(play(max_steps = 5))
+  }
+  limited <- gym_model(as.data.frame(ring), start = 0, max_episode_steps = 3)
+  expect_identical(rollout(limited, policy_random(), seed = 1)$episodes$length, 3L)
+  expect_no_error(rollout(walk_model(), policy_random(), seed = 1))
+})
