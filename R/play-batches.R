@@ -69,7 +69,7 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #' @noRd
 play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...,
                          max_steps = Inf) {
-  check_ends(vector_env, max_steps)
+  check_has_end(vector_env, max_steps)
   while (!is.null(batch <- next_batch(vector_env, history))) {
     played <- play_drawn_batch(vector_env, batch, policy_of, report, ..., max_steps = max_steps)
     # An interrupt finds the batch entered completely, or not at all.
@@ -78,7 +78,7 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
 }
 
 # Where it is known that no episode ever ends, nothing would come of playing.
-check_ends <- function(vector_env, max_steps) {
+check_has_end <- function(vector_env, max_steps) {
   if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
     gym_abort(
       c(paste0("Episodes of ", environment_label(vector_env), " have no end, whatever is done."),
