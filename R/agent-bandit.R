@@ -130,12 +130,6 @@ choose_arms <- function(rule, values, taken, step) {
   arm
 }
 
-# The column of the largest number in each row; of several one is drawn.
-any_best_column <- function(values) {
-  best <- values == row_max(values)
-  max.col(best * (1 + stats::runif(length(values))), "first")
-}
-
 bandit_text <- function(rule, initial) {
   parts <- c(
     switch(

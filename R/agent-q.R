@@ -9,10 +9,8 @@
 #' remembered steps are learned from again after each real one (Dyna-Q; section 8.2), where the last
 #' outcome of each state and action is remembered.
 #'
-#' Of actions with equal values the first is taken, also while it explores. Where rewards are rare
-#' and all values begin at 0 it may so walk against a wall for long: a small positive `initial`,
-#' such as 1e-6, makes it try the other actions, too. Where the model is known, an action that a
-#' state does not have is never taken.
+#' While it learns it draws among actions with equal values; the policy that it returns takes the
+#' first of them. Where the model is known, an action that a state does not have is never taken.
 #'
 #' Where the model of the environment is known (see [env_model()]) the policy is judged by it,
 #' exactly and without playing; the evaluations then have 0 episodes and a standard error of 0.

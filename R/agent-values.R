@@ -146,8 +146,11 @@ exploration <- function(agent) {
   )
 }
 
-# The numbers of the actions that are taken, from 1.
-choose_actions <- function(agent, values) draw_table_actions(exploration(agent), values)
+# The numbers of the actions that are taken, from 1. Of equal values one is drawn, so that a learner
+# which knows nothing yet goes everywhere.
+choose_actions <- function(agent, values) {
+  draw_table_actions(exploration(agent), values, best = any_best_column)
+}
 
 #' @export
 agent_policy.gym_value_learner <- function(agent) {

@@ -83,12 +83,13 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   rows
 }
 
-# The numbers, from 1, of the actions that are taken.
-draw_table_actions <- function(policy, rows) {
+# The numbers, from 1, of the actions that are taken; `best` gives the column of the largest value
+# in each row.
+draw_table_actions <- function(policy, rows, best = best_column) {
   if (!is.null(policy$temperature)) {
     return(draw_by_row(row_probabilities(policy, rows)))
   }
-  choice <- best_column(rows)
+  choice <- best(rows)
   if (policy$epsilon > 0) {
     explores <- stats::runif(length(choice)) < policy$epsilon
     if (any(explores)) {
@@ -136,6 +137,12 @@ row_max <- function(x) {
   if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
 }
 best_column <- function(x) if (nrow(x) == 1L) which.max(x) else max.col(x, "first")
+
+# The column of the largest number in each row; of several one is drawn.
+any_best_column <- function(x) {
+  best <- x == row_max(x)
+  max.col(best * (1 + stats::runif(length(x))), "first")
+}
 
 #' @exportS3Method
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {

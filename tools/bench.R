@@ -17,7 +17,7 @@ for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "
                "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
-source("tools/fewer-colours.R")
+source("vignettes/pictures.R")
 
 progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 

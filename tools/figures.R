@@ -7,7 +7,7 @@
 # png.
 
 library(gym)
-source("tools/fewer-colours.R")
+source("vignettes/pictures.R")
 
 results <- readRDS("vignettes/results.rds")
 policy <- results$search$policy

@@ -1,5 +1,5 @@
 # Makes the table of solved environments, inst/extdata/solve-table.csv (a row for each training) and
-# solve-curves.csv (the evaluations of each): trains every environment of tools/solve/jobs.R with
+# solve-curves.csv.gz (the evaluations of each): trains every environment of tools/solve/jobs.R with
 # the settings of agent_presets(), with seeds that no setting was tried on.
 #
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
@@ -14,7 +14,7 @@ source("tools/solve/readme.R")
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
 
 table_file <- "inst/extdata/solve-table.csv"
-curve_file <- "inst/extdata/solve-curves.csv"
+curve_file <- "inst/extdata/solve-curves.csv.gz"
 key <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
 read_rows <- function(file) {
   if (file.exists(file)) {
@@ -27,7 +27,10 @@ add_rows <- function(file, rows) {
   all <- rbind(read_rows(file), rows)
   of_job <- match(paste(all$env_id, all$kwargs), paste(solve_jobs$env_id, solve_jobs$kwargs))
   all <- all[order(of_job, all$seed, method = "radix"), ]
-  utils::write.csv(all, file, row.names = FALSE)
+  to <- if (endsWith(file, ".gz")) gzfile(file, compression = 9L) else base::file(file)
+  open(to, "w")
+  on.exit(close(to))
+  utils::write.csv(all, to, row.names = FALSE)
 }
 
 todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {

@@ -240,3 +240,20 @@ test_that("what cannot be learned so is refused", {
   refused(learn_q(walk_model(), iterations = 1, policy = policy_random()), "a table of values")
   refused(state_values(3), "what was learned by a table")
 })
+
+test_that("among actions with equal values a learner draws, but not among forbidden ones", {
+  equal <- rbind(c(1, 1, -Inf), c(-Inf, 0, 0), c(2, 2, 2))
+  policy <- spaces(3, 3)
+  policy$q <- equal
+  for (learner in list(agent_q(epsilon = 0), agent_sarsa(epsilon = 0))) {
+    agent <- agent_start(learner, policy)
+    chosen <- withr::with_seed(1, replicate(200, agent_act(agent, 0:2, 1:3)))
+    shares <- apply(chosen, 1, function(actions) table(factor(actions, 0:2)) / 200)
+    expect_true(all(abs(shares - t(equal > -Inf) %*% diag(c(1 / 2, 1 / 2, 1 / 3))) < 0.12))
+  }
+})
+
+test_that("the best action is taken where it is alone", {
+  agent <- started(agent_q(epsilon = 0))
+  expect_identical(withr::with_seed(1, agent_act(agent, 0:2, 1:3)), c(1L, 1L, 0L))
+})

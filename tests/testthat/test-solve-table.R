@@ -27,7 +27,7 @@ test_that("each seed has one row, without a gap, failures included", {
 
 test_that("the curves end with the final evaluations of the table", {
   table <- read_solved("solve-table.csv")
-  curves <- read_solved("solve-curves.csv")
+  curves <- read_solved("solve-curves.csv.gz")
   final <- curves[curves$kind == "final", ]
   expect_identical(task_of(final), task_of(table))
   expect_equal(final$mean_return, table$mean_return, tolerance = 0.005 / 10)

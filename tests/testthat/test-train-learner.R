@@ -170,3 +170,13 @@ test_that("rewards that are no numbers end the training by name", {
   )
   expect_error(learn_q(wrong, iterations = 1), class = "gym_error_agent")
 })
+
+test_that("a learner that knows nothing yet does not walk against one wall", {
+  # Twelve states in a row. Only the third action leads on, and only the last step pays: who draws
+  # needs 48 steps on average, who takes the first action but where epsilon explores 480.
+  steps <- expand.grid(action = 0:3, state = 0:11)
+  steps$next_state <- steps$state + (steps$action == 2)
+  steps$reward <- as.numeric(steps$next_state == 12)
+  learned <- learn_q(gym_model(steps, start = 0), iterations = 1, episodes = 1, seed = 1)
+  expect_lt(learned$history$mean_length, 150)
+})
