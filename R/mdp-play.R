@@ -31,16 +31,19 @@ model_env <- function(model, num_envs = NULL) {
     gym_env(
       reset = function(self) {
         self$row <- draw_start(moves, self$num_envs %||% 1L)
+        self$over <- logical(length(self$row))
         moves$states[self$row]
       },
       step = function(self, action) {
         pair <- pair_rows(model, self$row, action)
-        check_possible(moves, model, self$row, action, pair)
+        check_possible(moves, model, self$row, action, pair, self$over)
         drawn <- draw_transition(moves, pair)
-        self$row <- moves$next_row[drawn]
+        # A sub-environment whose episode has ended is stepped with the others, and stays in place.
+        self$row <- ifelse(self$over, self$row, moves$next_row[drawn])
+        self$over <- self$over | moves$terminated[drawn]
         list(
           observation = moves$states[self$row], reward = moves$reward[drawn],
-          terminated = moves$terminated[drawn]
+          terminated = self$over
         )
       },
       observation_space = model$observation_space, action_space = model$action_space,
@@ -58,6 +61,10 @@ as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   env <- model_env(x, num_envs %||% vectorized_sub_envs)
   vector_env <- as_vector_env(env, num_envs, frames = frames)
   vector_env$endless <- is.null(x$spec$max_episode_steps) && !can_end(x)
+  possible <- possible_actions(x)
+  # In an end, which has no actions, nothing is done.
+  lacks <- any(rowSums(possible) > 0 & rowSums(possible) < ncol(possible))
+  vector_env$possible <- if (lacks) possible
   vector_env
 }
 
@@ -90,12 +97,12 @@ moves_of <- function(model) {
   first <- match(seq_len(count * as.integer(model$action_space$n)), pair)
   last <- first + tabulate(pair, length(first)) - 1L
   list(
-    count = count, states = state_numbers(model$observation_space),
+    states = state_numbers(model$observation_space),
     start = cumsum(model$start), last_start = max(which(model$start > 0)),
     until = until, from = c(0, until)[first], width = until[last] - c(0, until)[first],
     first = first, last = last,
     next_row = state_rows(model, table$next_state), reward = table$reward,
-    terminated = table$terminated, is_end = !seq_len(count) %in% state_rows(model, table$state)
+    terminated = table$terminated
   )
 }
 
@@ -112,9 +119,8 @@ draw_transition <- function(moves, pair) {
   drawn
 }
 
-check_possible <- function(moves, model, row, action, pair) {
-  # A sub-environment whose episode has ended is stepped, and what comes of it ignored.
-  barred <- is.na(moves$first[pair]) & !moves$is_end[row]
+check_possible <- function(moves, model, row, action, pair, over) {
+  barred <- is.na(moves$first[pair]) & !over
   if (any(barred)) {
     gym_abort(
       paste0("Action ", action[barred][[1L]], " cannot be taken in state ",

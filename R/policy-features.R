@@ -134,18 +134,18 @@ tiles_of <- function(features, space, call) {
     )
   }
   width <- (high - low) / bins
-  displaced <- outer(seq_len(tilings) - 1, 2 * seq_len(numbers) - 1) %% tilings / tilings
+  last <- bins * (1 - 1e-12)
+  # A column for each tiling.
+  displaced <- t(outer(seq_len(tilings) - 1, 2 * seq_len(numbers) - 1) %% tilings / tilings)
+  first <- per_tiling * (seq_len(tilings) - 1) + 1
   of <- function(observation, n) {
-    # In tiles from the lower bound, within the range.
+    # In tiles from the lower bound, within the range; a column for each observation.
     place <- (t(matrix(observation, n)) - low) / width
-    place <- t(pmin(pmax(place, 0), bins * (1 - 1e-12)))
-    tiles <- matrix(0L, n, tilings)
-    for (tiling in seq_len(tilings)) {
-      at <- floor(t(t(place) + displaced[tiling, ]))
-      number <- at %*% weights[seq_len(numbers)]
-      tiles[, tiling] <- as.integer(number + per_tiling * (tiling - 1) + 1)
-    }
-    tiles
+    place <- pmin(pmax(place, 0), last)
+    of_tiling <- rep(seq_len(tilings), each = n)
+    at <- floor(place[, rep(seq_len(n), tilings)] + displaced[, of_tiling])
+    number <- as.vector(weights[seq_len(numbers)] %*% at)
+    matrix(as.integer(number + first[of_tiling]), n, tilings)
   }
   list(count = per_tiling * tilings, each = tilings, of = of, features = features)
 }

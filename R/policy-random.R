@@ -3,7 +3,8 @@
 #' `policy_random()` makes a policy that looks at nothing and draws its action:
 #' uniformly between the bounds of the action space, and from an exponential or
 #' normal distribution where a side or both are unbounded, as Gymnasium's own
-#' `sample()` does. It draws from R's generator, so that [set.seed()] fixes it.
+#' `sample()` does. In a model, see [gym_model()], it draws among the actions that the
+#' state has. It draws from R's generator, so that [set.seed()] fixes it.
 #' `random_discrete_agent()` is the same for `n` actions, under the name that the
 #' classic package had for it.
 #'
@@ -73,7 +74,12 @@ act.gym_policy_random <- function(policy, observation, ...) {
 
 #' @exportS3Method
 act_batch.gym_policy_random <- function(policy, observation, n, vector_env) {
-  sample_batch(policy$action_space, n)
+  possible <- policy$possible
+  if (is.null(possible)) {
+    return(sample_batch(policy$action_space, n))
+  }
+  possible <- possible[space_index(policy$observation_space)$index(observation, n), , drop = FALSE]
+  draw_by_row(possible / pmax(rowSums(possible), 1)) - 1L + as.integer(policy$action_space$start)
 }
 
 #' @exportS3Method
@@ -82,6 +88,7 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy$observation_space <- env$observation_space
   if (is.null(own)) {
     policy$action_space <- env$action_space
+    policy$possible <- env$possible
   } else if (!space_within(own, env$action_space)) {
     gym_abort(
       paste0(

@@ -79,3 +79,18 @@ test_that("a model whose episodes have no end is played with a limit of steps on
   expect_identical(rollout(limited, policy_random(), seed = 1)$episodes$length, 3L)
   expect_no_error(rollout(walk_model(), policy_random(), seed = 1))
 })
+
+test_that("at random a model is played with the actions that a state has", {
+  # In state 1 there is only action 1, in state 2 only 0 and 2.
+  table <- data.frame(
+    state = c(0, 0, 0, 1, 2, 2), action = c(0, 1, 2, 1, 0, 2),
+    next_state = c(1, 2, 3, 2, 3, 3), reward = c(0, 1, 2, 4, 8, 16)
+  )
+  model <- gym_model(table, start = 0, id = "Few")
+  played <- rollout(model, policy_random(), episodes = 3000, seed = 1, steps = TRUE)
+  expect_setequal(played$steps$action[played$steps$obs_1 == 1], 1)
+  expect_equal(mean(played$steps$action[played$steps$obs_1 == 2] == 0), 0.5, tolerance = 0.1)
+  exact <- evaluate_policy(model, policy_random())$mean_return
+  returns <- played$episodes$return
+  expect_lt(abs(mean(returns) - exact), 4 * stats::sd(returns) / sqrt(length(returns)))
+})
