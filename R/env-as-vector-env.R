@@ -44,9 +44,8 @@
 #'       reset.}
 #'     \item{endless}{`TRUE` where it is known that no episode ever ends, so that it is played with
 #'       `max_steps` only. `FALSE` or `NULL` elsewhere.}
-#'     \item{possible}{Where a model is played whose states do not have all actions, a logical
-#'       matrix of which can be taken, a row for each state and a column for each action; else
-#'       `NULL`.}
+#'     \item{possible}{Where a model is played, a logical matrix of the actions that can be taken,
+#'       with a row for each state and a column for each action; else `NULL`.}
 #'     \item{reset(seeds, which)}{A function that starts episodes and returns the first
 #'       observations, a row for each: with `one_seed` in all sub-environments, `seeds` being one
 #'       whole number; otherwise in the sub-environments with the numbers `which`, in increasing

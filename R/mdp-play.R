@@ -61,10 +61,7 @@ as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   env <- model_env(x, num_envs %||% vectorized_sub_envs)
   vector_env <- as_vector_env(env, num_envs, frames = frames)
   vector_env$endless <- is.null(x$spec$max_episode_steps) && !can_end(x)
-  possible <- possible_actions(x)
-  # In an end, which has no actions, nothing is done.
-  lacks <- any(rowSums(possible) > 0 & rowSums(possible) < ncol(possible))
-  vector_env$possible <- if (lacks) possible
+  vector_env$possible <- possible_actions(x)
   vector_env
 }
 

@@ -88,7 +88,9 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy$observation_space <- env$observation_space
   if (is.null(own)) {
     policy$action_space <- env$action_space
-    policy$possible <- env$possible
+    # In an end, which has no actions, nothing is done.
+    count <- if (!is.null(env$possible)) rowSums(env$possible)
+    policy$possible <- if (any(count > 0 & count < ncol(env$possible))) env$possible
   } else if (!space_within(own, env$action_space)) {
     gym_abort(
       paste0(
