@@ -16,6 +16,7 @@ Swimmer-v5,,cem,325,paper (registered 360),3,20
 HalfCheetah-v5,,ars,3430,paper (registered 4800),1,10
 Pendulum-v1,,cem,-200,ours,2,10
 Hopper-v5,,ars,3120,paper (registered 3800),1,1
+BipedalWalker-v3,,ars,300,registered,1,1
 ", strip.white = TRUE, na.strings = "NA", colClasses = c(kwargs = "character"))
 
 first_seed <- function(job) 1000L * job$choice + 1L

@@ -11,7 +11,8 @@ write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv") {
     solved <- if (count > 1L) {
       paste(sum(rows$solved), "of", count, "seeds")
     } else {
-      paste("a demonstration:", round(rows$mean_return))
+      one <- if (rows$solved) "a demonstration:" else "one seed, not solved:"
+      paste(one, round(rows$mean_return))
     }
     steps <- format(round(stats::median(rows$steps), -3), big.mark = ",", scientific = FALSE)
     kwargs <- rows$kwargs[[1L]]
