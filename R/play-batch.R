@@ -2,6 +2,8 @@
 # environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
 # played again, and it does not matter in which order batches are played, and by whom.
 #
+# A batch is played in slices (play-slices.R): all of them side by side here, or one by a worker.
+#
 # Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. Which of them
 # plays an episode is written down before the first step. If the next one were given to whichever
 # ends first, and playing stopped at the number of episodes asked for, short episodes would be
@@ -15,7 +17,8 @@
 #' @param policy The policy, bound to the environment: one, or several candidates.
 #' @param episodes A list of vectors with an element for each episode: `candidate` (which of the
 #'   policies plays it), `episode` (its number among those of the candidate) and `seed`.
-#' @param stream The stream that the policy draws from.
+#' @param streams The streams that the policy draws from, one for each slice.
+#' @param slice The slice of each sub-environment that plays, as [slice_sub_envs()] returns it.
 #' @param max_steps After how many steps an episode is cut short.
 #' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
 #'   none; `each`, how many episodes a candidate plays.
@@ -26,21 +29,28 @@
 #'   to, see [agent_observe()].
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
-#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`.
+#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`,
+#'   those of each slice.
 #'   Candidates after one that has reached the target are left out.
 #' @noRd
-play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
+play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps = Inf, target = NULL,
                        each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
                        learner = NULL, report = function(ended) NULL) {
+  # Products of matrices by R itself: a row of them is the same, to the last bit, whatever rows are
+  # beside it, which is not so with every library of linear algebra.
+  matprod <- options(matprod = "internal")
+  on.exit(options(matprod))
   n <- length(episodes$episode)
-  at_once <- vector_env$num_envs
+  at_once <- if (vector_env$one_seed) vector_env$num_envs else length(slice)
   batch <- rlang::env(
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     steps = list(), frames = list(), target = target, each = each, report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
-    keep_next = keep_next, learner = learner, moments = if (keep_moments) no_moments()
+    keep_next = keep_next, learner = learner, at_once = at_once, slice = slice, streams = streams,
+    draws = length(streams) > 1L && inherits(policy, "gym_policy_random"),
+    moments = if (keep_moments) no_slice_moments(length(streams))
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
@@ -51,10 +61,11 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
       }
     }
   }
-  with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
+  with_generator(new_generator(stream = streams[[1L]]), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
-  kept <- mget(c("steps", "frames", "moments"), batch)
+  kept <- mget(c("steps", "frames"), batch)
+  kept["moments"] <- list(if (keep_moments) split_slice_moments(batch$moments))
   c(lapply(mget(columns, batch), utils::head, batch$needed), kept)
 }
 
@@ -77,7 +88,7 @@ naming_call <- function(code, vector_env) {
 # `acting` is the policy for these rows, whose candidates are `candidate`.
 play_episodes <- function(batch, first, last) {
   vector_env <- batch$vector_env
-  episode <- seq.int(first, min(last, batch$needed, first + vector_env$num_envs - 1L))
+  episode <- seq.int(first, min(last, batch$needed, first + batch$at_once - 1L))
   observation <- begin_episodes(batch, episode, last)
   ask_beforehand(batch, episode, observation)
   candidate <- batch$candidate[episode]
@@ -90,9 +101,8 @@ play_episodes <- function(batch, first, last) {
   whole <- batch$keep_next || !is.null(batch$learner)
   step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
-    n <- length(playing$rows$episode)
     action <- if (is.null(batch$learner)) {
-      act_batch(playing$acting, playing$observation, n, vector_env)
+      act_in_slices(batch, playing)
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
     }
@@ -125,8 +135,8 @@ end_step <- function(batch, playing, action, out) {
   keep_frame(batch, rows$episode)
   playing$rows$return <- rows$return + out$reward
   if (!is.null(batch$moments)) {
-    batch$moments <- merge_moments(
-      batch$moments, moments_of(number_rows(playing$observation))
+    batch$moments <- add_slice_moments(
+      batch$moments, number_rows(playing$observation), batch$slice[rows$sub_env]
     )
   }
   if (batch$keep_steps) {
@@ -155,7 +165,7 @@ end_step <- function(batch, playing, action, out) {
 begin_next_episodes <- function(batch, playing, ended, waiting) {
   vector_env <- batch$vector_env
   rows <- playing$rows
-  rows$episode[ended] <- rows$episode[ended] + vector_env$num_envs
+  rows$episode[ended] <- rows$episode[ended] + batch$at_once
   rows$return[ended] <- 0
   rows$began[ended] <- playing$taken
   going <- which(rows$episode <= min(playing$last, batch$needed))
@@ -205,7 +215,7 @@ begin_episodes <- function(batch, episode, last) {
   } else if (isTRUE(vector_env$begins_next)) {
     last <- min(last, batch$needed)
     seeds <- lapply(episode, function(first) {
-      batch$seed[seq.int(first, last, by = vector_env$num_envs)]
+      batch$seed[seq.int(first, last, by = batch$at_once)]
     })
     vector_env$reset(seeds, sub_envs)
   } else {

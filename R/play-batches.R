@@ -68,10 +68,17 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #' @param ... Further arguments of [play_batch()].
 #' @noRd
 play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...,
-                         max_steps = Inf) {
+                         learner = NULL, max_steps = Inf) {
   check_has_end(vector_env, max_steps)
+  if (plays_on_workers(vector_env, policy_of, learner)) {
+    return(play_in_futures(
+      vector_env, history, policy_of, report, ..., max_steps = max_steps
+    ))
+  }
   while (!is.null(batch <- next_batch(vector_env, history))) {
-    played <- play_drawn_batch(vector_env, batch, policy_of, report, ..., max_steps = max_steps)
+    played <- play_drawn_batch(
+      vector_env, batch, policy_of, report, ..., learner = learner, max_steps = max_steps
+    )
     # An interrupt finds the batch entered completely, or not at all.
     suspendInterrupts(enter_batch(history, played))
   }
@@ -93,7 +100,7 @@ check_has_end <- function(vector_env, max_steps) {
 #' What comes of a batch depends on this alone, so that batches can be played in any order, as long
 #' as they are drawn and entered in theirs.
 #' @return A list: `episodes`, as [play_batch()] takes them, with the candidates' own numbers,
-#'   `each`, how many a candidate plays, and `stream`; `NULL` when there is no further batch.
+#'   `each`, how many a candidate plays, and `slice` and `streams`; `NULL` when there is no further batch.
 #' @noRd
 next_batch <- function(vector_env, history) {
   batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size
@@ -104,7 +111,9 @@ next_batch <- function(vector_env, history) {
   }
   history$drawn_batches <- history$drawn_batches + 1
   episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
-  list(episodes = episodes, each = history$episodes, stream = take_stream(history$streams))
+  slice <- slice_sub_envs(vector_env, length(episodes$episode), history$episodes)
+  streams <- slice_streams(take_stream(history$streams), max(slice))
+  list(episodes = episodes, each = history$episodes, slice = slice, streams = streams)
 }
 
 # Plays a batch. Its policy has its candidates alone.
@@ -113,8 +122,8 @@ play_drawn_batch <- function(vector_env, batch, policy_of, report = function(end
   candidates <- unique(episodes$candidate)
   episodes$candidate <- match(episodes$candidate, candidates)
   played <- play_batch(
-    vector_env, policy_of(candidates), episodes, batch$stream, each = batch$each, report = report,
-    ...
+    vector_env, policy_of(candidates), episodes, batch$streams, batch$slice, each = batch$each,
+    report = report, ...
   )
   played$candidate <- candidates[played$candidate]
   played

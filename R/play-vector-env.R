@@ -15,6 +15,7 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., call = rl
   finished <- FALSE
   on.exit(vector_env$close(wait = finished))
   vector_env$call <- call
+  vector_env$recipe <- environment_recipe(env, vector_env, list(...))
   warn_of_own_limit(max_steps, vector_env, call)
   inform_of_memory(vector_env, env)
   value <- use(vector_env)

@@ -211,7 +211,10 @@ candidate_results <- function(history, asked, call) {
   }
   list(
     weights = asked, returns = returns, lengths = each("length"),
-    moments = Reduce(merge_moments, lapply(history$batches, function(batch) batch$moments))
+    moments = Reduce(
+      merge_moments,
+      unlist(lapply(history$batches, function(batch) batch$moments), recursive = FALSE)
+    )
   )
 }
 

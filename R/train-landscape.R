@@ -82,7 +82,12 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
     env <- make_seeded_sub_envs(env, as.numeric(size)^2 * episodes, client)
     on.exit(close_or_warn(env))
   }
+  seeded <- !identical(env, search$env %||% search$env_id)
   play <- function(vector_env) {
+    if (seeded) {
+      vector_env$recipe <- environment_recipe(search$env_id, vector_env, list())
+      if (is.list(vector_env$recipe)) vector_env$recipe$seeded <- TRUE
+    }
     play_plane(vector_env, plane, search, as.integer(episodes), streams, progress)
   }
   with_vector_env(env, as.numeric(size)^2 * episodes, play)

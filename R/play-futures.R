@@ -1,0 +1,346 @@
+# Playing on workers, by the plan that the user has set with future::plan(). Each task is a future of
+# its own; there are never more than there are free workers. What becomes of a task does not depend
+# on who does it, so that one that was lost is done again, and results are put together in the order
+# of the tasks.
+#
+# A worker whose future has failed is left alone: its future is never asked for again, so that the
+# plan goes on counting the worker as busy, and gives it nothing more.
+
+most_tries <- 3L
+
+# Whether tasks can go to the workers of the plan: "none" without a plan, "kept" where a worker lives
+# on between futures, "short" where each future has a process of its own.
+plan_kind <- function() {
+  if (!"future" %in% loadedNamespaces()) {
+    return("none")
+  }
+  plan <- future::plan("next")
+  alone <- inherits(plan, "multisession") && future::nbrOfWorkers() == 1L
+  if (inherits(plan, "sequential") || alone || isTRUE(identical(plan, the_session$broken_plan))) {
+    "none"
+  } else if (inherits(plan, c("cluster", "multisession", "mirai_cluster", "mirai_multisession"))) {
+    "kept"
+  } else {
+    "short"
+  }
+}
+
+inform_plays_here <- function(reason, hint = NULL) {
+  rlang::inform(
+    c(i = paste0("The workers of the plan are not used here: ", reason, "."), i = hint),
+    class = "gym_message_plays_here", .frequency = "once",
+    .frequency_id = paste("gym_plays_here", reason)
+  )
+}
+
+# Does something refer to a connection, a pointer or anything else that only this process has?
+refers_to_process <- function(x) {
+  found <- FALSE
+  serialize(x, NULL, refhook = function(part) {
+    if (typeof(part) == "externalptr") found <<- TRUE
+    NULL
+  })
+  found
+}
+
+# Can batches go to workers? Says why not where there are some.
+plays_on_workers <- function(vector_env, policy_of, learner) {
+  kind <- plan_kind()
+  if (kind == "none") {
+    return(FALSE)
+  }
+  if (kind == "short") {
+    inform_plays_here(
+      "they end after each future, and a batch is too short for that",
+      "`train_agent(seeds = )` gives each worker a training of its own."
+    )
+  } else if (!is.null(learner)) {
+    inform_plays_here("a learner learns from each step before it takes the next one")
+  } else if (!is.list(vector_env$recipe)) {
+    inform_plays_here(vector_env$recipe %||% "the environment cannot be made there")
+  } else if (refers_to_process(policy_of(1L))) {
+    inform_plays_here("the policy has a connection or a pointer, which cannot be sent")
+  } else {
+    return(TRUE)
+  }
+  FALSE
+}
+
+# Tasks --------------------------------------------------------------------------------
+
+# What every task has.
+new_task <- function(kind, vector_env, ...) {
+  list(
+    kind = kind, gym = as.character(utils::packageVersion("gym")),
+    versions = server_versions(vector_env$client), recipe = vector_env$recipe, ...
+  )
+}
+
+#' Do tasks on the workers of the plan
+#'
+#' @param next_task A function that returns the next task, `NULL` after the last one: a list with
+#'   `task`, what is sent, `here`, a function that does it in this session, and `done`, a function
+#'   of its value.
+#' @param deadline A function of the seconds of the slowest task so far, which returns after how many
+#'   a worker counts as lost.
+#' @param call The call that errors name.
+#' @noRd
+do_tasks <- function(next_task, deadline, call) {
+  # How long asking whether a future is resolved may wait.
+  old <- options(future.resolved.timeout = 0.002)
+  on.exit(options(old))
+  crew <- rlang::env(
+    running = list(), again = list(), slowest = 0, next_task = next_task, ended = FALSE,
+    broken = FALSE, deadline = deadline, call = call
+  )
+  on.exit(the_session$left_futures <- c(the_session$left_futures, futures_of(crew)), add = TRUE)
+  collect_left_futures()
+  repeat {
+    launch_tasks(crew)
+    if (!length(crew$running)) {
+      if (crew$ended && !length(crew$again)) break
+      do_here(crew)
+    }
+    for (number in rev(seq_along(crew$running))) {
+      look_at(crew, number)
+    }
+  }
+}
+
+futures_of <- function(crew) lapply(crew$running, function(one) one$future)
+
+# Futures of a call that was interrupted keep their workers busy until somebody takes their values.
+collect_left_futures <- function() {
+  still <- Filter(
+    function(future) !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE)),
+    the_session$left_futures
+  )
+  the_session$left_futures <- still
+}
+
+# The next one: one that was lost, or a new one.
+take_task <- function(crew) {
+  if (length(crew$again)) {
+    one <- crew$again[[1L]]
+    crew$again <- crew$again[-1L]
+    return(one)
+  }
+  if (crew$ended) {
+    return(NULL)
+  }
+  one <- crew$next_task()
+  crew$ended <- is.null(one)
+  if (!is.null(one)) one$tries <- 0L
+  one
+}
+
+launch_tasks <- function(crew) {
+  while (!crew$broken && free_workers() > 0 && !is.null(one <- take_task(crew))) {
+    one$tries <- one$tries + 1L
+    one$future <- tryCatch(launch(one$task), error = function(cnd) cnd)
+    if (inherits(one$future, "condition")) {
+      crew$broken <- TRUE
+      the_session$broken_plan <- future::plan("next")
+      warn_of_workers(paste0(
+        "The plan takes no more futures (", first_line(one$future), "): the session plays on by ",
+        "itself."
+      ), "Set the plan again, as in `future::plan(\"multisession\")`, to go on with workers.")
+      crew$again <- c(list(one), crew$again)
+    } else {
+      one$started <- proc.time()[["elapsed"]]
+      crew$running <- c(crew$running, list(one))
+    }
+  }
+}
+
+free_workers <- function() tryCatch(future::nbrOfFreeWorkers(), error = function(cnd) 0)
+
+first_line <- function(cnd) strsplit(conditionMessage(cnd), "\n", fixed = TRUE)[[1L]][[1L]]
+
+# The task travels as bytes, which are read when it is known that the worker has the package.
+launch <- function(task) {
+  run <- function(bytes) {
+    if (!requireNamespace("gym", quietly = TRUE)) {
+      return(list(lacks = TRUE, host = Sys.info()[["nodename"]]))
+    }
+    utils::getFromNamespace("do_task", "gym")(unserialize(bytes))
+  }
+  environment(run) <- baseenv()
+  future::future(
+    run(bytes), substitute = TRUE, seed = NULL, lazy = FALSE,
+    globals = list(run = run, bytes = serialize(task, NULL)), label = "gym"
+  )
+}
+
+# Takes a task here when there is no worker for it.
+do_here <- function(crew) {
+  if (!crew$broken && crew$slowest == 0 && !length(crew$again)) {
+    inform_plays_here("none of them is free")
+  }
+  one <- take_task(crew)
+  if (!is.null(one)) {
+    one$done(one$here())
+  }
+}
+
+look_at <- function(crew, number) {
+  one <- crew$running[[number]]
+  seconds <- proc.time()[["elapsed"]] - one$started
+  state <- tryCatch(
+    if (future::resolved(one$future)) future::value(one$future),
+    error = function(cnd) list(failed = first_line(cnd))
+  )
+  if (is.null(state)) {
+    if (seconds <= crew$deadline(crew$slowest)) {
+      return(invisible())
+    }
+    state <- list(failed = paste("it has been silent for", seconds_text(seconds)))
+    the_session$left_futures <- c(the_session$left_futures, list(one$future))
+  }
+  crew$running[[number]] <- NULL
+  if (!is.null(state$value)) {
+    crew$slowest <- max(crew$slowest, seconds)
+    warn_of_blas(state)
+    one$done(state$value)
+  } else {
+    task_failed(crew, one, state)
+  }
+}
+
+task_failed <- function(crew, one, state) {
+  if (isTRUE(state$lacks)) {
+    gym_abort(
+      c(paste0("A worker on ", state$host, " lacks the package gym."),
+        i = "Install it there, in the version that the session has."),
+      class = "gym_error_worker", host = state$host, call = crew$call
+    )
+  }
+  if (!is.null(state$error) && !isTRUE(state$lost)) {
+    error <- state$error
+    error["call"] <- list(rlang::error_call(crew$call))
+    error$host <- state$host
+    stop(error)
+  }
+  host <- state$host %||% future_host(one$future)
+  reason <- state$failed %||% first_line(state$error)
+  last <- one$tries >= most_tries
+  warn_of_workers(
+    paste0("A worker on ", host, " was lost (", reason, "): its batch is played ",
+           if (last) "here." else "by another one.")
+  )
+  one$future <- NULL
+  if (last) {
+    one$done(one$here())
+  } else {
+    crew$again <- c(crew$again, list(one))
+  }
+}
+
+# The host of a future's worker, as far as the plan knows it.
+future_host <- function(future) {
+  node <- tryCatch(future$workers[[future$node]], error = function(cnd) NULL)
+  node$host %||% "an unknown host"
+}
+
+warn_of_workers <- function(text, hint = NULL) {
+  rlang::warn(c(text, i = hint), class = "gym_warning_worker")
+}
+
+# Results may differ in the last bits where another library of linear algebra calculates.
+warn_of_blas <- function(state) {
+  own <- extSoftVersion()[["BLAS"]]
+  if (!identical(basename(state$BLAS), basename(own)) && is.null(the_session$warned_of_blas)) {
+    the_session$warned_of_blas <- TRUE
+    rlang::warn(
+      c(paste0("A worker on ", state$host, " calculates with another library of linear algebra (",
+               state$BLAS, ") than the session (", own, ")."),
+        i = "Results may differ in their last bits from those of the session alone."),
+      class = "gym_warning_blas"
+    )
+  }
+}
+
+# Batches --------------------------------------------------------------------------------
+
+#' Play all batches of a history on workers
+#' @inheritParams play_batches
+#' @noRd
+play_in_futures <- function(vector_env, history, policy_of, report, target = NULL, ...) {
+  open <- list()
+  waiting <- list()
+  arguments <- list(...)
+  enter_finished <- function() {
+    while (length(open) && open[[1L]]$left == 0L) {
+      first <- open[[1L]]
+      whole <- bind_parts(first$batch, first$parts, first$played, target)
+      whole$candidate <- first$candidates[whole$candidate]
+      suspendInterrupts(enter_batch(history, whole))
+      open <<- open[-1L]
+    }
+  }
+  next_slice <- function() {
+    if (!length(waiting)) {
+      batch <- next_batch(vector_env, history)
+      if (is.null(batch)) {
+        return(NULL)
+      }
+      one <- open_batch(batch, policy_of)
+      open <<- c(open, list(one))
+      waiting <<- lapply(seq_along(one$parts), function(i) list(one = one, i = i))
+    }
+    first <- waiting[[1L]]
+    waiting <<- waiting[-1L]
+    one <- first$one
+    task <- slice_task(vector_env, one, first$i, arguments)
+    list(
+      task = task,
+      here = function() {
+        rlang::exec(play_batch, vector_env, task$policy, !!!task$slice, !!!task$arguments)
+      },
+      done = function(played) {
+        own <- one$parts[[first$i]]$episodes$candidate
+        played$candidate <- unique(own)[played$candidate]
+        one$played[[first$i]] <- played
+        one$left <- one$left - 1L
+        ended <- sum(vapply(open, ended_episodes, 0))
+        enter_finished()
+        report(ended - sum(vapply(open, ended_episodes, 0)) * (one$left == 0L))
+      }
+    )
+  }
+  do_tasks(next_slice, slice_deadline, vector_env$call)
+}
+
+ended_episodes <- function(one) sum(vapply(one$played, function(x) length(x$episode), 0))
+
+# A batch whose slices are being played, a part of them by each worker.
+open_batch <- function(batch, policy_of) {
+  candidates <- unique(batch$episodes$candidate)
+  batch$episodes$candidate <- match(batch$episodes$candidate, candidates)
+  shares <- share_slices(length(batch$streams), future::nbrOfWorkers())
+  parts <- lapply(unname(shares), slices_of, batch = batch)
+  rlang::env(
+    batch = batch, candidates = candidates, policy = policy_of(candidates), parts = parts,
+    num_envs = max(vapply(parts, function(part) length(part$slice), 0L)),
+    played = vector("list", length(parts)), left = length(parts)
+  )
+}
+
+slice_task <- function(vector_env, one, i, arguments) {
+  slice <- one$parts[[i]]
+  slice$at <- NULL
+  candidates <- unique(slice$episodes$candidate)
+  slice$episodes$candidate <- match(slice$episodes$candidate, candidates)
+  num_envs <- if (vector_env$one_seed) vector_env$num_envs else one$num_envs
+  task <- new_task(
+    "slice", vector_env, policy = keep_candidates(one$policy, candidates), slice = slice,
+    num_envs = num_envs, arguments = arguments
+  )
+  task$recipe$one_seed <- vector_env$one_seed
+  task
+}
+
+# After how many seconds a worker that plays a slice counts as lost.
+slice_deadline <- function(slowest) {
+  getOption("gym.batch_deadline") %||% max(60, 10 * slowest)
+}

@@ -1,0 +1,145 @@
+# What a worker does: a task is what it is given, in one message, and depends on nothing else.
+#
+# A worker keeps its vector environments between tasks, on a server of its own, which ends with it.
+
+the_worker <- new.env(parent = emptyenv())
+the_worker$kept <- list()
+most_kept <- 4L
+
+#' What can be sent to a worker so that it makes the same environment
+#'
+#' @param arguments The further arguments of [as_vector_env()].
+#' @return A list; or a string that says why the environment cannot travel.
+#' @noRd
+environment_recipe <- function(env, vector_env, arguments) {
+  if (length(vector_env$remembers)) {
+    return(paste(vector_env$remembers[[1L]], "remembers earlier episodes"))
+  }
+  if (!is.null(vector_env$frame)) {
+    return("frames are kept")
+  }
+  own <- setdiff(names(arguments), c("num_envs", "num_workers", "frames", "client"))
+  recipe <- list(env = env, arguments = arguments[own], num_workers = arguments$num_workers)
+  if (is_registered(env)) {
+    id <- if (is.character(env)) env else env$env_id
+    recipe$entry <- the_session$environments[id]
+  } else if (is.character(env) || inherits(env, "gym_wrapped")) {
+    session <- list(the_session$client, the_session$named_client)
+    if (!any(vapply(session, identical, NA, vector_env$client))) {
+      return("it was made by a client that is not the session's own")
+    }
+  } else if (!inherits(env, "gym_model")) {
+    return("it was given as an object, not by its id")
+  }
+  recipe
+}
+
+#' Do a task
+#'
+#' @param task A list of the version of this package (`gym`), `versions` of the server, `kind`,
+#'   `recipe` and what the kind takes.
+#' @return A list: `value`, or `error` and whether the same task may succeed elsewhere (`lost`);
+#'   `host`, `pid`, `seconds`, `BLAS`.
+#' @noRd
+do_task <- function(task) {
+  started <- proc.time()[["elapsed"]]
+  done <- tryCatch(
+    {
+      check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
+      with_own_server(list(value = switch(
+        task$kind, slice = play_slice(task), training = task_training(task)
+      )))
+    },
+    error = function(cnd) {
+      forget_kept()
+      cnd$trace <- NULL
+      list(error = cnd, lost = inherits(cnd, "gym_error_connection"))
+    }
+  )
+  c(done, list(
+    host = Sys.info()[["nodename"]], pid = Sys.getpid(), BLAS = extSoftVersion()[["BLAS"]],
+    seconds = proc.time()[["elapsed"]] - started
+  ))
+}
+
+check_worker_version <- function(wanted, own, of) {
+  if (!identical(wanted, own)) {
+    gym_abort(
+      c(paste0("Worker ", Sys.getpid(), " on ", Sys.info()[["nodename"]], " has ", of, " in version ",
+               own %||% "unknown", ", and the session has ", wanted %||% "unknown", "."),
+        i = "Install the same version on both."),
+      class = "gym_error_worker", host = Sys.info()[["nodename"]]
+    )
+  }
+}
+
+# A forked child has a server of its own as well, which must not outlive it.
+with_own_server <- function(code) {
+  if (Sys.getpid() != the_session$pid) {
+    parent <- mget(c("pid", "client", "servers"), the_session)
+    the_session$pid <- Sys.getpid()
+    the_session["client"] <- list(NULL)
+    the_session$servers <- list()
+    on.exit({
+      lapply(the_session$servers, stop_server)
+      list2env(parent, the_session)
+    })
+  }
+  code
+}
+
+play_slice <- function(task) {
+  vector_env <- kept_vector_env(task)
+  play <- function(...) play_batch(vector_env, task$policy, ...)
+  rlang::exec(play, !!!task$slice, !!!task$arguments)
+}
+
+# The worker's vector environment of a recipe, which is made when it is needed for the first time.
+kept_vector_env <- function(task) {
+  recipe <- task$recipe
+  key <- rlang::hash(list(recipe, task$num_envs))
+  kept <- the_worker$kept[[key]]
+  client <- if (!is.null(kept$client)) gym_client()
+  if (!is.null(kept) && identical(kept$client, client)) {
+    return(kept)
+  }
+  if (length(the_worker$kept) >= most_kept) forget_kept()
+  made <- make_from_recipe(recipe, task$num_envs)
+  versions <- server_versions(made$client)
+  if (!is.null(task$versions) && !is.null(versions)) {
+    check_worker_version(task$versions$gymnasium, versions$gymnasium, "Gymnasium")
+  }
+  made$call <- quote(play_batch())
+  the_worker$kept[[key]] <- made
+  made
+}
+
+make_from_recipe <- function(recipe, num_envs) {
+  the_session$environments[names(recipe$entry)] <- recipe$entry
+  if (inherits(recipe$env, "gym_model")) {
+    return(as_vector_env(recipe$env, num_envs))
+  }
+  make <- function(...) rlang::exec(as_vector_env, recipe$env, ..., !!!recipe$arguments)
+  if (is_registered(recipe$env)) {
+    return(make(num_envs = num_envs))
+  }
+  if (isTRUE(recipe$seeded)) {
+    env <- make_seeded_sub_envs(recipe$env, num_envs, gym_client())
+    vector_env <- as_vector_env(env)
+    vector_env$close <- function(wait = TRUE) close_or_warn(env)
+    return(vector_env)
+  }
+  if (num_envs > 1L) {
+    make(num_envs = num_envs, num_workers = recipe$num_workers %||% if (!recipe$one_seed) 0L)
+  } else {
+    make(max_envs = 1L)
+  }
+}
+
+forget_kept <- function() {
+  kept <- the_worker$kept
+  the_worker$kept <- list()
+  for (vector_env in kept) {
+    try(vector_env$close(wait = FALSE), silent = TRUE)
+  }
+}
