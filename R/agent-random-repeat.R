@@ -109,7 +109,7 @@ check_target <- function(settings, call) {
 #' @noRd
 play_searches <- function(with_env, template, settings, seeds, progress, call) {
   started <- proc.time()[["elapsed"]]
-  show <- if (progress) progress_bar(length(seeds), "Search", "0 solved, ") else function(...) NULL
+  show <- progress_bar(length(seeds), "Search", "0 solved, ", shown = progress)
   rows <- list()
   origin <- NULL
   play <- function() {

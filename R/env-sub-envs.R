@@ -102,6 +102,18 @@ make_seeded <- function(make, n, traits, num_workers = NULL) {
   )
 }
 
+# How many a landscape gets: with so many playing takes seconds.
+landscape_sub_envs <- 128L
+
+# Each sub-environment has a seed of its own, so that all networks can play the same episodes.
+make_seeded_sub_envs <- function(env_id, episodes, client) {
+  n <- as.integer(min(episodes, landscape_sub_envs))
+  make <- env_maker(env_id, list(), client, rlang::caller_env())
+  traits <- sub_env_traits(make)
+  seeded <- if (!is.null(traits)) if_supported(make_seeded(make, n, traits))
+  seeded %||% make(NULL)
+}
+
 # Fewer sub-environments are tried where the server refuses so many.
 counts_to_try <- function(n) {
   unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))

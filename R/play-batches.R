@@ -100,7 +100,8 @@ check_has_end <- function(vector_env, max_steps) {
 #' What comes of a batch depends on this alone, so that batches can be played in any order, as long
 #' as they are drawn and entered in theirs.
 #' @return A list: `episodes`, as [play_batch()] takes them, with the candidates' own numbers,
-#'   `each`, how many a candidate plays, and `slice` and `streams`; `NULL` when there is no further batch.
+#'   `each`, how many a candidate plays, and `slice` and `streams`; `NULL` when there is no further
+#'   batch.
 #' @noRd
 next_batch <- function(vector_env, history) {
   batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size

@@ -1,15 +1,62 @@
-# Playing on workers, by the plan that the user has set with future::plan(). Each task is a future of
-# its own; there are never more than there are free workers. What becomes of a task does not depend
-# on who does it, so that one that was lost is done again, and results are put together in the order
-# of the tasks.
+# Playing on workers, by the plan that the user has set with future::plan(). Each task is a future
+# of its own; there are never more than there are free workers. What becomes of a task does not
+# depend on who does it, so that one that was lost is done again, and results are put together in
+# the order of the tasks.
 #
 # A worker whose future has failed is left alone: its future is never asked for again, so that the
 # plan goes on counting the worker as busy, and gives it nothing more.
 
+#' Play on many cores and machines
+#'
+#' Where the user has set a plan of the package future, such as
+#' `future::plan(future::multisession, workers = 8)` or
+#' `future::plan(future::cluster, workers = c("host1", "host2"))`, its workers play the episodes of
+#' [rollout()], [evaluate_policy()], [search_random()] and the other searches, [train_agent()],
+#' [search_landscape()] and [gym_objective()]; `train_agent(seeds = )` gives each of them whole
+#' trainings. Nothing else needs to be said, and nothing changes without a plan.
+#'
+#' Results do not depend on the plan, to the last bit: a batch of episodes is cut into at most 16
+#' slices by a rule that does not look at workers, and each slice draws from a random stream of its
+#' own. Only the library of linear algebra may make a difference on another machine;
+#' [provenance()] names it, and one that differs is warned of.
+#'
+#' Each worker plays on a server of its own, which it starts when it is first needed, keeps, and
+#' ends when it ends itself; the variable `GYM_SERVER_URL` on the worker, with the token's variable,
+#' names another one (see [gym_client()]). The worker's sub-environments run in that one process
+#' unless `num_workers` asks for more, so that cores are not used twice.
+#'
+#' What cannot be sent is played in the session, which is said once: an environment that was given
+#' as an object, or by a client other than the session's own; wrappers that remember something over
+#' episodes; episodes whose frames are kept; agents that learn from each step; a policy with a
+#' connection or a pointer. Plans whose workers end after each future (`multicore`, those of
+#' batchtools) train whole seeds only.
+#'
+#' Where the package progressr is loaded its handlers are told of the progress.
+#'
+#' @section A worker that is lost:
+#' When a worker dies, its server fails, or it is silent for longer than the option
+#' `gym.batch_deadline` (seconds; by default ten times as long as the slowest part of a batch so
+#' far, and at least 60), its part is played by another one, with a warning of class
+#' `gym_warning_worker` that names the host; the third time the session plays it. When the plan
+#' takes no more futures the session plays on by itself. The result is the same. A training of a seed has no deadline.
+#'
+#' @section Errors: `gym_error_worker` where a worker lacks the package, or has another version of
+#'   it or of Gymnasium; the element `host` names the worker's machine. An error on a worker is the
+#'   call's own error, with the element `host`.
+#' @references H. Bengtsson (2021): A Unifying Framework for Parallel and Distributed Processing in
+#'   R using Futures. The R Journal 13(2), <https://doi.org/10.32614/RJ-2021-048>.
+#' @seealso `system.file("examples/slurm.R", package = "gym")`, for a cluster with a queue.
+#' @name workers
+#' @examplesIf gym:::can_start_server() && requireNamespace("future", quietly = TRUE)
+#' future::plan(future::multisession, workers = 2)
+#' rollout("Acrobot-v1", policy_random(), episodes = 20, max_steps = 50, seed = 1)
+#' future::plan(future::sequential)
+NULL
+
 most_tries <- 3L
 
-# Whether tasks can go to the workers of the plan: "none" without a plan, "kept" where a worker lives
-# on between futures, "short" where each future has a process of its own.
+# Whether tasks can go to the workers of the plan: "none" without a plan, "kept" where a worker
+# lives on between futures, "short" where each future has a process of its own.
 plan_kind <- function() {
   if (!"future" %in% loadedNamespaces()) {
     return("none")
@@ -68,21 +115,13 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
 
 # Tasks --------------------------------------------------------------------------------
 
-# What every task has.
-new_task <- function(kind, vector_env, ...) {
-  list(
-    kind = kind, gym = as.character(utils::packageVersion("gym")),
-    versions = server_versions(vector_env$client), recipe = vector_env$recipe, ...
-  )
-}
-
 #' Do tasks on the workers of the plan
 #'
 #' @param next_task A function that returns the next task, `NULL` after the last one: a list with
 #'   `task`, what is sent, `here`, a function that does it in this session, and `done`, a function
 #'   of its value.
-#' @param deadline A function of the seconds of the slowest task so far, which returns after how many
-#'   a worker counts as lost.
+#' @param deadline A function of the seconds of the slowest task so far, which returns after how
+#'   many a worker counts as lost.
 #' @param call The call that errors name.
 #' @noRd
 do_tasks <- function(next_task, deadline, call) {
@@ -142,8 +181,8 @@ launch_tasks <- function(crew) {
       crew$broken <- TRUE
       the_session$broken_plan <- future::plan("next")
       warn_of_workers(paste0(
-        "The plan takes no more futures (", first_line(one$future), "): the session plays on by ",
-        "itself."
+        "The plan takes no more futures (", first_message_line(one$future),
+        "): the session plays on by itself."
       ), "Set the plan again, as in `future::plan(\"multisession\")`, to go on with workers.")
       crew$again <- c(list(one), crew$again)
     } else {
@@ -155,7 +194,12 @@ launch_tasks <- function(crew) {
 
 free_workers <- function() tryCatch(future::nbrOfFreeWorkers(), error = function(cnd) 0)
 
-first_line <- function(cnd) strsplit(conditionMessage(cnd), "\n", fixed = TRUE)[[1L]][[1L]]
+# Between batches, when all that are left of the plan's workers are free.
+workers_note <- function() {
+  if (plan_kind() == "kept") paste0(count_of(free_workers(), "worker"), ", ")
+}
+
+first_message_line <- function(cnd) strsplit(conditionMessage(cnd), "\n", fixed = TRUE)[[1L]][[1L]]
 
 # The task travels as bytes, which are read when it is known that the worker has the package.
 launch <- function(task) {
@@ -175,7 +219,7 @@ launch <- function(task) {
 # Takes a task here when there is no worker for it.
 do_here <- function(crew) {
   if (!crew$broken && crew$slowest == 0 && !length(crew$again)) {
-    inform_plays_here("none of them is free")
+    inform_plays_here("none of them is free, or alive")
   }
   one <- take_task(crew)
   if (!is.null(one)) {
@@ -188,7 +232,7 @@ look_at <- function(crew, number) {
   seconds <- proc.time()[["elapsed"]] - one$started
   state <- tryCatch(
     if (future::resolved(one$future)) future::value(one$future),
-    error = function(cnd) list(failed = first_line(cnd))
+    error = function(cnd) list(failed = first_message_line(cnd))
   )
   if (is.null(state)) {
     if (seconds <= crew$deadline(crew$slowest)) {
@@ -222,7 +266,7 @@ task_failed <- function(crew, one, state) {
     stop(error)
   }
   host <- state$host %||% future_host(one$future)
-  reason <- state$failed %||% first_line(state$error)
+  reason <- state$failed %||% first_message_line(state$error)
   last <- one$tries >= most_tries
   warn_of_workers(
     paste0("A worker on ", host, " was lost (", reason, "): its batch is played ",
@@ -278,7 +322,7 @@ play_in_futures <- function(vector_env, history, policy_of, report, target = NUL
       open <<- open[-1L]
     }
   }
-  next_slice <- function() {
+  next_part <- function() {
     if (!length(waiting)) {
       batch <- next_batch(vector_env, history)
       if (is.null(batch)) {
@@ -291,24 +335,23 @@ play_in_futures <- function(vector_env, history, policy_of, report, target = NUL
     first <- waiting[[1L]]
     waiting <<- waiting[-1L]
     one <- first$one
-    task <- slice_task(vector_env, one, first$i, arguments)
+    task <- slices_task(vector_env, one, first$i, arguments)
     list(
       task = task,
       here = function() {
-        rlang::exec(play_batch, vector_env, task$policy, !!!task$slice, !!!task$arguments)
+        rlang::exec(play_batch, vector_env, task$policy, !!!task$part, !!!task$arguments)
       },
       done = function(played) {
         own <- one$parts[[first$i]]$episodes$candidate
         played$candidate <- unique(own)[played$candidate]
         one$played[[first$i]] <- played
         one$left <- one$left - 1L
-        ended <- sum(vapply(open, ended_episodes, 0))
         enter_finished()
-        report(ended - sum(vapply(open, ended_episodes, 0)) * (one$left == 0L))
+        report(sum(vapply(open, ended_episodes, 0)))
       }
     )
   }
-  do_tasks(next_slice, slice_deadline, vector_env$call)
+  do_tasks(next_part, slice_deadline, vector_env$call)
 }
 
 ended_episodes <- function(one) sum(vapply(one$played, function(x) length(x$episode), 0))
@@ -326,18 +369,18 @@ open_batch <- function(batch, policy_of) {
   )
 }
 
-slice_task <- function(vector_env, one, i, arguments) {
-  slice <- one$parts[[i]]
-  slice$at <- NULL
-  candidates <- unique(slice$episodes$candidate)
-  slice$episodes$candidate <- match(slice$episodes$candidate, candidates)
+slices_task <- function(vector_env, one, i, arguments) {
+  part <- one$parts[[i]]
+  part$at <- NULL
+  candidates <- unique(part$episodes$candidate)
+  part$episodes$candidate <- match(part$episodes$candidate, candidates)
   num_envs <- if (vector_env$one_seed) vector_env$num_envs else one$num_envs
-  task <- new_task(
-    "slice", vector_env, policy = keep_candidates(one$policy, candidates), slice = slice,
-    num_envs = num_envs, arguments = arguments
+  recipe <- vector_env$recipe
+  recipe$one_seed <- vector_env$one_seed
+  new_worker_task(
+    "slices", recipe, server_versions(vector_env$client), part = part, num_envs = num_envs,
+    policy = keep_candidates(one$policy, candidates), arguments = arguments
   )
-  task$recipe$one_seed <- vector_env$one_seed
-  task
 }
 
 # After how many seconds a worker that plays a slice counts as lost.

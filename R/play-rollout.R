@@ -206,7 +206,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
     new_rollout(history, policy, vector_env, origin, steps, next_observation, interrupted)
   }
   total <- candidates * episodes
-  show <- if (progress) progress_bar(total, "Episode") else function(ended) NULL
+  show <- progress_bar(total, "Episode", shown = progress)
   interrupted <- tryCatch(
     until_interrupted(
       play_batches(

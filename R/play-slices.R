@@ -3,9 +3,9 @@
 # by side in one vector environment.
 #
 # The rule: a batch has at most 16 slices of equally many sub-environments (the last one may have
-# fewer), with whole candidates where a candidate's episodes begin together and fit. It looks at the
-# batch alone, never at workers. Each slice draws from a stream of its own, and its moments are
-# those of its own observations, so that it does not matter beside which others it is played.
+# fewer), with whole candidates where their episodes fit in. It looks at the batch alone, never at
+# workers. Each slice draws from a stream of its own, and its moments are those of its own
+# observations, so that it does not matter beside which others it is played.
 
 slices_of_batch <- 16L
 

@@ -34,10 +34,21 @@ environment_recipe <- function(env, vector_env, arguments) {
   recipe
 }
 
+#' Make a task
+#'
+#' @param kind What [run_task()] has a method for.
+#' @param versions Those of the server.
+#' @noRd
+new_worker_task <- function(kind, recipe, versions, ...) {
+  gym <- as.character(utils::packageVersion("gym"))
+  structure(
+    list(gym = gym, versions = versions, recipe = recipe, ...), class = paste0("gym_task_", kind)
+  )
+}
+
 #' Do a task
 #'
-#' @param task A list of the version of this package (`gym`), `versions` of the server, `kind`,
-#'   `recipe` and what the kind takes.
+#' @param task As [new_worker_task()] makes it.
 #' @return A list: `value`, or `error` and whether the same task may succeed elsewhere (`lost`);
 #'   `host`, `pid`, `seconds`, `BLAS`.
 #' @noRd
@@ -46,9 +57,8 @@ do_task <- function(task) {
   done <- tryCatch(
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
-      with_own_server(list(value = switch(
-        task$kind, slice = play_slice(task), training = task_training(task)
-      )))
+      the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
+      with_own_server(list(value = run_task(task)))
     },
     error = function(cnd) {
       forget_kept()
@@ -65,8 +75,9 @@ do_task <- function(task) {
 check_worker_version <- function(wanted, own, of) {
   if (!identical(wanted, own)) {
     gym_abort(
-      c(paste0("Worker ", Sys.getpid(), " on ", Sys.info()[["nodename"]], " has ", of, " in version ",
-               own %||% "unknown", ", and the session has ", wanted %||% "unknown", "."),
+      c(paste0("Worker ", Sys.getpid(), " on ", Sys.info()[["nodename"]], " has ", of,
+               " in version ", own %||% "unknown", ", and the session has ", wanted %||% "unknown",
+               "."),
         i = "Install the same version on both."),
       class = "gym_error_worker", host = Sys.info()[["nodename"]]
     )
@@ -78,7 +89,7 @@ with_own_server <- function(code) {
   if (Sys.getpid() != the_session$pid) {
     parent <- mget(c("pid", "client", "servers"), the_session)
     the_session$pid <- Sys.getpid()
-    the_session["client"] <- list(NULL)
+    the_session$client <- NULL
     the_session$servers <- list()
     on.exit({
       lapply(the_session$servers, stop_server)
@@ -88,10 +99,14 @@ with_own_server <- function(code) {
   code
 }
 
-play_slice <- function(task) {
+# What is done with a task of its class, given that the worker has the right package.
+run_task <- function(task) UseMethod("run_task")
+
+#' @exportS3Method
+run_task.gym_task_slices <- function(task) {
   vector_env <- kept_vector_env(task)
   play <- function(...) play_batch(vector_env, task$policy, ...)
-  rlang::exec(play, !!!task$slice, !!!task$arguments)
+  rlang::exec(play, !!!task$part, !!!task$arguments)
 }
 
 # The worker's vector environment of a recipe, which is made when it is needed for the first time.
@@ -115,7 +130,6 @@ kept_vector_env <- function(task) {
 }
 
 make_from_recipe <- function(recipe, num_envs) {
-  the_session$environments[names(recipe$entry)] <- recipe$entry
   if (inherits(recipe$env, "gym_model")) {
     return(as_vector_env(recipe$env, num_envs))
   }

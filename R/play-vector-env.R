@@ -76,11 +76,22 @@ until_interrupted <- function(play, text, count_finished, total = NULL) {
 
 #' Show a progress bar until the calling function ends
 #'
+#' Where the package progressr is loaded its handlers are told as well, by whom they were asked for.
 #' @param unit What is counted, a word such as `"Round"`.
 #' @param note What stands before the time that is left.
+#' @param shown Whether there is a bar.
 #' @return A function of how many are finished and the new `note`.
 #' @noRd
-progress_bar <- function(total, unit, note = "", frame = parent.frame()) {
+progress_bar <- function(total, unit, note = "", shown = TRUE, frame = parent.frame()) {
+  bar <- if (shown) cli_bar(total, unit, note, frame) else function(finished, note) NULL
+  signal <- progress_signal(total, frame)
+  function(finished, note = "") {
+    bar(finished, note)
+    signal(finished, note)
+  }
+}
+
+cli_bar <- function(total, unit, note, frame) {
   bar <- cli::cli_progress_bar(
     total = total,
     format = paste(
@@ -91,13 +102,28 @@ progress_bar <- function(total, unit, note = "", frame = parent.frame()) {
     .envir = frame
   )
   shown <- 0
-  function(finished, note = "") {
+  function(finished, note) {
     # A bar that has come to its end is gone.
     if (shown < total) {
       shown <<- finished
       cli::cli_progress_update(
         id = bar, set = finished, extra = list(note = note), .envir = frame
       )
+    }
+  }
+}
+
+# At most a hundred signals, each of which takes a while.
+progress_signal <- function(total, frame) {
+  if (!"progressr" %in% loadedNamespaces()) {
+    return(function(finished, note) NULL)
+  }
+  progress <- progressr::progressor(steps = total, envir = frame)
+  told <- 0
+  function(finished, note) {
+    if (finished - told >= total / 100 || finished >= total && told < total) {
+      progress(note, amount = finished - told)
+      told <<- finished
     }
   }
 }

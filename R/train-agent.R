@@ -126,11 +126,10 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
   check_string(log, allow_null = TRUE)
   check_string(checkpoint, allow_null = TRUE)
   if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
+  settings$num_envs <- num_envs %||% learner_envs(agent, env)
+  settings$num_workers <- num_workers
   in_env <- function(use, max_steps = NULL) {
-    # However few episodes an evaluation has, candidates are played side by side.
-    with_vector_env(env, max(eval_episodes, least_sub_envs), use, max_steps, ...,
-                    num_envs = num_envs %||% learner_envs(agent, env), num_workers = num_workers,
-                    client = client, call = call)
+    with_training_env(settings, use, max_steps, client, call)
   }
   settings$model <- judging_model(settings, client)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
@@ -145,6 +144,15 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
 }
 
 least_sub_envs <- 100
+
+# However few episodes an evaluation has, candidates are played side by side.
+with_training_env <- function(settings, use, max_steps, client, call) {
+  rlang::exec(
+    with_vector_env, settings$env, max(settings$eval_episodes, least_sub_envs), use, max_steps,
+    !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
+    client = client, call = call
+  )
+}
 
 # Reads the checkpoint of a training, where it is to have one.
 training_file <- function(settings, files, call) {

@@ -89,12 +89,10 @@ played_text.gym_training_settings <- function(settings, state, of_all = FALSE) {
 #' @exportS3Method
 training_progress.gym_training_settings <- function(settings, state, progress,
                                                     frame = parent.frame()) {
-  if (!progress) {
-    return(function(state) NULL)
-  }
   by_steps <- is.null(settings$iterations)
   bar <- progress_bar(
-    settings$iterations %||% settings$steps, if (by_steps) "Step" else "Iteration", frame = frame
+    settings$iterations %||% settings$steps, if (by_steps) "Step" else "Iteration",
+    shown = progress, frame = frame
   )
   function(state) {
     row <- state$history[[state$iteration]]
@@ -106,7 +104,8 @@ training_progress.gym_training_settings <- function(settings, state, progress,
       paste0(
         "median ", number_text(row$median_return), ", best ", number_text(row$max_return),
         if (!is.null(evaluated)) paste0(", evaluation ", number_text(evaluated)),
-        ", ", number_text(row$steps / max(row$elapsed, 1e-3)), " steps/s, "
+        ", ", number_text(row$steps / max(row$elapsed, 1e-3)), " steps/s, ",
+        workers_note()
       )
     )
   }

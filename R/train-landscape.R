@@ -143,25 +143,13 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-# With so many sub-environments playing takes seconds.
-landscape_sub_envs <- 128L
-
-# Each sub-environment has a seed of its own, so that all networks can play the same episodes.
-make_seeded_sub_envs <- function(env_id, episodes, client) {
-  n <- as.integer(min(episodes, landscape_sub_envs))
-  make <- env_maker(env_id, list(), client, rlang::caller_env())
-  traits <- sub_env_traits(make)
-  seeded <- if (!is.null(traits)) if_supported(make_seeded(make, n, traits))
-  seeded %||% make(NULL)
-}
-
 #' Play the episodes of all points, side by side
 #' @return As [search_landscape()].
 #' @noRd
 play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
   started <- proc.time()[["elapsed"]]
   points <- nrow(plane$grid)
-  show <- if (progress) progress_bar(points, "Network") else function(finished) NULL
+  show <- progress_bar(points, "Network", shown = progress)
   history <- new_history(points, episodes, streams, common_seeds = TRUE)
   finished <- function() history$played_episodes %/% episodes
   interrupted <- until_interrupted(

@@ -85,10 +85,9 @@ played_text.gym_search_settings <- function(settings, state, of_all = FALSE) {
 #' @exportS3Method
 training_progress.gym_search_settings <- function(settings, state, progress,
                                                   frame = parent.frame()) {
-  if (!progress) {
-    return(function(state) NULL)
-  }
-  bar <- progress_bar(settings$rounds, "Round", "best mean return -, ", frame)
+  bar <- progress_bar(
+    settings$rounds, "Round", "best mean return -, ", shown = progress, frame = frame
+  )
   show <- function(episodes) {
     best <- state$agent$best_return
     note <- if (is.finite(best)) number_text(best) else "-"

@@ -27,54 +27,146 @@ train_seeds <- function(in_env, settings, seeds, files, progress, call) {
   if (kept > 0L) {
     inform_resumed("Going on from the files of {kept} of {length(seeds)} seed{?s}.")
   }
-  show <- if (progress) progress_bar(length(seeds), "Seed", "0 solved, ") else function(...) NULL
+  show <- progress_bar(length(seeds), "Seed", "0 solved, ", shown = progress)
   trainings <- list()
   result <- function(interrupted = FALSE) {
     new_trainings(trainings, settings, proc.time()[["elapsed"]] - started, interrupted)
   }
-  keep <- function(training) trainings[[length(trainings) + 1L]] <<- training
+  keep <- function(training) {
+    trainings[[length(trainings) + 1L]] <<- training
+    solved <- sum(vapply(trainings, function(training) training$solved, NA))
+    if (!training$interrupted) show(length(trainings), paste0(solved, " solved, "))
+  }
   train_all <- function(vector_env) {
+    if (seeds_go_to_workers(vector_env, settings)) {
+      return(train_in_futures(vector_env, of_seeds, keep, call))
+    }
     anew <- length(vector_env$remembers) && !is_playable(settings$env)
     with_env <- if (anew) in_env else function(use) use(vector_env)
     for (one in of_seeds) {
-      training <- quietly_for_seed(with_env(function(vector_env) {
-        train_in(vector_env, one$settings, one$file, one$log, progress = FALSE, call)
-      }))
+      training <- train_seed(one, with_env, call)
       keep(training)
       if (training$interrupted) {
         rlang::interrupt()
       }
-      solved <- sum(vapply(trainings, function(training) training$solved, NA))
-      show(length(trainings), paste0(solved, " solved, "))
     }
   }
-  interrupted <- tryCatch(
+  interrupted <- keeping_trainings(
     until_interrupted(
       in_env(train_all, settings$max_steps),
       "Interrupted after {finished} of {total} seed{?s}; what was trained is returned.",
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
-    error = function(cnd) {
-      if (!length(trainings) && !inherits(cnd, "gym_error_training")) {
-        rlang::cnd_signal(cnd)
-      }
-      finished <- count_of(length(trainings), "seed")
-      if (inherits(cnd$result, "gym_training")) {
-        begun <- cnd$result
-        begun$interrupted <- TRUE
-        keep(begun)
-      }
-      abort_with_result(
-        if (inherits(cnd, "gym_error_training")) cnd$parent %||% cnd else cnd, "The training",
-        result(), finished, "gym_error_training", call,
-        if (!is.null(files$checkpoint)) {
-          "The same call goes on from the checkpoints when what is wrong is fixed."
-        }
-      )
-    }
+    function() trainings, keep, result, files, call
   )
   result(interrupted)
+}
+
+# An error carries the trainings so far, with the one that was being trained.
+keeping_trainings <- function(code, trained, keep, result, files, call) {
+  tryCatch(code, error = function(cnd) {
+    if (!length(trained()) && !inherits(cnd, "gym_error_training")) {
+      rlang::cnd_signal(cnd)
+    }
+    finished <- count_of(length(trained()), "seed")
+    if (inherits(cnd$result, "gym_training")) {
+      begun <- cnd$result
+      begun$interrupted <- TRUE
+      keep(begun)
+    }
+    abort_with_result(
+      if (inherits(cnd, "gym_error_training")) cnd$parent %||% cnd else cnd, "The training",
+      result(), finished, "gym_error_training", call,
+      if (!is.null(files$checkpoint)) {
+        "The same call goes on from the checkpoints when what is wrong is fixed."
+      }
+    )
+  })
+}
+
+train_seed <- function(one, with_env, call) {
+  quietly_for_seed(with_env(function(vector_env) {
+    train_in(vector_env, one$settings, one$file, one$log, progress = FALSE, call)
+  }))
+}
+
+# On workers -----------------------------------------------------------------------------
+
+seeds_go_to_workers <- function(vector_env, settings) {
+  if (plan_kind() == "none") {
+    return(FALSE)
+  }
+  recipe <- training_recipe(vector_env, settings)
+  if (!is.list(recipe)) {
+    inform_plays_here(recipe)
+  } else if (refers_to_process(settings[c("agent", "policy", "callback")])) {
+    inform_plays_here("agent, policy or callback has a connection or a pointer")
+  } else {
+    inform_of_servers()
+    return(TRUE)
+  }
+  FALSE
+}
+
+# What remembers something over episodes does so on the worker as well, which plays a whole
+# training.
+training_recipe <- function(vector_env, settings) {
+  vector_env$remembers <- NULL
+  environment_recipe(settings$env, vector_env, settings$kwargs)
+}
+
+# Where trainings side by side have workers of their own on this machine, too.
+inform_of_servers <- function() {
+  plans <- future::plan("list")
+  if (length(plans) < 2L || !inherits(plans[[1L]], c("multisession", "multicore"))) {
+    return(invisible())
+  }
+  workers <- vapply(plans[1:2], function(plan) as.numeric(future::nbrOfWorkers(plan)), 0)
+  cores <- parallel::detectCores()
+  if (all(is.finite(workers)) && isTRUE(prod(workers) > cores)) {
+    rlang::inform(
+      c(i = paste0("The nested plans start up to ", prod(workers), " servers on a machine of ",
+                   count_of(cores, "core"), ": ", workers[[1L]], " trainings with ", workers[[2L]],
+                   " workers each.")),
+      class = "gym_message_servers"
+    )
+  }
+}
+
+# A future for each seed. What they return is kept in the order of the seeds.
+train_in_futures <- function(vector_env, of_seeds, keep, call) {
+  recipe <- training_recipe(vector_env, of_seeds[[1L]]$settings)
+  trained <- vector("list", length(of_seeds))
+  begun <- kept <- 0L
+  next_seed <- function() {
+    if (begun == length(of_seeds)) {
+      return(NULL)
+    }
+    begun <<- begun + 1L
+    at <- begun
+    one <- of_seeds[[at]]
+    task <- new_worker_task("training", recipe, server_versions(vector_env$client), one = one)
+    list(
+      task = task, here = function() run_task(task),
+      done = function(training) {
+        trained[[at]] <<- training
+        while (kept < length(trained) && !is.null(trained[[kept + 1L]])) {
+          kept <<- kept + 1L
+          keep(trained[[kept]])
+        }
+      }
+    )
+  }
+  do_tasks(next_seed, function(slowest) Inf, call)
+}
+
+#' @exportS3Method
+run_task.gym_task_training <- function(task) {
+  settings <- task$one$settings
+  call <- quote(train_agent())
+  with_env <- function(use) with_training_env(settings, use, NULL, gym_client(), call)
+  train_seed(task$one, with_env, call)
 }
 
 # What a seed has of its own: its settings, its checkpoint, the folder of its log.
