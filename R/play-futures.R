@@ -38,7 +38,8 @@
 #' `gym.batch_deadline` (seconds; by default ten times as long as the slowest part of a batch so
 #' far, and at least 60), its part is played by another one, with a warning of class
 #' `gym_warning_worker` that names the host; the third time the session plays it. When the plan
-#' takes no more futures the session plays on by itself. The result is the same. A training of a seed has no deadline.
+#' takes no more futures the session plays on by itself. The result is the same. A training of a
+#' seed has no deadline.
 #'
 #' @section Errors: `gym_error_worker` where a worker lacks the package, or has another version of
 #'   it or of Gymnasium; the element `host` names the worker's machine. An error on a worker is the
@@ -211,7 +212,7 @@ launch <- function(task) {
   }
   environment(run) <- baseenv()
   future::future(
-    run(bytes), substitute = TRUE, seed = NULL, lazy = FALSE,
+    quote(run(bytes)), substitute = FALSE, seed = NULL, lazy = FALSE,
     globals = list(run = run, bytes = serialize(task, NULL)), label = "gym"
   )
 }
