@@ -39,14 +39,10 @@ play_in_order <- function(make, policy, order) {
   vector_env <- as_vector_env(env)
   vector_env$call <- rlang::current_env()
   policy <- policy_bind(policy, vector_env)
-  episodes <- 5L * vector_env$batch_size
-  cut <- cut_batches(vector_env$batch_size, 1L, episodes)
-  streams <- new_streams(1)
+  history <- new_history(1L, 5L * vector_env$batch_size, new_streams(1))
   tasks <- list()
-  history <- new_history(1L, episodes, streams)
-  while (!is.null(episodes <- cut(length(tasks) + 1))) {
-    episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
-    tasks[[length(tasks) + 1L]] <- list(episodes = episodes, stream = take_stream(streams))
+  while (!is.null(task <- next_batch(vector_env, history))) {
+    tasks[[length(tasks) + 1L]] <- task
   }
   played <- vector("list", length(tasks))
   for (i in order(rep(seq_along(tasks), length.out = length(tasks)))[order]) {
