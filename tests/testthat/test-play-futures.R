@@ -150,6 +150,26 @@ test_that("when no worker is left the session plays on", {
   expect_identical(what_counts(suppressWarnings(train(callback = kill_all))), alone)
 })
 
+test_that("a plan that is set again after it broke is used again", {
+  play <- function() rollout("Acrobot-v1", drawing, 20, max_steps = 5, seed = 1)$episodes
+  alone <- play()
+  cluster <- parallelly::makeClusterPSOCK(2)
+  withr::defer(for (i in 1:2) try(parallel::stopCluster(cluster[i]), silent = TRUE))
+  local_plan(future::cluster, workers = cluster)
+  tools::pskill(worker_pids(), tools::SIGKILL)
+  Sys.sleep(0.5)
+  expect_warning(played <- play(), "takes no more futures", class = "gym_warning_worker")
+  expect_identical(played, alone)
+  expect_identical(plan_kind(), "none")
+  expect_no_warning(play())
+  again <- parallelly::makeClusterPSOCK(1)
+  withr::defer(parallel::stopCluster(again))
+  cluster <- again
+  future::plan(future::cluster, workers = cluster)
+  expect_identical(plan_kind(), "kept")
+  expect_identical(play(), alone)
+})
+
 test_that("a worker that is silent counts as lost, and its part is played here in the end", {
   here <- Sys.getpid()
   slow <- function(observation) {
