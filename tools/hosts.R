@@ -1,0 +1,348 @@
+# A proof that trainings run on other hosts: two hosts on this machine, each a network namespace
+# with an address and a core of its own. What they gain, what a batch costs beside playing, what
+# becomes of a training when a worker, a server or a host is lost in its middle, and how workers of
+# a plan compare with worker processes of the server. Only on Linux, as root; where namespaces are
+# not allowed the hosts are mere processes.
+#
+#   tools/in-env Rscript --no-init-file tools/hosts.R [rates] [faults] [ways]      runs parts
+
+library(gym)
+
+# Hosts ----------------------------------------------------------------------------------
+
+hosts <- c("gym-host-0", "gym-host-1")
+number_of <- function(host) as.integer(sub(".*-", "", host))
+session_address <- function(host) paste0("10.77.", number_of(host) + 1L, ".1")
+host_address <- function(host) paste0("10.77.", number_of(host) + 1L, ".2")
+session_link <- function(host) paste0("gymhost", number_of(host))
+
+ip <- function(...) {
+  system2("ip", c(...), stdout = FALSE, stderr = FALSE) == 0L
+}
+
+# Each host has a cable of its own to the session.
+make_host <- function(host) {
+  link <- session_link(host)
+  commands <- list(
+    c("netns", "add", host),
+    c("link", "add", link, "type", "veth", "peer", "name", "eth0", "netns", host),
+    c("address", "add", paste0(session_address(host), "/24"), "dev", link),
+    c("link", "set", link, "up"),
+    c("-n", host, "address", "add", paste0(host_address(host), "/24"), "dev", "eth0"),
+    c("-n", host, "link", "set", "eth0", "up"),
+    c("-n", host, "link", "set", "lo", "up"),
+    # A connection that is cut is given up after seconds, not after a quarter of an hour.
+    c("netns", "exec", host, "sysctl", "-qw", "net.ipv4.tcp_retries2=3")
+  )
+  all(vapply(commands, ip, NA))
+}
+
+# The namespaces of an earlier proof that was killed are taken away first.
+make_hosts <- function() {
+  remove_hosts()
+  made <- nzchar(Sys.which("ip")) && all(vapply(hosts, make_host, NA))
+  if (!made) {
+    remove_hosts()
+    message("Network namespaces are not allowed here: the hosts are mere processes.")
+  }
+  made
+}
+
+# Only processes of the hosts, by their ids.
+clear_host <- function(host) {
+  tools::pskill(pids_on(host), tools::SIGKILL)
+}
+
+remove_hosts <- function() {
+  for (host in hosts) {
+    clear_host(host)
+    ip("netns", "delete", host)
+    # The other end of the cable ends with it, but not at once.
+    ip("link", "delete", session_link(host))
+  }
+}
+
+pids_on <- function(host) {
+  in_namespace <- suppressWarnings(
+    system2("ip", c("netns", "pids", host), stdout = TRUE, stderr = FALSE)
+  )
+  failed <- !is.null(attr(in_namespace, "status"))
+  as.integer(if (failed) pids_with(paste0("TMPDIR=", tmp_of(host))) else in_namespace)
+}
+
+# Where a host is only a name: the processes whose environment says that they are on it.
+pids_with <- function(variable) {
+  files <- Sys.glob("/proc/[0-9]*/environ")
+  has <- vapply(files, function(file) {
+    # A process may end meanwhile.
+    bytes <- tryCatch(readBin(file, "raw", 1e5), error = identity, warning = identity)
+    is.raw(bytes) && variable %in% strsplit(rawToChar(replace(bytes, bytes == 0L, as.raw(10L))),
+                                            "\n")[[1L]]
+  }, NA)
+  basename(dirname(files[has]))
+}
+
+tmp_of <- function(host) file.path(Sys.getenv("GYM_HOSTS_TMP"), host)
+
+# The processes of a host that are of a kind, "R" or "python".
+pids_of_kind <- function(host, kind) {
+  Filter(function(pid) {
+    name <- suppressWarnings(try(readLines(file.path("/proc", pid, "comm")), silent = TRUE))
+    startsWith(name[[1L]], kind)
+  }, pids_on(host))
+}
+
+# Workers --------------------------------------------------------------------------------
+
+# Makes the workers of some hosts those of the plan.
+start_workers <- function(on, namespaces) {
+  nodes <- lapply(on, function(host) {
+    dir.create(tmp_of(host), showWarnings = FALSE)
+    parallelly::makeClusterPSOCK(
+      host, master = if (namespaces) session_address(host) else "localhost", port = "random",
+      revtunnel = FALSE, homogeneous = TRUE, autoStop = FALSE, verbose = FALSE,
+      rshcmd = file.path(getwd(), "tools", "in-host"), rshopts = character(),
+      rscript = file.path(R.home("bin"), "Rscript"), rscript_args = "--no-init-file"
+    )[[1L]]
+  })
+  workers <- structure(nodes, class = c("SOCKcluster", "cluster"))
+  future::plan(future::cluster, workers = workers)
+  workers
+}
+
+stop_workers <- function(workers) {
+  future::plan(future::sequential)
+  for (worker in seq_along(workers)) {
+    try(parallel::stopCluster(workers[worker]), silent = TRUE)
+  }
+}
+
+with_workers <- function(on, namespaces, code) {
+  workers <- start_workers(on, namespaces)
+  on.exit(stop_workers(workers))
+  code
+}
+
+# Trainings ------------------------------------------------------------------------------
+
+train <- function(env = "LunarLander-v3", iterations = 7, ...) {
+  train_agent(
+    agent_ars(directions = 32, top = 16), env, policy_linear(normalize = TRUE),
+    iterations = iterations, seed = 3, eval_episodes = 20, eval_every = 1000, ...
+  )
+}
+
+# Steps a second. The first iteration makes environments and starts servers, and does not count.
+rate_of <- function(training) {
+  history <- training$history
+  last <- nrow(history)
+  (history$steps[[last]] - history$steps[[1L]]) / (history$elapsed[[last]] - history$elapsed[[1L]])
+}
+
+what_counts <- function(training) {
+  history <- training$history
+  history$elapsed <- NULL
+  list(history, stats::coef(training), training$final)
+}
+
+show_table <- function(title, table) {
+  cat("\n", title, "\n\n", sep = "")
+  print(table, row.names = FALSE, right = FALSE)
+}
+
+# Rates ----------------------------------------------------------------------------------
+
+# What a batch costs beside playing: the session's seconds in play_in_futures() less the seconds
+# that the slowest worker says its task took, and the session's seconds between batches.
+batches <- new.env()
+
+watch_batches <- function() {
+  batches$rows <- list()
+  now <- function() proc.time()[["elapsed"]]
+  batches$enter <- function() {
+    batches$slowest <- 0
+    batches$began <- now()
+  }
+  batches$take <- function(state) batches$slowest <- max(batches$slowest, state$seconds)
+  batches$leave <- function() {
+    row <- c(began = batches$began, ended = now(), slowest = batches$slowest)
+    batches$rows <- c(batches$rows, list(row))
+  }
+  watch <- function(name, ...) {
+    suppressMessages(trace(name, ..., where = asNamespace("gym"), print = FALSE))
+  }
+  watch("play_in_futures", tracer = batches$enter, exit = batches$leave)
+  watch("warn_of_blas", tracer = quote(get("batches", globalenv())$take(state)))
+}
+
+forget_batches <- function() {
+  suppressMessages(untrace("play_in_futures", where = asNamespace("gym")))
+  suppressMessages(untrace("warn_of_blas", where = asNamespace("gym")))
+}
+
+# Medians of the batches of a training, in milliseconds, without its first and the final evaluation.
+batch_costs <- function() {
+  rows <- do.call(rbind, utils::head(batches$rows, -1L))
+  took <- (rows[, "ended"] - rows[, "began"])[-1L]
+  between <- rows[-1L, "began"] - rows[-nrow(rows), "ended"]
+  1000 * c(
+    batch = stats::median(took), sending = stats::median(took - rows[-1L, "slowest"]),
+    between = stats::median(between)
+  )
+}
+
+measure <- function(on, namespaces) {
+  watch_batches()
+  on.exit(forget_batches())
+  with_workers(on, namespaces, rate <- rate_of(train()))
+  c(rate = rate, batch_costs())
+}
+
+report_rates <- function(namespaces, pairs = 3L) {
+  rows <- lapply(seq_len(pairs), function(pair) {
+    one <- measure(hosts[[1L]], namespaces)
+    two <- measure(hosts, namespaces)
+    data.frame(
+      pair = pair, one = round(one[["rate"]]), two = round(two[["rate"]]),
+      ratio = round(two[["rate"]] / one[["rate"]], 2),
+      batch_ms = round(two[["batch"]]), sending_ms = round(two[["sending"]], 1),
+      between_ms = round(two[["between"]], 1)
+    )
+  })
+  table <- do.call(rbind, rows)
+  show_table("Steps a second of LunarLander-v3 on one and on two hosts, and of a batch on two hosts
+the milliseconds: all, those beside the slowest worker's own, those until the next batch begins",
+             table)
+  median_ratio <- stats::median(table$ratio)
+  cat("\nMedian ratio:", median_ratio, if (median_ratio >= 1.7) "(at least 1.7)" else "(below 1.7)",
+      "\n")
+}
+
+# Faults ---------------------------------------------------------------------------------
+
+# Strikes when an iteration's batch has been on its way for a moment.
+later <- function(...) {
+  system2("sh", c("-c", shQuote(paste("sleep 0.15;", paste(...)))), wait = FALSE)
+}
+
+kill_first <- function(kind) {
+  force(kind)
+  function(host) later("kill -9", pids_of_kind(host, kind)[[1L]])
+}
+
+faults <- list(
+  "none" = function(host) NULL,
+  "worker killed" = kill_first("R"),
+  "server killed" = kill_first("python"),
+  "link down" = function(host) later("ip -n", host, "link set eth0 down")
+)
+
+# What is known of a training in whose third iteration the fault strikes the second host.
+train_with <- function(fault) {
+  warnings <- character()
+  started <- proc.time()[["elapsed"]]
+  training <- withCallingHandlers(
+    train(iterations = 6, callback = function(training) {
+      if (nrow(training$history) == 2L) faults[[fault]](hosts[[2L]])
+      NULL
+    }),
+    warning = function(cnd) {
+      warnings <<- c(warnings, conditionMessage(cnd))
+      invokeRestart("muffleWarning")
+    }
+  )
+  list(
+    counts = what_counts(training), warnings = warnings,
+    seconds = proc.time()[["elapsed"]] - started
+  )
+}
+
+wait_until <- function(done, seconds) {
+  deadline <- Sys.time() + seconds
+  while (!done() && Sys.time() < deadline) Sys.sleep(0.1)
+}
+
+# How many processes of a kind, or files, are on all hosts.
+count_on <- function(what) sum(lengths(lapply(hosts, what)))
+
+logs_on <- function(host) {
+  list.files(tmp_of(host), "^gym-server-.*[.]log$", recursive = TRUE)
+}
+
+fault_row <- function(fault, expected, namespaces) {
+  old <- options(gym.batch_deadline = if (fault == "link down") 5)
+  on.exit(options(old))
+  with_workers(hosts, namespaces, trained <- train_with(fault))
+  wait_until(function() !count_on(pids_on), 20)
+  row <- data.frame(
+    fault = fault, equal = identical(trained$counts, expected),
+    seconds = round(trained$seconds, 1), warnings = length(trained$warnings),
+    workers_left = count_on(function(host) pids_of_kind(host, "R")),
+    servers_left = count_on(function(host) pids_of_kind(host, "python")),
+    logs_left = count_on(logs_on)
+  )
+  row$text <- list(trained$warnings)
+  lapply(hosts, clear_host)
+  unlink(vapply(hosts, tmp_of, ""), recursive = TRUE)
+  if (namespaces) ip("-n", hosts[[2L]], "link", "set", "eth0", "up")
+  row
+}
+
+report_faults <- function(namespaces) {
+  expected <- what_counts(train(iterations = 6))
+  possible <- if (namespaces) names(faults) else setdiff(names(faults), "link down")
+  table <- do.call(rbind, lapply(possible, fault_row, expected, namespaces))
+  show_table("Faults on the second of two hosts, in the third of six iterations: is the result that
+of the session alone, and what is left 20 seconds after the end of the workers at most",
+             table[setdiff(names(table), "text")])
+  for (row in seq_len(nrow(table))) {
+    text <- table$text[[row]]
+    if (length(text)) cat("\n", table$fault[[row]], ":\n", paste0("  ", text, "\n"), sep = "")
+  }
+  if (!all(table$equal) || any(table$servers_left > 0L) || any(table$logs_left > 0L)) {
+    stop("A result differs, or something is left.")
+  }
+}
+
+# Ways on this machine -------------------------------------------------------------------
+
+on_sessions <- function(workers) {
+  force(workers)
+  function(env) {
+    future::plan(future::multisession, workers = workers)
+    on.exit({
+      future::plan(future::sequential)
+      gc()
+    })
+    rate_of(train(env))
+  }
+}
+
+ways <- list(
+  "one process" = function(env) rate_of(train(env, num_workers = 0)),
+  "num_workers = 2" = function(env) rate_of(train(env, num_workers = 2)),
+  "multisession, 2" = on_sessions(2), "multisession, 4" = on_sessions(4)
+)
+
+report_ways <- function(envs = c("LunarLander-v3", "Pendulum-v1"), turns = 3L) {
+  rows <- lapply(envs, function(env) {
+    rates <- replicate(turns, vapply(ways, function(way) way(env), 0))
+    medians <- apply(rates, 1L, stats::median)
+    data.frame(env = env, as.list(round(medians)), best = names(which.max(medians)),
+               check.names = FALSE)
+  })
+  show_table("Steps a second on this machine, medians of turns", do.call(rbind, rows))
+}
+
+prove <- function(parts) {
+  Sys.setenv(GYM_HOSTS_TMP = tempfile("hosts-"))
+  dir.create(Sys.getenv("GYM_HOSTS_TMP"))
+  namespaces <- make_hosts()
+  on.exit(remove_hosts())
+  if ("rates" %in% parts) report_rates(namespaces)
+  if ("faults" %in% parts) report_faults(namespaces)
+  if ("ways" %in% parts) report_ways()
+}
+
+parts <- commandArgs(trailingOnly = TRUE)
+prove(if (length(parts)) parts else c("rates", "faults", "ways"))
