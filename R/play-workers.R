@@ -42,7 +42,8 @@
 #'   call's own error, with the element `host`.
 #' @references H. Bengtsson (2021): A Unifying Framework for Parallel and Distributed Processing in
 #'   R using Futures. The R Journal 13(2), <https://doi.org/10.32614/RJ-2021-048>.
-#' @seealso `system.file("examples/slurm.R", package = "gym")`, for a cluster with a queue.
+#' @seealso `vignette("scaling")`; `system.file("examples/slurm.R", package = "gym")`, for a cluster
+#'   with a queue.
 #' @name workers
 #' @examplesIf gym:::can_start_server() && requireNamespace("future", quietly = TRUE)
 #' future::plan(future::multisession, workers = 2)
