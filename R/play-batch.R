@@ -50,7 +50,7 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
     keep_next = keep_next, learner = learner, at_once = at_once, slice = slice, streams = streams,
     draws = length(streams) > 1L && inherits(policy, "gym_policy_random"),
-    moments = if (keep_moments) no_slice_moments(length(streams))
+    moments = if (keep_moments) no_slice_moments(length(streams)), noted = list()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
@@ -112,6 +112,7 @@ play_episodes <- function(batch, first, last) {
     }
     end_step(batch, playing, action, out)
   }
+  add_noted(batch)
 }
 
 # What a learner is told of a step. An episode that `max_steps` cuts short is truncated.
@@ -134,11 +135,7 @@ end_step <- function(batch, playing, action, out) {
   playing$taken <- playing$taken + 1L
   keep_frame(batch, rows$episode)
   playing$rows$return <- rows$return + out$reward
-  if (!is.null(batch$moments)) {
-    batch$moments <- add_slice_moments(
-      batch$moments, number_rows(playing$observation), batch$slice[rows$sub_env]
-    )
-  }
+  if (!is.null(batch$moments)) note_observations(batch, playing)
   if (batch$keep_steps) {
     batch$steps[[length(batch$steps) + 1L]] <- list(
       at = rows$episode, observation = playing$observation, action = action,

@@ -3,8 +3,9 @@
 # depend on who does it, so that one that was lost is done again, and results are put together in
 # the order of the tasks.
 #
-# A worker whose future has failed is left alone: its future is never asked for again, so that the
-# plan goes on counting the worker as busy, and gives it nothing more.
+# A worker whose future has failed is left alone: its future is never asked for again, so that
+# future before 1.40 goes on counting the worker as busy, and gives it nothing more. Later versions
+# start another worker in its place.
 
 most_tries <- 3L
 
@@ -18,8 +19,8 @@ most_tries <- 3L
 #' @param call The call that errors name.
 #' @noRd
 do_tasks <- function(next_task, deadline, call) {
-  # How long asking whether a future is resolved may wait.
-  old <- options(future.resolved.timeout = 0.002)
+  # Whether a future is resolved is asked when its worker has something to say: no need to wait.
+  old <- options(future.resolved.timeout = 0)
   on.exit(options(old))
   crew <- rlang::env(
     running = list(), again = list(), slowest = 0, next_task = next_task, ended = FALSE,
@@ -33,21 +34,56 @@ do_tasks <- function(next_task, deadline, call) {
       if (crew$ended && !length(crew$again)) break
       do_here(crew)
     }
+    ready <- await_workers(crew)
     for (number in rev(seq_along(crew$running))) {
-      look_at(crew, number)
+      look_at(crew, number, number %in% ready)
     }
   }
 }
 
+# After how many seconds at most the deadlines are looked at.
+longest_wait <- 0.5
+
+# Waits until a worker has something to say; which ones may have. To ask future for it again and
+# again would take the core that a worker on this machine needs, so the session sleeps on the
+# workers' connections. Where a future has none it is asked after a hundredth of the time that it
+# has been waited for.
+await_workers <- function(crew) {
+  connections <- lapply(crew$running, function(one) worker_connection(one$future))
+  if (length(connections) && !any(vapply(connections, is.null, NA))) {
+    return(which(socketSelect(connections, FALSE, longest_wait)))
+  }
+  started <- vapply(crew$running, function(one) one$started, 0)
+  waited <- proc.time()[["elapsed"]] - max(started, -Inf)
+  Sys.sleep(min(longest_wait, max(0.002, waited / 100)))
+  seq_along(crew$running)
+}
+
+# Since future 1.40 the workers are those of the future's backend.
+worker_node <- function(future) {
+  workers <- future$backend$workers %||% future$workers
+  if (is.list(workers) && !is.null(future$node)) workers[[future$node]]
+}
+
+# The socket by which a future's worker answers, where it is known.
+worker_connection <- function(future) {
+  connection <- worker_node(future)$con
+  if (inherits(connection, "sockconn") && is_open(connection)) connection
+}
+
+is_open <- function(connection) tryCatch(isOpen(connection), error = function(cnd) FALSE)
+
 futures_of <- function(crew) lapply(crew$running, function(one) one$future)
 
 # Futures of a call that was interrupted keep their workers busy until somebody takes their values.
+# Those that were cancelled with their plan are not asked for: future would start workers for them.
 collect_left_futures <- function() {
-  still <- Filter(
-    function(future) !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE)),
-    the_session$left_futures
-  )
-  the_session$left_futures <- still
+  the_session$left_futures <- Filter(is_under_way, the_session$left_futures)
+}
+
+is_under_way <- function(future) {
+  identical(future$state, "running") &&
+    !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE))
 }
 
 # The next one: one that was lost, or a new one.
@@ -76,7 +112,7 @@ launch_tasks <- function(crew) {
       warn_of_workers(paste0(
         "The plan takes no more futures (", first_message_line(one$future),
         "): the session plays on by itself."
-      ), "Set the plan again, as in `future::plan(\"multisession\")`, to go on with workers.")
+      ), "Set `future::plan(\"sequential\")` and then your plan again, to go on with workers.")
       crew$again <- c(list(one), crew$again)
     } else {
       one$started <- proc.time()[["elapsed"]]
@@ -94,7 +130,7 @@ workers_note <- function() {
 
 # The first sentence of a message; those of future go on for long.
 first_message_line <- function(cnd) {
-  line <- strsplit(conditionMessage(cnd), "\n", fixed = TRUE)[[1L]][[1L]]
+  line <- strsplit(cnd$message, "\n", fixed = TRUE)[[1L]][[1L]]
   sub("[.] [A-Z].*", "", line)
 }
 
@@ -124,11 +160,12 @@ do_here <- function(crew) {
   }
 }
 
-look_at <- function(crew, number) {
+# A task is asked for when it may be `ready`; it is lost when it is not, for too long.
+look_at <- function(crew, number, ready) {
   one <- crew$running[[number]]
   seconds <- proc.time()[["elapsed"]] - one$started
   state <- tryCatch(
-    if (future::resolved(one$future)) future::value(one$future),
+    if (ready && future::resolved(one$future)) future::value(one$future),
     error = function(cnd) list(failed = first_message_line(cnd))
   )
   if (is.null(state)) {
@@ -178,10 +215,7 @@ task_failed <- function(crew, one, state) {
 }
 
 # The host of a future's worker, as far as the plan knows it.
-future_host <- function(future) {
-  node <- tryCatch(future$workers[[future$node]], error = function(cnd) NULL)
-  node$host %||% "an unknown host"
-}
+future_host <- function(future) worker_node(future)$host %||% "an unknown host"
 
 warn_of_workers <- function(text, hint = NULL) {
   rlang::warn(c(text, i = hint), class = "gym_warning_worker")

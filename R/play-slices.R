@@ -2,10 +2,11 @@
 # play. Slices can be played apart: each worker is given some, and those that it has are played side
 # by side in one vector environment.
 #
-# The rule: a batch has at most 16 slices of equally many sub-environments (the last one may have
-# fewer), with whole candidates where their episodes fit in. It looks at the batch alone, never at
-# workers. Each slice draws from a stream of its own, and its moments are those of its own
-# observations, so that it does not matter beside which others it is played.
+# The rule: a batch has at most 16 slices, whose numbers of sub-environments differ by one at most;
+# where the episodes of several candidates fit into a slice it has whole candidates, whose numbers
+# differ by one at most. It looks at the batch alone, never at workers. Each slice draws from a
+# stream of its own, and its moments are those of its own observations, so that it does not matter
+# beside which others it is played.
 
 slices_of_batch <- 16L
 
@@ -21,11 +22,11 @@ slice_sub_envs <- function(vector_env, episodes, each) {
   if (vector_env$one_seed || length(vector_env$remembers)) {
     return(rep(1L, playing))
   }
-  size <- ceiling(playing / slices_of_batch)
-  if (episodes <= playing && each <= size) {
-    size <- ceiling(size / each) * each
-  }
-  (seq_len(playing) - 1L) %/% as.integer(size) + 1L
+  together <- if (episodes <= playing && each <= playing / slices_of_batch) each else 1L
+  units <- ceiling(playing / together)
+  unit <- (seq_len(playing) - 1L) %/% as.integer(together)
+  # Larger and smaller slices take turns, so that neighbouring ones have equally many together.
+  as.integer((unit * min(units, slices_of_batch)) %/% units) + 1L
 }
 
 # The streams of a batch's slices: the first is that of the batch.
@@ -79,7 +80,28 @@ act_in_slice <- function(batch, playing, slice, rows) {
 # `count` has an element, `mean` and `squares` a row for each slice.
 no_slice_moments <- function(slices) list(count = numeric(slices), mean = NULL, squares = NULL)
 
-#' Add the observations of a step to the moments of their slices
+# How many steps are noted before their observations are added to the moments: adding takes R as
+# long for a few rows as for hundreds. The number depends on the size of an observation alone.
+steps_together <- function(numbers) max(1L, min(64L, 8192L %/% numbers))
+
+# Notes the observations that a step was taken from.
+note_observations <- function(batch, playing) {
+  values <- number_rows(playing$observation)
+  noted <- list(values = values, slice = batch$slice[playing$rows$sub_env])
+  batch$noted[[length(batch$noted) + 1L]] <- noted
+  if (playing$taken %% steps_together(ncol(values)) == 0L) add_noted(batch)
+}
+
+add_noted <- function(batch) {
+  if (length(batch$noted)) {
+    values <- do.call(rbind, lapply(batch$noted, `[[`, "values"))
+    slice <- unlist(lapply(batch$noted, `[[`, "slice"))
+    batch$moments <- add_slice_moments(batch$moments, values, slice)
+    batch$noted <- list()
+  }
+}
+
+#' Add observations to the moments of their slices
 #'
 #' All slices at once: as [merge_moments()] does for one. The numbers of a slice are summed in their
 #' order, whatever slices are beside it.

@@ -58,7 +58,8 @@ plan_kind <- function() {
     return("none")
   }
   plan <- future::plan("next")
-  alone <- inherits(plan, "multisession") && future::nbrOfWorkers() == 1L
+  local <- inherits(plan, c("multisession", "mirai_multisession"))
+  alone <- local && future::nbrOfWorkers() == 1L
   if (inherits(plan, "sequential") || alone || is_broken_plan()) {
     "none"
   } else if (inherits(plan, c("cluster", "multisession", "mirai_cluster", "mirai_multisession"))) {
@@ -68,9 +69,14 @@ plan_kind <- function() {
   }
 }
 
-# Which workers the plan has: the same call of plan() may have started new ones.
+# Which workers the plan has: the same call of plan() may have started new ones. Since future 1.40
+# a plan has a backend with an id of its own.
 plan_workers <- function() {
   plan <- future::plan("next")
+  backend <- attr(plan, "backend", exact = TRUE)
+  if (!is.null(backend)) {
+    return(backend$uuid)
+  }
   workers <- tryCatch(plan(NULL, lazy = TRUE)$workers, error = function(cnd) NULL)
   attr(workers, "name", exact = TRUE) %||% plan
 }

@@ -14,7 +14,7 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   use_python(python)
   process <- with_own_tree_id(tryCatch(
     processx::process$new(
-      python, arguments,
+      python, c(arguments, "--own-log", log),
       stdin = "|", stdout = "|", stderr = log,
       env = server_environment(),
       # processx would kill the server, and a forked child would do so, too. Instead the session
@@ -163,10 +163,12 @@ stop_server <- function(server, timeout = 15) {
   }
 }
 
+# Closes the server's standard input, by which it ends. The line before says that this session is
+# still there: where it was killed there is none, and the server removes its log by itself.
 close_server_input <- function(server) {
-  input <- server$process$get_input_connection()
   # It is closed already when an earlier stop was interrupted.
-  tryCatch(close(input), error = function(cnd) NULL)
+  try(server$process$write_input("stop\n"), silent = TRUE)
+  try(close(server$process$get_input_connection()), silent = TRUE)
 }
 
 # Asks the server to end by a signal, as its standard input stays open while a forked child of this

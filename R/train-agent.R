@@ -147,11 +147,17 @@ least_sub_envs <- 100
 
 # However few episodes an evaluation has, candidates are played side by side.
 with_training_env <- function(settings, use, max_steps, client, call) {
+  episodes <- iteration_candidates(settings$agent) * settings$episodes
   rlang::exec(
-    with_vector_env, settings$env, max(settings$eval_episodes, least_sub_envs), use, max_steps,
-    !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
+    with_vector_env, settings$env, max(settings$eval_episodes, episodes, least_sub_envs), use,
+    max_steps, !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
     client = client, call = call
   )
+}
+
+# How many candidates an agent asks for in an iteration, where it is one of ours; else 0.
+iteration_candidates <- function(agent) {
+  agent$population %||% agent$candidates %||% (2L * (agent$directions %||% 0L))
 }
 
 # Reads the checkpoint of a training, where it is to have one.

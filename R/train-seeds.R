@@ -122,7 +122,7 @@ inform_of_servers <- function() {
   if (length(plans) < 2L || !inherits(plans[[1L]], c("multisession", "multicore"))) {
     return(invisible())
   }
-  workers <- vapply(plans[1:2], function(plan) as.numeric(future::nbrOfWorkers(plan)), 0)
+  workers <- vapply(plans[1:2], workers_of_plan, 0)
   cores <- parallel::detectCores()
   if (all(is.finite(workers)) && isTRUE(prod(workers) > cores)) {
     rlang::inform(
@@ -132,6 +132,19 @@ inform_of_servers <- function() {
       class = "gym_message_servers"
     )
   }
+}
+
+# How many workers a plan asks for, also one that is not in use: future would set that one up to
+# answer, which ends the workers of the one in use. `NA` where it cannot be told.
+workers_of_plan <- function(plan) {
+  workers <- tryCatch(
+    {
+      workers <- eval(formals(plan)$workers, list(), environment(plan))
+      if (is.function(workers)) workers() else workers
+    },
+    error = function(cnd) NULL
+  )
+  as.numeric(if (is.null(workers)) NA else if (is.numeric(workers)) workers else length(workers))
 }
 
 # A future for each seed. What they return is kept in the order of the seeds.

@@ -191,29 +191,42 @@ batch_costs <- function() {
   )
 }
 
-measure <- function(on, namespaces, directions) {
+measure <- function(workers, directions) {
+  future::plan(future::cluster, workers = workers)
   watch_batches()
   on.exit(forget_batches())
-  with_workers(on, namespaces, rate <- rate_of(train(directions = directions)))
-  c(rate = rate, batch_costs())
+  c(rate = rate_of(train(directions = directions, iterations = 5)), batch_costs())
 }
 
-report_rates <- function(namespaces, pairs = 3L) {
-  rows <- lapply(rep(c(32, 256), pairs), function(directions) {
-    one <- measure(hosts[[1L]], namespaces, directions)
-    two <- measure(hosts, namespaces, directions)
+# The speed of a machine's cores drifts: one host and two take turns, shortly, with workers that are
+# kept, and each turn gives a ratio of its own.
+report_rates <- function(namespaces, turns = 4L) {
+  # Without this R waits some 40 ms for an acknowledgement before it sends the rest of a larger message.
+  options(socketOptions = "no-delay")
+  workers <- start_workers(hosts, namespaces)
+  on.exit(stop_workers(workers))
+  rows <- lapply(rep(c(32, 256, 512), turns), function(directions) {
+    one <- measure(workers[1L], directions)
+    two <- measure(workers, directions)
     data.frame(
-      directions = directions, one = round(one[["rate"]]), two = round(two[["rate"]]),
-      ratio = round(two[["rate"]] / one[["rate"]], 2),
-      batch_ms = round(two[["batch"]]), sending_ms = round(two[["sending"]], 1),
-      between_ms = round(two[["between"]], 1)
+      directions = directions, one = one[["rate"]], two = two[["rate"]],
+      ratio = two[["rate"]] / one[["rate"]], batch_ms = two[["batch"]],
+      sending_ms = two[["sending"]], between_ms = two[["between"]]
     )
   })
   table <- do.call(rbind, rows)
-  show_table("Steps a second of LunarLander-v3 on one and on two hosts, and of a batch on two hosts
-the milliseconds: all, those beside the slowest worker's own, those until the next batch begins",
-             table)
-  show_table("Medians", stats::aggregate(ratio ~ directions, table, stats::median))
+  in_turns <- split(table, table$directions)
+  medians <- do.call(rbind, lapply(in_turns, function(own) {
+    data.frame(
+      lapply(own, stats::median), least_ratio = min(own$ratio), greatest_ratio = max(own$ratio)
+    )
+  }))
+  ratios <- grep("ratio", names(medians))
+  medians[ratios] <- round(medians[ratios], 2)
+  medians[-ratios] <- round(medians[-ratios])
+  show_table("Steps a second of LunarLander-v3 on one and on two hosts, their ratio, and of a batch on
+two hosts the milliseconds: all, those beside the slowest worker's own, those until the next batch
+begins; medians of turns", medians)
 }
 
 # Faults ---------------------------------------------------------------------------------

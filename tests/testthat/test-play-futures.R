@@ -44,14 +44,15 @@ everything <- function() {
   )
 }
 
-# The processes of all workers of the plan.
+# The processes of all workers of the plan. Each is asked while the others still answer.
 worker_pids <- function() {
-  vapply(seq_len(future::nbrOfWorkers()), function(i) {
-    future::value(future::future({
+  asked <- lapply(seq_len(future::nbrOfWorkers()), function(i) {
+    future::future({
       Sys.sleep(0.3)
       Sys.getpid()
-    }, lazy = FALSE))
-  }, 0L)
+    }, lazy = FALSE)
+  })
+  vapply(asked, future::value, 0L)
 }
 
 test_that("results are the same with none and with two workers", {

@@ -29,7 +29,9 @@ play_in_parts <- function(vector_env, history, policy, workers, ...) {
 test_that("a batch has at most 16 slices, of whole candidates where these fit", {
   sub_envs <- function(n, one_seed = FALSE) list(num_envs = n, one_seed = one_seed)
   expect_identical(slice_sub_envs(sub_envs(100L), 64, 1), rep(1:16, each = 4))
-  expect_identical(slice_sub_envs(sub_envs(100L), 99, 3), c(rep(1:11, each = 9)))
+  sizes <- function(...) tabulate(slice_sub_envs(...))
+  expect_identical(sizes(sub_envs(100L), 99, 3), c(9L, rep(6L, 15)))
+  expect_identical(sizes(sub_envs(100L), 512, 1), rep(c(7L, 6L, 6L, 6L), 4))
   expect_identical(slice_sub_envs(sub_envs(100L), 15, 5), 1:15)
   expect_identical(slice_sub_envs(sub_envs(8L), 32, 1), 1:8)
   expect_identical(max(slice_sub_envs(sub_envs(256L), 1024, 1)), 16L)
@@ -39,7 +41,8 @@ test_that("a batch has at most 16 slices, of whole candidates where these fit", 
 })
 
 test_that("slices that are played apart come to the same as side by side", {
-  ends <- function(seed, step, action) step == 1L + seed %% 7L
+  # Longer ones than the number of steps after which moments are added.
+  ends <- function(seed, step, action) step == 1L + seed %% 7L + 70L * (seed %% 5L == 0L)
   reward <- function(seed, step, action) seed %% 3 + 10 * action
   make <- function() as_vector_env(fake_vector_env(20, "sync", ends = ends, reward = reward))
   policies <- list(
@@ -69,6 +72,12 @@ test_that("slices that are played apart come to the same as side by side", {
       expect_identical(play(workers), alone, label = paste(name, "with", workers))
     }
   }
+})
+
+test_that("observations of many steps are added to the moments at once, unless they are large", {
+  expect_identical(steps_together(8L), 64L)
+  expect_identical(steps_together(376L), 21L)
+  expect_identical(steps_together(84L * 84L * 4L), 1L)
 })
 
 test_that("moments of slices are those of their observations", {

@@ -161,23 +161,27 @@ test_that("a server that another session started is not stopped here", {
   )
 })
 
-test_that("the server ends with the R session, also when R is killed", {
+test_that("the server ends with the R session and leaves no log, also when R is killed", {
   skip_on_os("windows")
   skip_if_no_server()
   for (ending in c("q('no')", "tools::pskill(Sys.getpid(), tools::SIGKILL)")) {
     script <- paste0(
       ".libPaths(", deparse1(.libPaths()), "); server <- gym::gym_server_start();",
-      "cat(gym:::the_session$servers[[1]]$pid, '\\n'); ", ending
+      "cat(unlist(gym:::the_session$servers[[1]][c('pid', 'log')]), sep = '\\n'); ", ending
     )
     output <- processx::run(
       file.path(R.home("bin"), "Rscript"), c("-e", script), error_on_status = FALSE
     )
-    pid <- as.integer(output$stdout)
+    said <- strsplit(output$stdout, "\n")[[1]]
+    pid <- as.integer(said[[1]])
     for (i in 1:100) {
       if (!pid_runs(pid)) break
       Sys.sleep(0.1)
     }
     expect_false(pid_runs(pid))
+    expect_false(file.exists(said[[2]]))
+    # R that is killed leaves the folder.
+    unlink(dirname(said[[2]]), recursive = TRUE)
   }
 })
 

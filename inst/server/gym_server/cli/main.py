@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import errno
 import logging
 import os
@@ -110,7 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     app.answer_for = server.answer_for
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
-        threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
+        threading.Thread(target=_wait_for_eof, args=(stop, options.own_log), daemon=True).start()
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
     # From here on standard output goes where standard error goes: what environments print must not
@@ -180,13 +181,16 @@ def _stop_on_signals(stop: Callable[[], None]) -> None:
             signal.signal(getattr(signal, name), lambda *_: stop())
 
 
-def _wait_for_eof(stop: Callable[[], None]) -> None:
+def _wait_for_eof(stop: Callable[[], None], own_log: Path | None) -> None:
     # Not by sys.stdin: this thread would hold its lock when the interpreter ends.
-    try:
+    heard_a_line = False
+    with contextlib.suppress(OSError):
         while os.read(0, 4096):
-            pass
-    except OSError:
-        pass
+            heard_a_line = True
+    if own_log is not None and not heard_a_line:
+        # Nobody is left who reads the log, or removes it. Windows keeps a file that is open.
+        with contextlib.suppress(OSError):
+            own_log.unlink()
     stop()
 
 

@@ -41,6 +41,14 @@ def parser() -> argparse.ArgumentParser:
         "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
     )
     options.add_argument(
+        "--own-log",
+        type=Path,
+        metavar="FILE",
+        help="the file that standard error goes to; with --stop-on-stdin-eof it is removed when "
+        "standard input closes without a line, as it does when the program that started the "
+        "server was killed",
+    )
+    options.add_argument(
         "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
     )
     options.add_argument(

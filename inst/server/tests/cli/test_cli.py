@@ -37,6 +37,19 @@ def test_the_end_of_standard_input_stops_it_when_asked(serve):
     assert server.stop(how=None)[0] == 0
 
 
+@pytest.mark.parametrize("line", ["", "stop\n"])
+def test_the_log_is_removed_when_standard_input_closes_without_a_line(serve, tmp_path, line):
+    log = tmp_path / "server.log"
+    log.touch()
+    server = serve("--stop-on-stdin-eof", "--own-log", str(log))
+    server.process.stdin.write(line)
+    server.process.stdin.flush()
+    assert server.get("/v1/health")[0] == 200
+    assert log.exists()
+    assert server.stop(how=None)[0] == 0
+    assert log.exists() == bool(line)
+
+
 @pytest.mark.slow
 @needs_signals
 @pytest.mark.parametrize("isolate", ["all", "none"])
