@@ -137,6 +137,9 @@ inform_of_servers <- function() {
 # How many workers a plan asks for, also one that is not in use: future would set that one up to
 # answer, which ends the workers of the one in use. `NA` where it cannot be told.
 workers_of_plan <- function(plan) {
+  if (inherits(plan, "sequential")) {
+    return(1)
+  }
   workers <- tryCatch(
     {
       workers <- eval(formals(plan)$workers, list(), environment(plan))

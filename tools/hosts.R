@@ -8,6 +8,9 @@
 
 library(gym)
 
+# Else R waits some 40 ms for an acknowledgement before it sends the rest of a larger message.
+options(socketOptions = "no-delay")
+
 # Hosts ----------------------------------------------------------------------------------
 
 hosts <- c("gym-host-0", "gym-host-1")
@@ -200,9 +203,7 @@ measure <- function(workers, directions) {
 
 # The speed of a machine's cores drifts: one host and two take turns, shortly, with workers that are
 # kept, and each turn gives a ratio of its own.
-report_rates <- function(namespaces, turns = 4L) {
-  # Without this R waits some 40 ms for an acknowledgement before it sends the rest of a larger message.
-  options(socketOptions = "no-delay")
+report_rates <- function(namespaces, turns = 8L) {
   workers <- start_workers(hosts, namespaces)
   on.exit(stop_workers(workers))
   rows <- lapply(rep(c(32, 256, 512), turns), function(directions) {
@@ -310,7 +311,7 @@ of the session alone, and what is left 20 seconds after the end of the workers a
     text <- table$text[[row]]
     if (length(text)) cat("\n", table$fault[[row]], ":\n", paste0("  ", text, "\n"), sep = "")
   }
-  if (!all(table$equal) || any(table$servers_left > 0L) || any(table$logs_left > 0L)) {
+  if (!all(table$equal) || any(table[c("workers_left", "servers_left", "logs_left")] > 0L)) {
     stop("A result differs, or something is left.")
   }
 }
@@ -319,28 +320,31 @@ of the session alone, and what is left 20 seconds after the end of the workers a
 
 on_sessions <- function(workers) {
   force(workers)
-  function(env) {
+  function(...) {
     future::plan(future::multisession, workers = workers)
-    on.exit({
-      future::plan(future::sequential)
-      gc()
-    })
-    rate_of(train(env))
+    on.exit(future::plan(future::sequential))
+    rate_of(train(...))
   }
 }
 
 ways <- list(
-  "one process" = function(env) rate_of(train(env, num_workers = 0)),
-  "num_workers = 2" = function(env) rate_of(train(env, num_workers = 2)),
+  "one process" = function(...) rate_of(train(..., num_workers = 0)),
+  "num_workers = 2" = function(...) rate_of(train(..., num_workers = 2)),
   "multisession, 2" = on_sessions(2), "multisession, 4" = on_sessions(4)
 )
 
-report_ways <- function(envs = c("LunarLander-v3", "Pendulum-v1"), turns = 3L) {
-  rows <- lapply(envs, function(env) {
-    rates <- replicate(turns, vapply(ways, function(way) way(env), 0))
+tasks <- list(
+  list(env = "Pendulum-v1"), list(env = "LunarLander-v3"),
+  list(env = "LunarLander-v3", directions = 256, iterations = 4),
+  list(env = "BipedalWalker-v3", max_steps = 200, iterations = 4)
+)
+
+report_ways <- function(turns = 3L) {
+  rows <- lapply(tasks, function(task) {
+    rates <- replicate(turns, vapply(ways, function(way) do.call(way, task), 0))
     medians <- apply(rates, 1L, stats::median)
-    data.frame(env = env, as.list(round(medians)), best = names(which.max(medians)),
-               check.names = FALSE)
+    data.frame(env = task$env, directions = if (is.null(task$directions)) 32 else task$directions,
+               as.list(round(medians)), best = names(which.max(medians)), check.names = FALSE)
   })
   show_table("Steps a second on this machine, medians of turns", do.call(rbind, rows))
 }

@@ -32,3 +32,19 @@ test_that("the inventory never ends, and a rule of two numbers beats chance", {
   expect_identical(unique(run$env$chance$episodes$length), 365L)
   expect_gt(max(run$env$rules$profit), mean(run$env$chance$episodes$return) / 365 + 2)
 })
+
+test_that("the trainings for a queue are run one after the other where there is no Slurm", {
+  skip_if_not(tests_all(), "left to make test-all")
+  skip_if_not_installed("future.batchtools")
+  skip_if(nzchar(Sys.which("sbatch")), "Slurm is there")
+  test_client()
+  folder <- withr::local_tempdir()
+  withr::local_envvar(GYM_RESULTS = folder)
+  # batchtools keeps its registry in the working directory.
+  withr::local_dir(withr::local_tempdir())
+  withr::defer(future::plan("sequential"))
+  run <- run_example("slurm.R")
+  expect_named(run$env$trained$trainings, c("1", "2", "3"))
+  expect_setequal(list.files(folder, "rds$"), paste0("acrobot-", 1:3, ".rds"))
+  expect_setequal(list.files(file.path(folder, "acrobot")), paste0("seed-", 1:3))
+})

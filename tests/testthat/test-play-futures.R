@@ -180,6 +180,9 @@ test_that("a worker that is silent counts as lost, and its part is played here i
   play <- function() rollout("Acrobot-v1", slow, 4, seed = 1, max_steps = 5)$episodes
   alone <- play()
   local_plan(future::multisession, workers = 2)
+  # They would go on sleeping after the end of the plan.
+  pids <- worker_pids()
+  withr::defer(tools::pskill(pids, tools::SIGKILL))
   withr::local_options(gym.batch_deadline = 1)
   expect_warning(
     expect_warning(played <- play(), "silent for"), "silent for", class = "gym_warning_worker"
@@ -243,6 +246,34 @@ test_that("seeds are trained by workers, each with its own files", {
   expect_identical(trained(), alone)
   future::plan(list(future.batchtools::batchtools_local, inner))
   expect_identical(trained(), alone)
+})
+
+test_that("a future in a policy in a rollout in a future comes to an end, with the same result", {
+  test_client()
+  asking <- function(observation) {
+    turn <- future::value(future::future(1L))
+    rep(turn, nrow(observation))
+  }
+  play <- function() {
+    gym::rollout("Acrobot-v1", asking, 4, seed = 1, max_steps = 3)$episodes
+  }
+  alone <- play()
+  local_plan(future::multisession, workers = 2)
+  inner <- future::tweak(future::multisession, workers = I(2))
+  future::plan(list(future::tweak(future::multisession, workers = 2), inner))
+  expect_identical(future::value(future::future(play(), seed = NULL)), alone)
+  expect_identical(play(), alone)
+})
+
+test_that("counting the workers of a plan that is not in use sets none up", {
+  inner <- future::tweak(future::multisession, workers = I(3))
+  local_plan(future::multisession, workers = 2)
+  future::plan(list(future::tweak(future::multisession, workers = 2), inner))
+  plans <- future::plan("list")
+  pids <- sort(worker_pids())
+  expect_identical(vapply(plans, workers_of_plan, 0), c(2, 3))
+  expect_identical(workers_of_plan(future::sequential), 1)
+  expect_identical(sort(worker_pids()), pids)
 })
 
 test_that("progressr is told where it listens", {
