@@ -29,12 +29,18 @@
 #'
 #' Where the package progressr is loaded its handlers are told of the progress.
 #'
+#' Set `options(socketOptions = "no-delay")` before the plan, above all for workers that play a batch
+#' in less than a second: without it, R waits some 40 ms for an acknowledgement in the middle of
+#' every message to a worker that has more than a few thousand bytes.
+#'
 #' @section A worker that is lost:
 #' When a worker dies, its server fails, or it is silent for longer than the option
 #' `gym.batch_deadline` (seconds; by default ten times as long as the slowest part of a batch so
 #' far, and at least 60), its part is played by another one, with a warning of class
 #' `gym_warning_worker` that names the host; the third time the session plays it. When the plan
-#' takes no more futures the session plays on by itself. The result is the same. A training of a
+#' takes no more futures the session plays on by itself; `future::plan("sequential")` and then the
+#' plan again give it new workers. Since version 1.40 the package future starts another worker in
+#' the place of one that died, where it can. The result is the same in all cases. A training of a
 #' seed has no deadline.
 #'
 #' @section Errors: `gym_error_worker` where a worker lacks the package, or has another version of

@@ -77,10 +77,11 @@ pids_on <- function(host) {
 pids_with <- function(variable) {
   files <- Sys.glob("/proc/[0-9]*/environ")
   has <- vapply(files, function(file) {
-    # A process may end meanwhile.
-    bytes <- tryCatch(readBin(file, "raw", 1e5), error = identity, warning = identity)
-    is.raw(bytes) && variable %in% strsplit(rawToChar(replace(bytes, bytes == 0L, as.raw(10L))),
-                                            "\n")[[1L]]
+    # A process may end meanwhile. To leave by a warning would leave the file's connection behind,
+    # of which R has 128.
+    bytes <- suppressWarnings(tryCatch(readBin(file, "raw", 1e5), error = function(cnd) raw()))
+    lines <- rawToChar(replace(bytes, bytes == 0L, as.raw(10L)))
+    variable %in% strsplit(lines, "\n", fixed = TRUE)[[1L]]
   }, NA)
   basename(dirname(files[has]))
 }
@@ -203,7 +204,7 @@ measure <- function(workers, directions) {
 
 # The speed of a machine's cores drifts: one host and two take turns, shortly, with workers that are
 # kept, and each turn gives a ratio of its own.
-report_rates <- function(namespaces, turns = 8L) {
+report_rates <- function(namespaces, turns = 6L) {
   workers <- start_workers(hosts, namespaces)
   on.exit(stop_workers(workers))
   rows <- lapply(rep(c(32, 256, 512), turns), function(directions) {
