@@ -46,7 +46,8 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
-    steps = list(), frames = list(), target = target, each = each, report = report,
+    # Whose observations count must not depend on when others end.
+    steps = list(), frames = list(), target = if (!keep_moments) target, each = each, report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
     keep_next = keep_next, learner = learner, at_once = at_once, slice = slice, streams = streams,
     draws = length(streams) > 1L && inherits(policy, "gym_policy_random"),
@@ -66,7 +67,8 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
                "truncated")
   kept <- mget(c("steps", "frames"), batch)
   kept["moments"] <- list(if (keep_moments) split_slice_moments(batch$moments))
-  c(lapply(mget(columns, batch), utils::head, batch$needed), kept)
+  episodes <- lapply(mget(columns, batch), utils::head, batch$needed)
+  c(if (keep_moments) without_needless(episodes, each, target) else episodes, kept)
 }
 
 # An error of the environment names the user's call, not the step that was taken for it.

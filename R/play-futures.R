@@ -41,22 +41,37 @@ do_tasks <- function(next_task, deadline, call) {
   }
 }
 
-# After how many seconds at most the deadlines are looked at.
+# After how many seconds at most the deadlines are looked at, and after how many a future is asked
+# for again that may take as long as it likes.
 longest_wait <- 0.5
+longest_wait_without_deadline <- 10
 
 # Waits until a worker has something to say; which ones may have. To ask future for it again and
 # again would take the core that a worker on this machine needs, so the session sleeps on the
-# workers' connections. Where a future has none it is asked after a hundredth of the time that it
-# has been waited for.
+# workers' connections. Now and then all are asked: future may have read an answer by itself.
 await_workers <- function(crew) {
-  connections <- lapply(crew$running, function(one) worker_connection(one$future))
-  if (length(connections) && !any(vapply(connections, is.null, NA))) {
-    return(which(socketSelect(connections, FALSE, longest_wait)))
+  if (!length(crew$running)) {
+    return(integer())
   }
-  started <- vapply(crew$running, function(one) one$started, 0)
-  waited <- proc.time()[["elapsed"]] - max(started, -Inf)
-  Sys.sleep(min(longest_wait, max(0.002, waited / 100)))
-  seq_along(crew$running)
+  ready <- select_workers(crew$running)
+  if (is.null(ready)) Sys.sleep(pause_seconds(crew))
+  if (any(ready)) which(ready) else seq_along(crew$running)
+}
+
+# `NULL` where a worker has no connection that is known here.
+select_workers <- function(running) {
+  connections <- lapply(running, function(one) worker_connection(one$future))
+  if (!any(vapply(connections, is.null, NA))) {
+    tryCatch(socketSelect(connections, FALSE, longest_wait), error = function(cnd) NULL)
+  }
+}
+
+# Where it is not known when to ask: a hundredth of the time since the last task was sent.
+pause_seconds <- function(crew) {
+  waited <- proc.time()[["elapsed"]] - max(vapply(crew$running, function(one) one$started, 0))
+  has_deadline <- is.finite(crew$deadline(crew$slowest))
+  longest <- if (has_deadline) longest_wait else longest_wait_without_deadline
+  min(longest, max(0.002, waited / 100))
 }
 
 # Since future 1.40 the workers are those of the future's backend.
@@ -130,7 +145,7 @@ workers_note <- function() {
 
 # The first sentence of a message; those of future go on for long.
 first_message_line <- function(cnd) {
-  line <- strsplit(cnd$message, "\n", fixed = TRUE)[[1L]][[1L]]
+  line <- c(strsplit(cnd$message %||% "", "\n", fixed = TRUE)[[1L]], "")[[1L]]
   sub("[.] [A-Z].*", "", line)
 }
 

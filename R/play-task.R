@@ -84,6 +84,13 @@ check_worker_version <- function(wanted, own, of) {
   }
 }
 
+check_worker_gymnasium <- function(task, client) {
+  versions <- server_versions(client)
+  if (!is.null(task$versions) && !is.null(versions)) {
+    check_worker_version(task$versions$gymnasium, versions$gymnasium, "Gymnasium")
+  }
+}
+
 # A forked child has a server of its own as well, which must not outlive it.
 with_own_server <- function(code) {
   if (Sys.getpid() != the_session$pid) {
@@ -120,10 +127,7 @@ kept_vector_env <- function(task) {
   }
   if (length(the_worker$kept) >= most_kept) forget_kept()
   made <- make_from_recipe(recipe, task$num_envs)
-  versions <- server_versions(made$client)
-  if (!is.null(task$versions) && !is.null(versions)) {
-    check_worker_version(task$versions$gymnasium, versions$gymnasium, "Gymnasium")
-  }
+  check_worker_gymnasium(task, made$client)
   made$call <- quote(play_batch())
   the_worker$kept[[key]] <- made
   made

@@ -38,8 +38,8 @@
 #' `gym.batch_deadline` (seconds; by default ten times as long as the slowest part of a batch so
 #' far, and at least 60), its part is played by another one, with a warning of class
 #' `gym_warning_worker` that names the host; the third time the session plays it. When the plan
-#' takes no more futures the session plays on by itself; `future::plan("sequential")` and then the
-#' plan again give it new workers. Since version 1.40 the package future starts another worker in
+#' takes no more futures the session plays on by itself; `future::plan("sequential")` and then a
+#' plan with new workers end that. Since version 1.40 the package future starts another worker in
 #' the place of one that died, where it can. The result is the same in all cases. A training of a
 #' seed has no deadline.
 #'
@@ -81,7 +81,7 @@ plan_workers <- function() {
   plan <- future::plan("next")
   backend <- attr(plan, "backend", exact = TRUE)
   if (!is.null(backend)) {
-    return(backend$uuid)
+    return(backend$uuid %||% backend$reg)
   }
   workers <- tryCatch(plan(NULL, lazy = TRUE)$workers, error = function(cnd) NULL)
   attr(workers, "name", exact = TRUE) %||% plan

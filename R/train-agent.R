@@ -157,7 +157,12 @@ with_training_env <- function(settings, use, max_steps, client, call) {
 
 # How many candidates an agent asks for in an iteration, where it is one of ours; else 0.
 iteration_candidates <- function(agent) {
-  agent$population %||% agent$candidates %||% (2L * (agent$directions %||% 0L))
+  switch(class(agent)[[1L]],
+    gym_agent_ars = 2L * agent$directions,
+    gym_agent_cem = agent$population,
+    gym_agent_hill_climb = , gym_agent_random = agent$candidates,
+    0L
+  )
 }
 
 # Reads the checkpoint of a training, where it is to have one.

@@ -180,9 +180,20 @@ train_in_futures <- function(vector_env, of_seeds, keep, call) {
 #' @exportS3Method
 run_task.gym_task_training <- function(task) {
   settings <- task$one$settings
+  # The plan uses the cores.
+  if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
-  with_env <- function(use) with_training_env(settings, use, NULL, gym_client(), call)
+  with_env <- function(use) {
+    with_training_env(settings, function(vector_env) {
+      check_worker_gymnasium(task, vector_env$client)
+      use(vector_env)
+    }, NULL, gym_client(), call)
+  }
   train_seed(task$one, with_env, call)
+}
+
+is_made_by_server <- function(env) {
+  (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
 }
 
 # What a seed has of its own: its settings, its checkpoint, the folder of its log.

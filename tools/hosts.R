@@ -13,11 +13,16 @@ options(socketOptions = "no-delay")
 
 # Hosts ----------------------------------------------------------------------------------
 
-hosts <- c("gym-host-0", "gym-host-1")
+# Their names have the id of this process, so that two proofs do not meet.
+hosts <- paste0("gym-", Sys.getpid(), "-", 0:1)
 number_of <- function(host) as.integer(sub(".*-", "", host))
-session_address <- function(host) paste0("10.77.", number_of(host) + 1L, ".1")
-host_address <- function(host) paste0("10.77.", number_of(host) + 1L, ".2")
-session_link <- function(host) paste0("gymhost", number_of(host))
+owner_of <- function(host) sub("gym-([0-9]+)-.*", "\\1", host)
+network_of <- function(host) {
+  paste0("10.77.", 2L * (as.integer(owner_of(host)) %% 128L) + number_of(host))
+}
+session_address <- function(host) paste0(network_of(host), ".1")
+host_address <- function(host) paste0(network_of(host), ".2")
+session_link <- function(host) host
 
 ip <- function(...) {
   system2("ip", c(...), stdout = FALSE, stderr = FALSE) == 0L
@@ -40,10 +45,12 @@ make_host <- function(host) {
   all(vapply(commands, ip, NA))
 }
 
-# The namespaces of an earlier proof that was killed are taken away first.
+has_ip <- nzchar(Sys.which("ip"))
+
+# The namespaces of earlier proofs that were killed are taken away first.
 make_hosts <- function() {
-  remove_hosts()
-  made <- nzchar(Sys.which("ip")) && all(vapply(hosts, make_host, NA))
+  if (has_ip) remove_hosts(left_hosts())
+  made <- has_ip && all(vapply(hosts, make_host, NA))
   if (!made) {
     remove_hosts()
     message("Network namespaces are not allowed here: the hosts are mere processes.")
@@ -56,9 +63,16 @@ clear_host <- function(host) {
   tools::pskill(pids_on(host), tools::SIGKILL)
 }
 
-remove_hosts <- function() {
-  for (host in hosts) {
+left_hosts <- function() {
+  names <- system2("ip", c("netns", "list"), stdout = TRUE, stderr = FALSE)
+  found <- grep("^gym-[0-9]+-[01]$", sub(" .*", "", names), value = TRUE)
+  found[!dir.exists(file.path("/proc", owner_of(found)))]
+}
+
+remove_hosts <- function(which = hosts) {
+  for (host in which) {
     clear_host(host)
+    if (!has_ip) next
     ip("netns", "delete", host)
     # The other end of the cable ends with it, but not at once.
     ip("link", "delete", session_link(host))
@@ -66,11 +80,11 @@ remove_hosts <- function() {
 }
 
 pids_on <- function(host) {
-  in_namespace <- suppressWarnings(
-    system2("ip", c("netns", "pids", host), stdout = TRUE, stderr = FALSE)
-  )
-  failed <- !is.null(attr(in_namespace, "status"))
-  as.integer(if (failed) pids_with(paste0("TMPDIR=", tmp_of(host))) else in_namespace)
+  in_namespace <- if (has_ip) {
+    suppressWarnings(system2("ip", c("netns", "pids", host), stdout = TRUE, stderr = FALSE))
+  }
+  known <- has_ip && is.null(attr(in_namespace, "status"))
+  as.integer(if (known) in_namespace else pids_with(paste0("TMPDIR=", tmp_of(host))))
 }
 
 # Where a host is only a name: the processes whose environment says that they are on it.

@@ -19,5 +19,5 @@ test_that("a training is the same whatever is lost on a host, where nothing is l
   for (fault in c("none", struck)) {
     expect_match(lines, paste0("^ *", fault, " +TRUE +[0-9.]+ +[0-9]+ +0 +0 +0 *$"), all = FALSE)
   }
-  expect_match(lines, "A worker on gym-host-1 was lost", fixed = TRUE, all = FALSE)
+  expect_match(lines, "A worker on gym-[0-9]+-1 was lost", all = FALSE)
 })

@@ -33,8 +33,11 @@ everything <- function() {
   search <- search_random(
     "Acrobot-v1", policy_network(c(6, 2, 3)), rounds = 20, target = -150, seed = 1
   )
+  normalizing <- search_random(
+    "Acrobot-v1", policy_network(c(6, 3), normalize = TRUE), rounds = 8, target = -450, seed = 2
+  )
   list(
-    what_counts(train()),
+    what_counts(train()), normalizing$policy$moments, normalizing$solved,
     rollout("Acrobot-v1", drawing, 300, seed = 5, max_steps = 50, steps = TRUE)[1:2],
     as.data.frame(evaluate_policy("Acrobot-v1", list(drawing, policy_random()), 10, seed = 2,
                                   max_steps = 50)),
@@ -274,6 +277,17 @@ test_that("counting the workers of a plan that is not in use sets none up", {
   expect_identical(vapply(plans, workers_of_plan, 0), c(2, 3))
   expect_identical(workers_of_plan(future::sequential), 1)
   expect_identical(sort(worker_pids()), pids)
+})
+
+test_that("an answer that future has read by itself is not waited for", {
+  local_plan(future::multisession, workers = 2)
+  read <- future::future(1L)
+  expect_identical(future::value(read), 1L)
+  one <- list(future = read, started = proc.time()[["elapsed"]])
+  crew <- rlang::env(running = list(one), slowest = 0, deadline = function(slowest) Inf)
+  expect_identical(await_workers(crew), 1L)
+  crew$running <- list()
+  expect_identical(await_workers(crew), integer())
 })
 
 test_that("progressr is told where it listens", {

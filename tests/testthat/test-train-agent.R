@@ -451,3 +451,12 @@ test_that("CartPole is solved, from the same seed in the same way", {
   expect_gt(trained$final$mean_return, 450)
   expect_identical(what_counts(play()), what_counts(trained))
 })
+
+test_that("a large iteration gets more sub-environments, whoever else's agent has such fields", {
+  expect_identical(iteration_candidates(agent_ars(directions = 60)), 120L)
+  expect_identical(iteration_candidates(agent_cem(population = 150)), 150L)
+  expect_identical(iteration_candidates(agent_random(7)), 7L)
+  expect_identical(iteration_candidates(agent_hill_climb(candidates = 9)), 9L)
+  own <- structure(list(population = list(1)), class = c("own", "gym_agent"))
+  expect_identical(iteration_candidates(own), 0L)
+})
