@@ -47,7 +47,8 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     # Whose observations count must not depend on when others end.
-    steps = list(), frames = list(), target = if (!keep_moments) target, each = each, report = report,
+    target = if (!keep_moments) target, each = each,
+    steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
     keep_next = keep_next, learner = learner, at_once = at_once, slice = slice, streams = streams,
     draws = length(streams) > 1L && inherits(policy, "gym_policy_random"),

@@ -29,9 +29,9 @@
 #'
 #' Where the package progressr is loaded its handlers are told of the progress.
 #'
-#' Set `options(socketOptions = "no-delay")` before the plan, above all for workers that play a batch
-#' in less than a second: without it, R waits some 40 ms for an acknowledgement in the middle of
-#' every message to a worker that has more than a few thousand bytes.
+#' Set `options(socketOptions = "no-delay")` before the plan, above all where a batch takes less
+#' than a second: without it, R waits some 40 ms for an acknowledgement in the middle of every
+#' message to a worker that has more than a few thousand bytes.
 #'
 #' @section A worker that is lost:
 #' When a worker dies, its server fails, or it is silent for longer than the option

@@ -240,9 +240,9 @@ report_rates <- function(namespaces, turns = 6L) {
   ratios <- grep("ratio", names(medians))
   medians[ratios] <- round(medians[ratios], 2)
   medians[-ratios] <- round(medians[-ratios])
-  show_table("Steps a second of LunarLander-v3 on one and on two hosts, their ratio, and of a batch on
-two hosts the milliseconds: all, those beside the slowest worker's own, those until the next batch
-begins; medians of turns", medians)
+  show_table("Steps a second of LunarLander-v3 on one and on two hosts, their ratio, and of a batch
+on two hosts the milliseconds: all, those beside the slowest worker's own, those until the next
+batch begins; medians of turns", medians)
 }
 
 # Faults ---------------------------------------------------------------------------------
