@@ -27,7 +27,6 @@ do_tasks <- function(next_task, deadline, call) {
     broken = FALSE, deadline = deadline, call = call
   )
   on.exit(the_session$left_futures <- c(the_session$left_futures, futures_of(crew)), add = TRUE)
-  collect_left_futures()
   repeat {
     launch_tasks(crew)
     if (!length(crew$running)) {
@@ -118,6 +117,7 @@ take_task <- function(crew) {
 }
 
 launch_tasks <- function(crew) {
+  collect_left_futures()
   while (!crew$broken && free_workers() > 0 && !is.null(one <- take_task(crew))) {
     one$tries <- one$tries + 1L
     one$future <- tryCatch(launch(one$task), error = function(cnd) cnd)
