@@ -61,7 +61,7 @@ test_that("results are the same with none and with two workers", {
   expect_identical(everything(), alone)
 })
 
-test_that("a search that normalises has the same moments, whatever the workers play beyond its end", {
+test_that("a search that normalises has the same moments, whoever plays beyond its end", {
   search <- function() {
     search <- search_random(
       "Acrobot-v1", policy_network(c(6, 3), normalize = TRUE), rounds = 40, target = -400, seed = 1
