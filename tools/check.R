@@ -1,4 +1,5 @@
 # Builds the package and checks it, both in a temporary folder, and says what the check found.
+# The vignettes are computed once, by the build.
 # Fails on errors and warnings, and on notes but those that say something of the machine.
 
 excusable <- c(
@@ -32,7 +33,7 @@ check_package <- function(folder) {
   if (r_cmd("build", "gym") != 0) stop("R CMD build failed", call. = FALSE)
   tarball <- list.files(pattern = "^gym_.*[.]tar[.]gz$")
   Sys.setenv("_R_CHECK_FORCE_SUGGESTS_" = "false")
-  status <- r_cmd("check", "--no-manual", tarball)
+  status <- r_cmd("check", "--no-manual", "--no-vignettes", tarball)
   log <- file.path("gym.Rcheck", "00check.log")
   bad <- inexcusable(log)
   for (output in list.files("gym.Rcheck", "[.]fail$", recursive = TRUE, full.names = TRUE)) {

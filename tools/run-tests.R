@@ -1,12 +1,15 @@
 # Runs tests/testthat against the installed package and closes with one line of counts.
-#   Rscript tools/run-tests.R [LIBRARY]
+#   Rscript tools/run-tests.R [PATTERN]     PATTERN chooses files: what stands after "test-"
 # A test is one test_that() block: failed when anything in it failed, skipped when it was skipped
-# or holds no expectation. With LIBRARY, what that library holds must have been loaded from there.
+# or holds no expectation. Where GYM_R_LIBRARY names a library of the checkout, what that library
+# holds must be loaded from there. GYM_TEST_CPUS processes play the files, each with a server.
 
 # As the package has it when it loads processx itself, which testthat loads before it.
 Sys.setenv(PROCESSX_NOTIFY_OLD_SIGCHLD = "true")
 library(testthat)
-Sys.setenv(NOT_CRAN = "true")
+Sys.setenv(
+  NOT_CRAN = "true", TESTTHAT_PARALLEL = "TRUE", TESTTHAT_CPUS = Sys.getenv("GYM_TEST_CPUS", "3")
+)
 Sys.unsetenv("GYM_SERVER_URL")
 options(testthat.summary.max_reports = Inf)
 
@@ -21,6 +24,12 @@ state_of <- function(test) {
   } else {
     "outside of any test"
   }
+}
+
+# Loads the package as the processes that run the tests do.
+load_packages <- function() {
+  imports <- names(getNamespaceImports(loadNamespace("gym")))
+  for (package in setdiff(imports, c("", "base"))) loadNamespace(package)
 }
 
 loaded_from <- function() {
@@ -42,16 +51,17 @@ not_loaded_from <- function(library) {
   union(astray, setdiff(c("gym", "httr", "curl", "testthat"), held))
 }
 
-run_tests <- function(library) {
+run_tests <- function(pattern, library = Sys.getenv("GYM_R_LIBRARY")) {
+  load_packages()
   results <- test_dir(
-    "tests/testthat",
-    package = "gym", load_package = "installed", reporter = "summary", stop_on_failure = FALSE
+    "tests/testthat", filter = pattern, package = "gym", load_package = "installed",
+    reporter = "summary", stop_on_failure = FALSE
   )
   states <- vapply(results, state_of, "")
   count <- function(state) sum(states == state)
 
   cat("\n", R.version.string, "; ", versions_of(loadedNamespaces()), "\n", sep = "")
-  astray <- if (length(library) == 1) not_loaded_from(library)
+  astray <- if (nzchar(library)) not_loaded_from(library)
   if (length(astray) > 0) cat("Not loaded from ", library, ": ", toString(astray), "\n", sep = "")
   cat(sprintf(
     "R tests: %d passed, %d failed, %d skipped\n",
@@ -60,4 +70,5 @@ run_tests <- function(library) {
   count("passed") > 0 && count("failed") == 0 && length(astray) == 0
 }
 
-quit(status = if (run_tests(commandArgs(trailingOnly = TRUE))) 0 else 1)
+arguments <- commandArgs(trailingOnly = TRUE)
+quit(status = if (run_tests(if (length(arguments)) arguments[[1]])) 0 else 1)

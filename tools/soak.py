@@ -105,6 +105,14 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "processes": python("guests", "processes", 1 if quick else 5),
         "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/processes/test_worker_process.py"),
+        "environments": pytest("tests/test_environments.py", GYM_TEST_ENVIRONMENTS="all"),
+        "parity": testthat("parity", GYM_TEST_PARITY="all"),
+        "orders": testthat("train-orders", GYM_TEST_ORDERS=1000),
+        "spaces": testthat("round-trips", GYM_TEST_SPACES=300),
+        "futures": testthat("play-futures", GYM_TEST_ALL="true", GYM_TEST_FUTURES="all"),
+        "hosts": testthat("hosts", GYM_TEST_ALL="true", GYM_TEST_HOSTS="all"),
+        "book": testthat("book-vignettes", GYM_TEST_BOOK="all"),
+        "tables": testthat("learn-table", GYM_TEST_TABLES="all"),
         "soak": python("soak", lasting(1800, 60)),
     }
 

@@ -13,6 +13,9 @@ skip_unless_all <- function() {
   testthat::skip_if_not(tests_all(), "left to make test-all")
 }
 
+# Whether a part of `make soak` runs, which sets this variable: for what takes minutes to prove.
+soaks <- function(variable) identical(Sys.getenv(variable), "all")
+
 skip_if_no_server <- function() {
   testthat::skip_if_not(
     can_start_server(), "no Python that can run the server (GYM_PYTHON names one)"

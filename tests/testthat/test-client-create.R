@@ -53,7 +53,7 @@ test_that("an answer that does not come within the timeout is an error", {
 test_that("whatever way a server is dead, the error comes within the timeout, with what helps", {
   skip_unless_all()
   for (how in c("silent", "half", "full", "cut")) {
-    client <- create_GymClient(local_stalling(how), timeout = 1)
+    client <- create_GymClient(local_stalling(how), timeout = 0.5)
     for (call in list(env_list_all, function(x) env_create(x, "CartPole-v1"))) {
       # Where it is not noticed this test hangs for a minute.
       taken <- system.time(error <- expect_error(call(client), class = "gym_error_connection"))

@@ -16,7 +16,7 @@ test_that("what the info forbids is never taken, with one sub-environment and wi
   for (learn in learners) {
     for (num_envs in c(1, 3)) {
       learned <- learn(
-        "Taxi-v4", iterations = 2, episodes = 4, seed = 1, mask = "action_mask",
+        "Taxi-v4", iterations = 1, episodes = 3, seed = 1, mask = "action_mask", eval_episodes = 2,
         num_envs = num_envs, num_workers = 0, target = Inf
       )
       # Whoever picks up or drops where it cannot be done pays 10.
