@@ -94,9 +94,13 @@ def sub_envs(create):
 
 
 class ServerProcess:
-    """A real server in a process of its own."""
+    """A real server in a process of its own.
 
-    def __init__(self, *arguments, **variables):
+    Constants of its modules can have other values, so that nobody waits for them in full:
+    ``limits={"gym_server.cli.main._GRACE_SECONDS": 1}``.
+    """
+
+    def __init__(self, *arguments, limits=None, **variables):
         environment = {
             **os.environ,
             **variables,
@@ -105,8 +109,11 @@ class ServerProcess:
             ),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
+        program = ["-m", "gym_server"]
+        if limits is not None:
+            program = [str(TESTS / "serve_with_limits.py"), json.dumps(limits)]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "gym_server", *arguments],
+            [sys.executable, *program, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -142,6 +149,14 @@ class ServerProcess:
         assert status == 200, answer
         return f"/v1/envs/{answer['instance_id']}"
 
+    def takes_no_more(self):
+        """Tell whether it lets nobody in any more, which is the first thing it does to stop."""
+        try:
+            self.socket().close()
+        except ConnectionError:
+            return True
+        return False
+
     def stop(self, how=signal.SIGTERM, timeout=30):
         """Stop it and return exit status, standard output and standard error."""
         if how is not None:
@@ -156,21 +171,64 @@ class ServerProcess:
             pipe.close()
 
 
+ON_A_FREE_PORT = ("--port", "0", "--allow-module", "faulty_envs")
+
+# Limits of a server that leaves alone after a second what hangs when it stops.
+SHORT_GRACE = {"gym_server.cli.main._GRACE_SECONDS": 1, "gym_server.cli.main._LAST_SECONDS": 1}
+
+
 @pytest.fixture
 def serve():
     """Start a server on a free port; it is gone when the test is over."""
     servers = []
 
-    def serve(*arguments, **variables):
-        server = ServerProcess(
-            "--port", "0", "--allow-module", "faulty_envs", *arguments, **variables
-        )
-        servers.append(server)
-        return server
+    def serve(*arguments, **how):
+        servers.append(ServerProcess(*ON_A_FREE_PORT, *arguments, **how))
+        return servers[-1]
 
     yield serve
     for server in servers:
         server.kill()
+
+
+@pytest.fixture(scope="module")
+def _server_of_a_file():
+    # Nobody reads its log, which would fill the pipe.
+    server = ServerProcess(*ON_A_FREE_PORT, "--log-level", "error")
+    yield server
+    server.kill()
+
+
+@pytest.fixture
+def shared(_server_of_a_file):
+    """Give a server that all tests of a file use who do not stop it; each finds it empty."""
+    yield _server_of_a_file
+    for instance_id in _server_of_a_file.get("/v1/envs/")[1]["all_envs"]:
+        _server_of_a_file.post(f"/v1/envs/{instance_id}/close/")
+
+
+class Gate:
+    """Keeps the environment ``Gated`` from going on until the test lets it."""
+
+    def __init__(self, directory):
+        self._begun, self._open = directory / "begun", directory / "open"
+        self.kwargs = {"directory": str(directory)}
+
+    def is_reached(self):
+        return self._begun.exists()
+
+    def open(self):
+        self._open.touch()
+
+
+@pytest.fixture
+def gate(tmp_path):
+    """Give a gate; what still waits at it when the test is over goes on then."""
+    directory = tmp_path / "gate"
+    directory.mkdir()
+    gate = Gate(directory)
+    yield gate
+    gate.open()
 
 
 TOKEN = "correct-horse-battery"
@@ -186,7 +244,7 @@ def attacked(tmp_path_factory):
         (root / "models" / "out.xml").symlink_to("/etc/passwd")
     options = {"--monitor-dir": root / "runs", "--allow-path": root / "models"}
     server = ServerProcess(
-        *("--port", "0", "--allow-module", "faulty_envs"),
+        *ON_A_FREE_PORT,
         *(str(word) for option in options.items() for word in option),
         GYM_SERVER_TOKEN=TOKEN,
     )

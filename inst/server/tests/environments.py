@@ -5,6 +5,7 @@ For tests: ``runnable()`` and ``not_runnable()`` are written out from the regist
 
 import contextlib
 import importlib
+import os
 
 import gymnasium
 from gymnasium.envs.registration import EnvSpec
@@ -53,11 +54,25 @@ def runnable() -> list[str]:
     return [spec.id for spec in REGISTERED if reason(spec) is None]
 
 
-def sampled() -> list[str]:
-    """Return the same, but of the hundreds of Atari games, which take minutes, some only."""
-    atari = [env_id for env_id in runnable() if env_id in ATARI]
-    left_out = set(atari) - set(atari[::16])
-    return [env_id for env_id in runnable() if env_id not in left_out]
+def atari_played() -> list[str]:
+    """Return the ids of Atari games to play: each game once, and each kind of id again and again.
+
+    ``GYM_TEST_ENVIRONMENTS=all`` plays a game by each of its ids; ``make soak`` does.
+    """
+    atari = [spec for spec in REGISTERED if spec.id in ATARI and reason(spec) is None]
+    if os.environ.get("GYM_TEST_ENVIRONMENTS") == "all":
+        return [spec.id for spec in atari]
+    games: dict[str, list[str]] = {}
+    for spec in atari:
+        games.setdefault(spec.kwargs["game"], []).append(spec.id)
+    return [ids[turn % len(ids)] for turn, ids in enumerate(games.values())]
+
+
+def kind_of_id(env_id: str) -> str:
+    """Return what is the same in the ids of all Atari games, such as ``NoFrameskip-v4``."""
+    name, _, version = env_id.rpartition("-")
+    namespace, _, game = name.rpartition("/")
+    return f"{namespace}{'NoFrameskip' if game.endswith('NoFrameskip') else ''}-{version}"
 
 
 def not_runnable() -> dict[str, str]:

@@ -16,9 +16,11 @@ def read_answer(connection):
     head, _, body = data.partition(b"\r\n\r\n")
     lines = head.decode().split("\r\n")
     headers = dict(line.lower().split(": ", 1) for line in lines[1:])
+    body = bytearray(body)
     while len(body) < int(headers.get("content-length", 0)):
-        body, packets = body + _receive(connection), packets + 1
-    return int(lines[0].split()[1]), headers, body, packets
+        body += _receive(connection)
+        packets += 1
+    return int(lines[0].split()[1]), headers, bytes(body), packets
 
 
 def _receive(connection):

@@ -3,11 +3,10 @@
 import http.client
 import json
 import os
-import socket
 from contextlib import closing
 
 import pytest
-from conftest import TOKEN
+from conftest import ON_A_FREE_PORT, TOKEN, ServerProcess
 
 from gym_server.cli import main
 
@@ -18,6 +17,14 @@ def token_file(tmp_path):
     file.write_text(TOKEN + "\n")
     file.chmod(0o600)
     return file
+
+
+@pytest.fixture(scope="module")
+def locked():
+    """Start a server that asks for the token of the variable."""
+    server = ServerProcess(*ON_A_FREE_PORT, "--log-level", "error", GYM_SERVER_TOKEN=TOKEN)
+    yield server
+    server.kill()
 
 
 def ask(server, method="GET", path="/v1/health/", body=None, token=TOKEN, **headers):
@@ -41,19 +48,17 @@ def test_a_token_from_a_file_opens_a_server_that_others_can_reach(serve, token_f
     assert (status, TOKEN in output + errors) == (0, False)
 
 
-def test_a_token_from_the_variable_is_asked_for_on_loopback_too(serve):
-    server = serve(GYM_SERVER_TOKEN=TOKEN)
-    assert ask(server)[0] == 200
-    assert ask(server, token=None)[0] == 401
+def test_a_token_from_the_variable_is_asked_for_on_loopback_too(locked):
+    assert ask(locked)[0] == 200
+    assert ask(locked, token=None)[0] == 401
 
 
-def test_who_shows_no_token_gets_one_answer_a_connection(serve):
-    server = serve(GYM_SERVER_TOKEN=TOKEN)
+def test_who_shows_no_token_gets_one_answer_a_connection(locked):
     paths = {"/v1/health/": 401, "/v1/envs/00000000/watch/watch.js": 200}
     for path, status in paths.items():
         for token, closes in ((None, "close"), (TOKEN, None)):
             headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-            with closing(server.connect()) as connection:
+            with closing(locked.connect()) as connection:
                 connection.request("GET", path, headers=headers)
                 answer = connection.getresponse()
                 assert answer.status == (status if token is None else 200)
@@ -128,24 +133,22 @@ def test_shutdown_can_be_switched_off(serve):
 
 
 @pytest.mark.slow
-def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve):
+def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve, shared, locked):
     body = {"env_id": "Ant-v5", "kwargs": {"xml_file": "/no/such.xml"}}
 
-    def refused_by_us(*options, **variables):
-        answer = ask(serve(*options, **variables), "POST", "/v1/envs/", body)[1]
-        return "may be a path" in answer["message"]
+    def refused_by(server):
+        return "may be a path" in ask(server, "POST", "/v1/envs/", body)[1]["message"]
 
-    assert not refused_by_us()
-    assert refused_by_us(GYM_SERVER_TOKEN=TOKEN)
-    assert refused_by_us("--host", "0.0.0.0", "--no-auth")
-    assert not refused_by_us("--allow-path", "/no", GYM_SERVER_TOKEN=TOKEN)
+    assert not refused_by(shared)
+    assert refused_by(locked)
+    assert refused_by(serve("--host", "0.0.0.0", "--no-auth"))
+    assert not refused_by(serve("--allow-path", "/no", GYM_SERVER_TOKEN=TOKEN))
 
 
-def test_http_1_0_needs_no_host(serve):
-    server = serve()
-    with server.socket() as connection:
+def test_http_1_0_needs_no_host(shared):
+    with shared.socket() as connection:
         connection.sendall(b"GET /v1/health/ HTTP/1.0\r\n\r\n")
         assert connection.recv(1000).startswith(b"HTTP/1.1 200")
-    with socket.create_connection(("127.0.0.1", server.port)) as connection:
+    with shared.socket() as connection:
         connection.sendall(b"GET /v1/health/ HTTP/1.1\r\n\r\n")
         assert connection.recv(1000).startswith(b"HTTP/1.1 400")

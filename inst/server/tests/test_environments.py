@@ -1,34 +1,62 @@
+from collections import Counter
+
 import environments
+import gymnasium
 import numpy as np
 import pytest
 
 from gym_server.protocol.safetensors import TENSORS, read
 
-SAMPLED = environments.sampled()
-REST = [env_id for env_id in environments.runnable() if env_id not in SAMPLED]
+OTHERS = [env_id for env_id in environments.runnable() if env_id not in environments.ATARI]
+ATARI = environments.atari_played()
+
+
+def played(client, url, how):
+    """Return the answers to a reset and to a step, and what is drawn then."""
+    first = client.post(f"{url}/reset/", headers={"Accept": how})
+    action = client.get(f"{url}/action_space/sample").json["action"]
+    later = client.post(f"{url}/step/", json={"action": action}, headers={"Accept": how})
+    assert later.status_code == 200, later.json
+    drawn = client.get(f"{url}/render/", headers={"Accept": TENSORS})
+    frame = read(drawn.data).tensors["frame"].array()
+    height, width, channels = frame.shape
+    assert (frame.dtype, channels) == (np.uint8, 3)
+    assert min(height, width) > 50
+    return first, later, frame
+
+
+@pytest.mark.parametrize("env_id", OTHERS)
+def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
+    url = create(env_id, seed=1)
+    first, later, frame = played(client, url, "application/json")
+    # Some observations lie outside of what their environments promise, none has another shape.
+    assert np.shape(later.json["observation"]) == np.shape(first.json["observation"])
+    assert np.ptp(frame) > 50
+    assert client.post(f"{url}/close/").status_code == 204
 
 
 @pytest.mark.parametrize(
-    "env_id", [*SAMPLED, *(pytest.param(env_id, marks=pytest.mark.slow) for env_id in REST)]
+    "env_id",
+    # Every eighth is of another kind than the one before.
+    [pytest.param(i, marks=[pytest.mark.slow] if n % 8 else []) for n, i in enumerate(ATARI)],
 )
-def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
-    url = create(env_id, seed=1)
-    observation = client.post(f"{url}/reset/").json["observation"]
-    action = client.get(f"{url}/action_space/sample").json["action"]
-    answer = client.post(f"{url}/step/", json={"action": action})
-    assert answer.status_code == 200, answer.json
-    # Some observations lie outside of what their environments promise, none has another shape.
-    assert np.shape(answer.json["observation"]) == np.shape(observation)
-    frame = read(client.get(f"{url}/render/", headers={"Accept": TENSORS}).data).tensors["frame"]
-    height, width, channels = frame.shape
-    assert (frame.dtype, channels) == ("U8", 3)
-    assert min(height, width) > 50
-    if env_id in environments.ATARI:
-        # Some of them are black in the beginning, but what is observed is what is drawn.
-        assert np.array_equal(frame.array(), answer.json["observation"])
-    else:
-        assert np.ptp(frame.array()) > 50
+def test_an_atari_game_is_made_reset_stepped_and_drawn(client, create, env_id):
+    # Without a seed, for which the emulator loads the game once more.
+    url = create(env_id)
+    first, later, frame = played(client, url, TENSORS)
+    before, after = (read(one.data).tensors["observation"].array() for one in (first, later))
+    assert after.shape == before.shape
+    # Some of them are black in the beginning, but what is observed is what is drawn.
+    assert np.array_equal(frame, after)
     assert client.post(f"{url}/close/").status_code == 204
+
+
+def test_every_atari_game_and_every_kind_of_id_is_played():
+    games = {gymnasium.spec(env_id).kwargs["game"] for env_id in environments.ATARI}
+    assert {gymnasium.spec(env_id).kwargs["game"] for env_id in ATARI} == games
+    kinds = Counter(map(environments.kind_of_id, ATARI))
+    assert kinds.keys() == set(map(environments.kind_of_id, environments.ATARI))
+    assert all(count > 1 for count in kinds.values())
 
 
 @pytest.mark.parametrize(("env_id", "why"), environments.not_runnable().items())
@@ -48,7 +76,6 @@ def test_none_is_left_out(client):
 
 def _of_the_tests():
     import faulty_envs  # noqa: F401 - it registers them
-    import gymnasium
 
     return [
         spec.id

@@ -4,14 +4,19 @@ import json
 import socket
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 from raw_http import answered, read_answer, request
 
+# The longest that a client is waited for at the stop that has sent half a request, or does not
+# read what a watcher gets.
+SOON_DROPPED = {"gym_server.http_server.server._HALF_SENT_SECONDS": 0.5}
+
 
 @pytest.fixture
 def server(serve):
-    return serve()
+    return serve(limits=SOON_DROPPED)
 
 
 @pytest.fixture
@@ -52,50 +57,56 @@ def test_the_stop_does_not_wait_for_watchers(server, pole):
         watcher.close()
 
 
-def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, pole):
-    deaf = server.socket()
-    thread = threading.Thread(target=ask_for_ever, args=(deaf, pole), daemon=True)
-    thread.start()
-    step(server, pole, 50)
-    time.sleep(1)
+@pytest.fixture
+def deaf(server, pole):
+    """Ask on and on, and never read, until the server can send no more to this watcher."""
+    with server.socket() as connection:
+        asked = []
+
+        def ask_for_ever():
+            with suppress(OSError):
+                while True:
+                    connection.sendall(ask(pole))
+                    asked.append(time.monotonic())
+
+        thread = threading.Thread(target=ask_for_ever, daemon=True)
+        thread.start()
+        # It sends nothing any more, because the server reads nothing any more.
+        while not asked or time.monotonic() < asked[-1] + 0.3:
+            time.sleep(0.05)
+        yield
+        with suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)
+        thread.join()
+
+
+def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, deaf):
+    # Less than a request under way may take.
     assert server.stop(timeout=8)[0] == 0
-    deaf.close()
-    thread.join()
 
 
 @pytest.mark.slow
-def test_what_is_asked_after_watching_is_answered_at_the_stop(server):
-    url = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 4})
+def test_what_is_asked_after_watching_is_answered_at_the_stop(server, gate, eventually):
+    url = server.create("faulty_envs:Gated-v0", kwargs=gate.kwargs)
     server.post(f"{url}/reset/")
     with server.socket() as connection:
         assert answered(connection, ask(url))[0] == 200
         connection.sendall(request("POST", f"{url}/step/", b'{"action":0}'))
-        time.sleep(0.5)
+        eventually(gate.is_reached)
         server.process.terminate()
+        eventually(server.takes_no_more)
+        # For longer than a watcher that does not read is waited for.
+        time.sleep(1)
+        gate.open()
         assert read_answer(connection)[0] == 200
 
 
-def ask_for_ever(connection, url):
-    try:
-        while True:
-            connection.sendall(ask(url))
-    except OSError:
-        pass
-
-
-def test_a_watcher_that_never_reads_holds_nobody_up(server, pole):
-    deaf = server.socket()
-    thread = threading.Thread(target=ask_for_ever, args=(deaf, pole), daemon=True)
-    thread.start()
-    time.sleep(0.5)
+def test_a_watcher_that_never_reads_holds_nobody_up(server, pole, deaf):
     seen = look(server, pole)
     for count in range(1, 6):
         step(server, pole, 20)
         while seen["steps"] < 20 * count:
             seen = look(server, pole, seen["number"])
-    deaf.shutdown(socket.SHUT_RDWR)
-    thread.join()
-    deaf.close()
 
 
 def test_a_watcher_that_left_stops_the_drawing(server, pole):
@@ -106,5 +117,5 @@ def test_a_watcher_that_left_stops_the_drawing(server, pole):
     # One that it still waited for, and no more.
     for _ in range(5):
         step(server, pole, 10)
-        time.sleep(0.1)
+        time.sleep(0.05)
     assert look(server, pole)["number"] <= number + 2

@@ -41,12 +41,20 @@ def picture(browser):
     return browser.execute_script("return document.getElementById('picture').toDataURL()")
 
 
-def pictures(browser, seconds=1.5):
+def pictures(browser, seconds=0.7):
     """Return the different pictures that are shown for a while."""
     seen, end = set(), time.monotonic() + seconds
     while time.monotonic() < end:
         seen.add(picture(browser))
     return seen
+
+
+def moves(browser, seconds=20):
+    """Tell, as soon as it is so, that the pictures change again and again."""
+    seen, end = set(), time.monotonic() + seconds
+    while len(seen) <= 5 and time.monotonic() < end:
+        seen.add(picture(browser))
+    return len(seen) > 5
 
 
 def complaints(browser):

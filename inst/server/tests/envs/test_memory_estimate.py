@@ -82,11 +82,6 @@ def nothing_large(monkeypatch):
             {"name": "AddRenderObservation"},
             {"name": "DiscretizeObservation", "kwargs": {"bins": 10_000}},
         ],
-        [
-            {"name": "AddRenderObservation"},
-            {"name": "DiscretizeObservation", "kwargs": {"bins": 255, "multidiscrete": True}},
-            {"name": "FlattenObservation"},
-        ],
     ],
     ids=lambda wrappers: "-".join(wrapper["name"][:12] for wrapper in wrappers),
 )
@@ -102,6 +97,20 @@ def test_nested_wrappers_are_refused_before_they_take_memory(
     assert "--max-memory-mb" in answer.json["hint"]
     # Nothing of it stays taken.
     assert client.application._instances._budget.left == 4096 * MB
+
+
+@pytest.mark.parametrize(("num_envs", "most"), [(None, 200), (2, 400)])
+def test_what_discretizing_multiplies_is_refused_before_it_is_flattened(limited, num_envs, most):
+    # Small pictures and little memory: to discretize each number of a picture takes time.
+    wrappers = [
+        {"name": "AddRenderObservation"},
+        {"name": "ResizeObservation", "kwargs": {"shape": [110, 110]}},
+        {"name": "DiscretizeObservation", "kwargs": {"bins": 255, "multidiscrete": True}},
+        {"name": "FlattenObservation"},
+    ]
+    answer = create(limited(most), wrappers=wrappers, num_envs=num_envs)
+    assert refused(answer), answer.json
+    assert "FlattenObservation" in answer.json["message"]
 
 
 def test_atari_stacks_of_its_own_are_estimated(limited):

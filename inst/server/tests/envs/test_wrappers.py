@@ -25,7 +25,8 @@ def wrapped(name, **kwargs):
 
 # Each wrapper that Gymnasium may have, with arguments, and an environment that it fits.
 EXAMPLES = [
-    ("CartPole-v1", wrapped("AddRenderObservation", render_only=False)),
+    # Whose pictures are small.
+    ("faulty_envs:Drawing-v0", wrapped("AddRenderObservation", render_only=False)),
     ("CartPole-v1", wrapped("AddWhiteNoise", probability_of_noise_per_pixel=0.5)),
     ("Pendulum-v1", wrapped("ClipAction")),
     ("CartPole-v1", wrapped("ClipReward", min_reward=-1, max_reward=0.5)),
@@ -196,7 +197,11 @@ def test_what_draws_in_each_step_does_so_on_the_render_thread(client, create):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "chosen", [[wrapped("FrameStackObservation", stack_size=2)], [wrapped("AddRenderObservation")]]
+    "chosen",
+    [
+        [wrapped("FrameStackObservation", stack_size=2)],
+        [wrapped("AddRenderObservation"), wrapped("ResizeObservation", shape=[40, 60])],
+    ],
 )
 def test_a_wrapped_environment_is_monitored(client, create, monitor_dir, chosen):
     pytest.importorskip("moviepy")

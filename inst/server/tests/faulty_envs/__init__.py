@@ -8,7 +8,14 @@ import gymnasium
 
 from faulty_envs.counting import Counting
 from faulty_envs.drawing import Drawing, OldRenderModes
-from faulty_envs.hanging import Hanging, HangsWhenClosedElsewhere, HangsWhere, Meeting, Spins
+from faulty_envs.hanging import (
+    Gated,
+    Hanging,
+    HangsWhenClosedElsewhere,
+    HangsWhere,
+    Meeting,
+    Spins,
+)
 from faulty_envs.odd_spaces import (
     SPACES,
     CustomSpace,
@@ -44,6 +51,7 @@ for _kind in (
     Drawing,
     Echo,
     ExitsInStep,
+    Gated,
     Hanging,
     HangsWhenClosedElsewhere,
     HangsWhere,

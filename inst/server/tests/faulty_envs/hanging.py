@@ -32,6 +32,37 @@ class Meeting(Counting):
         return super().step(action)
 
 
+class Gated(Counting):
+    """Waits until a test lets it go on, in its step or, where its kwarg says so, in its drawing.
+
+    It makes a file "begun" in a directory then, and waits for a file "open".
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(self, directory, where="step", render_mode=None, **kwargs):
+        super().__init__(**kwargs)
+        self.directory, self.where, self.render_mode = Path(directory), where, render_mode
+
+    def wait(self, here):
+        if self.where != here:
+            return
+        (self.directory / "begun").touch()
+        end = time.monotonic() + 60
+        while not (self.directory / "open").exists():
+            if time.monotonic() > end:
+                raise RuntimeError("Nobody let it go on")
+            time.sleep(0.01)
+
+    def step(self, action):
+        self.wait("step")
+        return super().step(action)
+
+    def render(self):
+        self.wait("render")
+        return np.zeros((2, 2, 3), dtype=np.uint8)
+
+
 class HangsWhere(Counting):
     """Hangs for some seconds where its kwarg says: in "init", "reset", "render" or "close"."""
 

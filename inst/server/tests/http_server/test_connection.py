@@ -99,9 +99,9 @@ def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
 
 def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
     client, _ = converse()
-    client.sendall(GET % b"%d" % 2**22)
+    client.sendall(GET % b"%d" % 2**21)
     began, received = time.monotonic(), len(read_head(client))
-    while received < 2**22:
+    while received < 2**21:
         # Twice as fast as it has to be, for longer than nothing may be read.
         time.sleep(max(0, began + received / 2**21 - time.monotonic()))
         received += len(client.recv(65536))
@@ -111,10 +111,12 @@ def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
 
 def test_a_client_that_is_recognized_may_be_silent_for_long(converse):
     client, _ = converse()
-    for _ in range(2):
-        client.sendall(GET % b"")
-        assert b"200 OK" in read_head(client)
-        time.sleep(1.2)
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
+    # Longer than it may be while it sends or reads.
+    time.sleep(1)
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
 
 
 # Clients that are not recognized -------------------------------------------------------------

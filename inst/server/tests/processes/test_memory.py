@@ -6,6 +6,7 @@ import sys
 import weakref
 
 import pytest
+from conftest import created
 
 from gym_server.manager import watchdog
 from gym_server.processes import memory
@@ -81,12 +82,14 @@ def test_what_threads_have_freed_does_not_stay(script):
     assert int(measured.stdout) < 8
 
 
-def test_the_watchdog_sees_to_it(monkeypatch, client, create, eventually):
+def test_the_watchdog_sees_to_it(monkeypatch, quick, eventually):
     given_back = []
+    monkeypatch.setattr(watchdog, "_LONGEST_TICK", 0.05)
     monkeypatch.setattr(watchdog, "_GIVE_BACK_SECONDS", 0.0)
     monkeypatch.setattr(memory, "give_back", given_back.append)
+    client = quick().test_client()
     eventually(lambda: len(given_back) > 1)
     assert not any(given_back)
-    client.post(f"{create()}/close/")
+    client.post(f"{created(client)}/close/")
     eventually(lambda: any(given_back))
     eventually(lambda: not given_back[-1])

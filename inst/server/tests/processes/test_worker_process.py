@@ -206,29 +206,31 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve):
 
 
 def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
-    server = serve("--max-call-seconds", "4")
-    other, stopped = rogue(server, does="nothing")
+    # Ample for what does not hang, also where a process starts for it.
+    server = serve("--max-call-seconds", "3")
+    other, _ = rogue(server, does="nothing")
     url, pid = rogue(server, does="never_returns")
-
-    def step(_):
-        return server.post(f"{url}/step/", {"action": 0})
-
-    with ThreadPoolExecutor() as calls:
-        # One hangs, and the others wait for it.
-        answers = [*calls.map(step, range(3)), step(None)]
-    assert [(status, answer["code"]) for status, answer in answers] == [(504, "call_too_long")] * 4
-    eventually(lambda: not is_running(pid))
+    still, stopped = rogue(server, does="nothing")
     kwargs = {"does": "never_returns", "at": "constructor"}
-    status, answer = server.post("/v1/envs/", {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs})
-    assert (status, answer["code"]) == (504, "call_too_long")
-    assert list(server.get("/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
-    assert server.post(f"{other}/step/", {"action": 0})[0] == 200
-    # Also one that is asked while nothing moves.
+    making = {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs}
     os.kill(stopped, signal.SIGSTOP)
     eventually(lambda: is_stopped(stopped))
-    status, answer = server.get(f"{other}/action_space/")
-    assert (status, answer["code"]) == (504, "call_too_long")
-    eventually(lambda: not is_running(stopped))
+
+    def step(_=None):
+        return server.post(f"{url}/step/", {"action": 0})
+
+    # At the same time, so that the limit is waited for once.
+    with ThreadPoolExecutor() as calls:
+        # One hangs, and the others wait for it.
+        steps = calls.map(step, range(3))
+        made = calls.submit(server.post, "/v1/envs/", making)
+        # Also one that is asked while nothing moves.
+        asked = calls.submit(server.get, f"{still}/action_space/")
+        answers = [*steps, made.result(), asked.result(), step()]
+    assert [(status, answer["code"]) for status, answer in answers] == [(504, "call_too_long")] * 6
+    eventually(lambda: not is_running(pid) and not is_running(stopped))
+    assert list(server.get("/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
+    assert server.post(f"{other}/step/", {"action": 0})[0] == 200
 
 
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):

@@ -1,6 +1,7 @@
 import os
 import signal
-import time
+import threading
+from types import SimpleNamespace
 
 import gymnasium
 import pytest
@@ -77,18 +78,43 @@ def test_they_end_after_a_while(warm, eventually):
     eventually(lambda: not any(map(is_running, pids)))
 
 
-def test_none_waits_longer_because_another_one_came_later(warm, eventually):
+class Clock:
+    """Stands in for the modules ``time`` and ``threading``; its timers ring when told to."""
+
+    Lock = threading.Lock
+
+    def __init__(self):
+        self.now, self.timers = 0.0, []
+
+    def monotonic(self):
+        return self.now
+
+    def Timer(self, seconds, ring):  # noqa: N802
+        self.timers.append((self.now + seconds, ring))
+        return SimpleNamespace(start=lambda: None)
+
+    def go_on_to_the_next_timer(self):
+        self.now, ring = self.timers.pop(0)
+        ring()
+
+
+def test_none_waits_longer_because_another_one_came_later(warm, monkeypatch, eventually):
+    clock = Clock()
+    for module in ("time", "threading"):
+        monkeypatch.setattr(f"gym_server.vector_envs.warm_processes.{module}", clock)
     pool = warm(most=2, idle_seconds=2.0)
     first, second = pool.take(), pool.take()
     pool.put(first)
-    time.sleep(1.4)
+    clock.now = 1.5
     pool.put(second)
-    began = time.monotonic()
+    clock.go_on_to_the_next_timer()
+    assert clock.now == 2
     eventually(lambda: not is_running(first.pid))
     assert is_running(second.pid)
+    clock.go_on_to_the_next_timer()
+    assert clock.now == 3.5
     eventually(lambda: not is_running(second.pid))
-    # Not after twice as long, when the timer would ring again.
-    assert time.monotonic() - began < 2.5
+    assert clock.timers == []
 
 
 def test_one_that_has_ended_takes_no_place(warm, eventually):

@@ -11,7 +11,10 @@ from gym_server.viewing import viewer
 
 @pytest.fixture
 def occupied(app, client, faulty, watch):
-    """Have another environment draw for as long as the test does not call what it is given."""
+    """Have another environment draw for as long as the test does not call what it is given.
+
+    What the test makes has to be made before: to make sub-environments takes the render thread.
+    """
     url = faulty("Drawing")
     instance, _ = watch(url)
     begun, over = threading.Event(), threading.Event()
@@ -24,23 +27,37 @@ def occupied(app, client, faulty, watch):
 
     env.draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
     client.post(f"{url}/reset/")
-    thread, _ = in_background(state, app.test_client(), url)
-    assert begun.wait(5)
-    yield over.set
+    threads = []
+
+    def occupied():
+        threads.append(in_background(state, app.test_client(), url)[0])
+        assert begun.wait(5)
+        return over.set
+
+    yield occupied
     over.set()
-    thread.join(5)
+    for thread in threads:
+        thread.join(5)
 
 
-def test_a_watcher_that_waits_for_others_drawing_holds_up_no_step(app, client, create, occupied):
+def waits_for_its_turn(app):
+    """Tell whether a watcher waits behind the one who has the render thread."""
+    return len(app._renderer._jobs) > 1
+
+
+def test_a_watcher_that_waits_for_others_drawing_holds_up_no_step(
+    app, client, create, occupied, eventually
+):
     url = create()
     client.post(f"{url}/reset/")
+    end_of_drawing = occupied()
     watcher, seen = in_background(state, app.test_client(), url)
-    time.sleep(0.3)
+    eventually(lambda: waits_for_its_turn(app))
     player, _ = in_background(play, client, url)
     player.join(5)
     assert not player.is_alive()
     assert watcher.is_alive()
-    occupied()
+    end_of_drawing()
     watcher.join(5)
     assert seen[0]["step"] == 1
     assert seen[0]["frame"] is not None
@@ -52,16 +69,18 @@ def test_who_needs_no_drawing_here_does_not_wait_for_others(
 ):
     url = create(**made) if made else faulty("Counting")
     client.post(f"{url}/reset/")
+    occupied()
     watcher, seen = in_background(state, app.test_client(), url)
     watcher.join(5)
     assert seen[0]["state"] == "running"
 
 
-def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occupied):
+def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occupied, eventually):
     url = create()
     client.post(f"{url}/reset/")
+    occupied()
     watcher, answers = in_background(app.test_client().get, f"{url}/watch/state/")
-    time.sleep(0.2)
+    eventually(lambda: waits_for_its_turn(app))
     app.end_watching()
     watcher.join(5)
     assert answers[0].json["code"] == "shutting_down"
@@ -71,6 +90,7 @@ def test_who_waits_for_others_drawing_for_long_is_told(client, create, occupied,
     monkeypatch.setattr(viewer, "_LONGEST_WAIT", 0.2)
     url = create()
     client.post(f"{url}/reset/")
+    occupied()
     assert state(client, url) == {"number": None, "state": "busy"}
 
 

@@ -30,6 +30,8 @@ export class Playback {
     clearTimeout(this.timer);
     this.timer = null;
     this.clip = [];
+    // Since when the clip is filmed; null while there is none. It may be empty in between.
+    this.filmed = null;
     this.complete = false;
   }
 
@@ -40,7 +42,7 @@ export class Playback {
       return;
     }
     const now = performance.now();
-    if (!this.clip.length && this.timer === null) {
+    if (this.filmed === null) {
       this.filmed = this.played = now;
       this.clip.push({ frame, at: now });
       this.playNext();
