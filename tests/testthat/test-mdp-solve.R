@@ -4,6 +4,7 @@ test_that("both methods find the best values, and the actions that have them", {
     expect_equal(unname(solved$values), c(0, 0.9, 1, 0), tolerance = 1e-12)
     expect_identical(solved$actions[2:3], c(1L, 1L))
     expect_equal(solved$start_value, 0.9, tolerance = 1e-12)
+    expect_equal(unname(solved$q[2:3, ]), rbind(c(0, 0.9), c(0.81, 1)), tolerance = 1e-12)
   }
 })
 
