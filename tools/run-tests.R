@@ -26,10 +26,9 @@ state_of <- function(test) {
   }
 }
 
-# Loads the package as the processes that run the tests do.
-load_packages <- function() {
-  imports <- names(getNamespaceImports(loadNamespace("gym")))
-  for (package in setdiff(imports, c("", "base"))) loadNamespace(package)
+# What the processes that run the tests find: they have the same libraries.
+load_packages <- function(library) {
+  for (package in c("gym", if (nzchar(library)) list.files(library))) loadNamespace(package)
 }
 
 loaded_from <- function() {
@@ -52,7 +51,7 @@ not_loaded_from <- function(library) {
 }
 
 run_tests <- function(pattern, library = Sys.getenv("GYM_R_LIBRARY")) {
-  load_packages()
+  load_packages(library)
   results <- test_dir(
     "tests/testthat", filter = pattern, package = "gym", load_package = "installed",
     reporter = "summary", stop_on_failure = FALSE
