@@ -313,19 +313,20 @@ test_that("progressr is told where it listens", {
   expect_gt(told, 0)
 })
 
-test_that("no server and no future is left", {
-  servers <- function() {
-    processes <- ps_lines()
-    sum(grepl("gym_server", processes, fixed = TRUE))
-  }
-  ps_lines <- function() {
-    skip_on_os("windows")
-    run_quietly("ps", c("-eo", "args"))$stdout |> strsplit("\n") |> unlist()
-  }
-  before <- servers()
+test_that("no worker and no server of a worker is left", {
+  skip_on_os("windows")
   local_plan(future::multisession, workers = 2)
   rollout("Acrobot-v1", drawing, 30, max_steps = 20, seed = 1)
-  expect_gt(servers(), before)
+  asked <- lapply(1:2, function(i) {
+    future::future({
+      Sys.sleep(0.3)
+      session <- utils::getFromNamespace("the_session", "gym")
+      c(Sys.getpid(), vapply(session$servers, function(server) server$pid, 0L))
+    }, globals = FALSE, lazy = FALSE)
+  })
+  pids <- unlist(lapply(asked, future::value))
+  expect_gt(length(pids), 2)
+  expect_true(all(vapply(pids, pid_runs, NA)))
   future::plan("sequential")
-  expect_true(wait_until(function() servers() <= before))
+  expect_true(wait_until(function() !any(vapply(pids, pid_runs, NA))))
 })
