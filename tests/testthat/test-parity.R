@@ -2,10 +2,10 @@
 # the server for R, and in process by reference_trajectories.py, with the same seed
 # and actions. The observations, rewards, flags and frames are compared byte by byte.
 #
-# Of the hundreds of Atari games, which all observe large pictures, one in twenty plays 20 steps, and
-# the others play 30; `make test` has each play 10. With GYM_TEST_PARITY=all, as `make soak` has it,
-# every environment plays 200. (The server's test_environments.py makes, resets, steps and draws
-# every game.)
+# Of the hundreds of Atari games, which all observe large pictures, one in twenty plays 20 steps,
+# and the others play 30; `make test` has each play 10. With GYM_TEST_PARITY=all, as `make soak` has
+# it, every environment plays 200. (The server's test_environments.py makes, resets, steps and
+# draws every game.)
 
 registered <- utils::read.csv(test_path("environments.csv"), na.strings = "")
 played <- registered[is.na(registered$why_not), ]
