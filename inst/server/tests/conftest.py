@@ -40,10 +40,10 @@ def quick():
     """Return a function that makes an application with limits of its own."""
     apps = []
 
-    def quick(**limits):
+    def quick(isolate="none", **limits):
         apps.append(
             create_app(
-                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate="none")
+                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate=isolate)
             )
         )
         return apps[-1]

@@ -75,6 +75,15 @@ def kind_of_id(env_id: str) -> str:
     return f"{namespace}{'NoFrameskip' if game.endswith('NoFrameskip') else ''}-{version}"
 
 
+def older() -> set[str]:
+    """Return the ids of environments of which a later version is runnable, too."""
+    specs = [gymnasium.spec(env_id) for env_id in runnable()]
+    latest: dict[str, int] = {}
+    for spec in specs:
+        latest[spec.name] = max(spec.version, latest.get(spec.name, 0))
+    return {spec.id for spec in specs if spec.version < latest[spec.name]}
+
+
 def not_runnable() -> dict[str, str]:
     """Return the reason by the id of each of the others."""
     return {spec.id: why for spec in REGISTERED if (why := reason(spec)) is not None}

@@ -37,6 +37,7 @@ def installed():
     return installed
 
 
+@pytest.mark.slow
 def test_all_families_draw_from_any_thread_while_others_close(app, installed):
     failures = []
     # Some observe pictures, and in JSON these take long.
@@ -68,7 +69,9 @@ def test_all_families_draw_from_any_thread_while_others_close(app, installed):
     assert not failures
 
 
-@pytest.mark.parametrize("env_id", FAMILIES)
+@pytest.mark.parametrize(
+    "env_id", [FAMILIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in FAMILIES[1:])]
+)
 def test_it_is_recorded(client, create, installed, monitor_dir, env_id):
     pytest.importorskip("moviepy")
     if not installed(env_id):

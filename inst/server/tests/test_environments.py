@@ -8,6 +8,7 @@ import pytest
 from gym_server.protocol.safetensors import TENSORS, read
 
 OTHERS = [env_id for env_id in environments.runnable() if env_id not in environments.ATARI]
+OLDER = environments.older()
 ATARI = environments.atari_played()
 
 
@@ -25,7 +26,10 @@ def played(client, url, how):
     return first, later, frame
 
 
-@pytest.mark.parametrize("env_id", OTHERS)
+@pytest.mark.parametrize(
+    "env_id",
+    [pytest.param(i, marks=[pytest.mark.slow] if i in OLDER else []) for i in OTHERS],
+)
 def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
     url = create(env_id, seed=1)
     first, later, frame = played(client, url, "application/json")

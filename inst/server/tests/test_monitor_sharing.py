@@ -175,7 +175,7 @@ def record(server, url, directory="agents", **fields):
     return server.get(f"{url}/")[1]["monitor"]["table"]
 
 
-@pytest.mark.parametrize("mode", ["none", "all"])
+@pytest.mark.parametrize("mode", ["none", pytest.param("all", marks=pytest.mark.slow)])
 def test_six_agents_that_name_one_directory_all_record(serve, tmp_path, mode):
     options = ("--isolate", mode, "--monitor-dir", str(tmp_path))
     server = serve(*options)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from vector_play import (
     ACCEPT,
-    MODES,
+    MODES_SLOWLY,
     action_file,
     actions_of,
     apart,
@@ -29,7 +29,7 @@ def row(info, index):
 
 
 @pytest.mark.parametrize("num_workers", [0, 3])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", MODES_SLOWLY)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Text", "Sequence"])
 def test_sub_envs_that_step_alone_go_on_as_if_they_were_alone(
     client, sub_envs, kind, mode, num_workers

@@ -5,6 +5,7 @@ import json
 import faulty_envs
 import gymnasium
 import numpy as np
+import pytest
 from gymnasium.spaces import Dict, Discrete, Text, Tuple
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
 
@@ -15,6 +16,8 @@ from gym_server.protocol.safetensors import TENSORS
 from gym_server.spaces.stacking import stack
 
 MODES = ["NextStep", "SameStep", "Disabled"]
+# The same for what takes long: `make test` runs the first one.
+MODES_SLOWLY = [MODES[0], *(pytest.param(mode, marks=pytest.mark.slow) for mode in MODES[1:])]
 ACCEPT = {"Accept": TENSORS}
 KINDS = [kind for kind in faulty_envs.SPACES if kind != "nothing"]
 IN_TENSORS = [kind for kind in KINDS if spaces.travels_as_tensors(faulty_envs.SPACES[kind])]

@@ -298,7 +298,7 @@ def test_modules_are_imported_in_other_processes_only(serve, tmp_path):
     assert str(server.process.pid) not in pids
 
 
-@pytest.mark.parametrize("hangs", [True, False])
+@pytest.mark.parametrize("hangs", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_module_that_hangs_or_stays_leaves_no_process_of_the_list(
     serve, tmp_path, eventually, hangs
 ):
@@ -306,12 +306,13 @@ def test_a_module_that_hangs_or_stays_leaves_no_process_of_the_list(
     sleep = "time.sleep(3600)"
     wait = sleep if hangs else f"threading.Thread(target=lambda: {sleep}).start()"
     module.write_text(f"import threading, time\n{wait}\n")
-    # Ample for what does not hang, also where a process starts for it.
     limit = "2" if hangs else "60"
     arguments = ("--allow-module", "never_ends", "--max-call-seconds", limit)
     server = serve(*arguments, PYTHONPATH=str(tmp_path))
-    server.create("faulty_envs:Counting-v0")
+    # What starts processes stays. This one may take too long on a busy machine, which is no matter.
+    server.post("/v1/envs/", {"env_id": "faulty_envs:Counting-v0"})
+    eventually(lambda: len(descendants(server.process.pid)) >= 2)
     before = set(descendants(server.process.pid))
     status, answer = server.get("/v1/registry/?search=CartPole-v1")
     assert (status, answer["environments"][0]["id"]) == (200, "CartPole-v1")
-    eventually(lambda: set(descendants(server.process.pid)) == before)
+    eventually(lambda: set(descendants(server.process.pid)) <= before)

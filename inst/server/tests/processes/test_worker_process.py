@@ -207,7 +207,7 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve):
 
 def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
     # Ample for what does not hang, also where a process starts for it.
-    server = serve("--max-call-seconds", "3")
+    server = serve("--max-call-seconds", "5")
     other, _ = rogue(server, does="nothing")
     url, pid = rogue(server, does="never_returns")
     still, stopped = rogue(server, does="nothing")

@@ -12,7 +12,7 @@ import pytest
 from conftest import SERVER, SHORT_GRACE
 from gymnasium.vector import AutoresetMode
 from running import descendants, is_running
-from vector_play import MODES, actions_of
+from vector_play import MODES_SLOWLY, actions_of
 
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, call_too_long
@@ -86,7 +86,7 @@ def kept_processes():
     pool.end()
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", MODES_SLOWLY)
 @pytest.mark.parametrize("space", ["Box", "Discrete", "Dict", "Tuple", "Text", "Sequence", "Graph"])
 def test_any_number_of_processes_gives_the_same_bytes(make, kept_processes, space, mode):
     def came_of(num_workers):

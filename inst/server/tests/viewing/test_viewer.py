@@ -223,6 +223,7 @@ def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
     assert 2 <= len(drawn) <= 1 + (time.monotonic() - began) / 0.2
 
 
+@pytest.mark.slow
 def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch):
     url = faulty("Drawing")
     instance, drawn = watch(url)
@@ -257,7 +258,7 @@ def test_sub_envs_that_nobody_looks_at_any_more_are_forgotten(client, create, wa
 
 def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
     monkeypatch.setattr(capture, "_LOCK_TIMEOUT", 0.2)
-    url = faulty("Counting", seconds=1.5)
+    url = faulty("Counting", seconds=1.0)
     client.post(f"{url}/reset/")
     thread, _ = in_background(play, app.test_client(), url)
     time.sleep(0.2)
