@@ -123,6 +123,7 @@ def search(server):
     process.stdout.close()
 
 
+@pytest.mark.slow
 def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, eventually):
     assert search.endswith("/watch/")
     url = search.removeprefix(f"http://127.0.0.1:{server.port}").removesuffix("/watch/")
@@ -165,7 +166,6 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
 # What Python plays ---------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_two_people_watch_and_only_one_of_them_pauses(browser, server, play, look, eventually):
     url = server.create("MountainCar-v0")
     play(url, pause=0.01)

@@ -80,6 +80,7 @@ def deaf(server, pole):
         thread.join()
 
 
+@pytest.mark.slow
 def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, deaf):
     # Less than a request under way may take.
     assert server.stop(timeout=8)[0] == 0

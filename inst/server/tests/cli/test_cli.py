@@ -21,7 +21,9 @@ def test_one_line_says_where_the_server_is(serve):
 
 
 @needs_signals
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM]
+)
 def test_a_signal_stops_it_with_status_0(serve, how):
     server = serve()
     server.create("CartPole-v1")
@@ -70,6 +72,7 @@ def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path
     assert not list(tmp_path.glob("pymp-*"))
 
 
+@pytest.mark.slow
 def test_the_end_of_standard_input_means_nothing_otherwise(serve):
     server = serve()
     server.process.stdin.close()

@@ -61,6 +61,7 @@ def listening(serve):
         yield listener.getsockname()[1]
 
 
+@pytest.mark.slow
 def test_another_program_is_called_so():
     with http.server.HTTPServer(("127.0.0.1", 0), Stranger) as stranger:
         threading.Thread(target=stranger.serve_forever, daemon=True).start()

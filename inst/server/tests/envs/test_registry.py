@@ -127,7 +127,9 @@ print(json.dumps([answer.status_code, answer.json, found]))
     ("env_id", "extra", "module", "requirement"),
     [
         ("LunarLander-v3", "box2d", "Box2D", "gymnasium[box2d]"),
-        ("CarRacing-v3", "box2d", "Box2D", "gymnasium[box2d]"),
+        pytest.param(
+            *("CarRacing-v3", "box2d", "Box2D", "gymnasium[box2d]"), marks=pytest.mark.slow
+        ),
         ("Ant-v5", "mujoco", "mujoco", "gymnasium[mujoco]"),
         ("ALE/Pong-v5", "atari", "ale_py", '"gymnasium[atari]" "opencv-python-headless"'),
     ],

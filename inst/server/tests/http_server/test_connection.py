@@ -97,6 +97,7 @@ def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
     assert received < 2**21
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
     client, _ = converse()
     client.sendall(GET % b"%d" % 2**21)

@@ -9,6 +9,7 @@ from vector_play import (
     IN_TENSORS,
     KINDS,
     MODES,
+    MODES_SLOWLY,
     action_file,
     actions_of,
     apart,
@@ -31,7 +32,7 @@ from gym_server.spaces.stacking import stack, unstack
 # What comes is what Gymnasium has ------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", MODES_SLOWLY)
 @pytest.mark.parametrize("kind", KINDS)
 def test_sub_envs_in_json_are_those_of_gymnasium(client, sub_envs, kind, mode):
     check_play(client, sub_envs(kind, autoreset_mode=mode, vectorization_mode="sync"), kind, mode)

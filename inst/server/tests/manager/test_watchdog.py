@@ -4,6 +4,8 @@ import contextlib
 import http.client
 import json
 import os
+import queue
+import signal
 import threading
 import time
 from pathlib import Path
@@ -11,10 +13,11 @@ from pathlib import Path
 import pytest
 from conftest import ON_A_FREE_PORT, Gate, ServerProcess, created
 from faulty_envs import HangsWhere
-from running import descendants, is_running
+from running import descendants, is_running, is_stopped
 
 from gym_server.api.app import Config, create_app
 from gym_server.isolation.worker_backend import WorkerBackend
+from gym_server.manager import watchdog
 from gym_server.manager.limits import Limits
 
 # Ample for whatever does not hang.
@@ -122,7 +125,7 @@ def test_an_environment_may_hang_while_it_is_made(strict, call):
     assert strict.get("/v1/health/")[1]["instances"] == before + 1
 
 
-@pytest.mark.parametrize("num_envs", [None, 2])
+@pytest.mark.parametrize("num_envs", [None, pytest.param(2, marks=pytest.mark.slow)])
 def test_drawing_may_hang_and_others_are_drawn_all_the_same(
     strict, call, gate, eventually, num_envs
 ):
@@ -143,6 +146,7 @@ def test_drawing_may_hang_and_others_are_drawn_all_the_same(
     assert strict.post(f"{other}/close/")[0] == 204
 
 
+@pytest.mark.slow
 def test_a_watcher_may_be_the_one_for_whom_it_hangs(strict, call):
     url = hanging(strict, "render")
     strict.post(f"{url}/reset/")
@@ -153,6 +157,7 @@ def test_a_watcher_may_be_the_one_for_whom_it_hangs(strict, call):
     assert call(f"{other}/watch/state/", method="GET").answer()[0] == 200
 
 
+@pytest.mark.slow
 def test_closing_may_hang(strict, call):
     url, other = hanging(strict, "close"), strict.create("faulty_envs:Drawing-v0")
     stuck = call(f"{url}/close/")
@@ -161,6 +166,7 @@ def test_closing_may_hang(strict, call):
     assert strict.post(f"{other}/close/")[0] == 204
 
 
+@pytest.mark.slow
 def test_a_server_with_calls_that_hang_stops_all_the_same(serve):
     server = serve(*STRICT)
     in_reset, in_render = hanging(server, "reset"), hanging(server, "render")
@@ -173,20 +179,85 @@ def test_a_server_with_calls_that_hang_stops_all_the_same(serve):
     assert server.stop(timeout=SOON)[0] == 0
 
 
-def test_sub_envs_in_processes_end_with_it(quick, eventually):
-    app = quick(max_call_seconds=60)
+@pytest.fixture
+def impatient_later(quick, monkeypatch):
+    """Make an application in which a call may take long until what it needs is there.
+
+    Return it and a function after which a call may take a second: to start a process takes its
+    time, and on a busy machine more.
+    """
+
+    monkeypatch.setattr(watchdog, "_LONGEST_TICK", 0.1)
+
+    def impatient_later(**how):
+        app = quick(max_call_seconds=60, **how)
+
+        def be_impatient():
+            app._watchdog._limits = Limits(max_call_seconds=1)
+
+        return app, be_impatient
+
+    return impatient_later
+
+
+def test_sub_envs_in_processes_end_with_it(impatient_later, eventually):
+    app, be_impatient = impatient_later()
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}
     url = created(client, "faulty_envs:Hanging-v0", **fields)
     processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.pids
     client.post(f"{url}/reset/")
-    # Their start takes its time.
-    app._watchdog._limits = Limits(max_call_seconds=0.2)
+    be_impatient()
     answer = client.post(f"{url}/step/", json={"action": [0, 0]})
-    assert (answer.status_code, answer.json["code"]) == (504, "call_too_long")
+    assert too_long((answer.status_code, answer.json))
     eventually(lambda: not any(map(is_running, processes)))
 
 
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
+    app, be_impatient = impatient_later(isolate="all")
+
+    def ask(method, path, **body):
+        # A client is for one thread.
+        answer = app.test_client().open(path, method=method, json=body or None)
+        return answer.status_code, answer.json
+
+    def rogue(does):
+        url = created(app.test_client(), "faulty_envs:Rogue-v0", kwargs={"does": does})
+        return url, ask("POST", f"{url}/reset/")[1]["info"]["pid"]
+
+    def begin(*args, **body):
+        # A daemon, for one that never returns.
+        answers = queue.SimpleQueue()
+        call = threading.Thread(target=lambda: answers.put(ask(*args, **body)), daemon=True)
+        call.start()
+        return answers
+
+    other, _ = rogue("nothing")
+    url, hanging = rogue("never_returns")
+    still, stopped = rogue("nothing")
+    os.kill(stopped, signal.SIGSTOP)
+    eventually(lambda: is_stopped(stopped))
+    be_impatient()
+    kwargs = {"does": "never_returns", "at": "constructor"}
+    try:
+        # One hangs, and the others wait for it.
+        calls = [begin("POST", f"{url}/step/", action=0) for _ in range(3)]
+        calls.append(begin("POST", "/v1/envs/", env_id="faulty_envs:Rogue-v0", kwargs=kwargs))
+        # Also one that is asked while nothing moves.
+        calls.append(begin("GET", f"{still}/action_space/"))
+        assert all(too_long(answers.get(timeout=SOON)) for answers in calls)
+        assert too_long(ask("POST", f"{url}/step/", action=0))
+        eventually(lambda: not is_running(hanging) and not is_running(stopped))
+    finally:
+        for pid in (hanging, stopped):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+    assert list(ask("GET", "/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
+    assert ask("POST", f"{other}/step/", action=0)[0] == 200
+
+
+@pytest.mark.slow
 def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
     url = hanging(strict, "reset")
     connection = strict.connect()
@@ -229,6 +300,7 @@ def test_what_is_slow_but_not_too_slow_delays_nobody(shared, gate, tmp_path, eve
 # Without HTTP --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, eventually):
     client = quick(max_call_seconds=0.5).test_client()
     before = HangsWhere.closed
@@ -244,6 +316,7 @@ def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, ev
     assert client.get("/v1/envs/").json["all_envs"] == {}
 
 
+@pytest.mark.slow
 def test_one_that_was_evicted_may_hang_once_more_and_others_are_drawn(quick, monkeypatch):
     app = quick(max_call_seconds=0.3)
     closing, released, drawn = threading.Event(), threading.Event(), []
@@ -287,12 +360,12 @@ def impatient():
     [
         ("init", {}),
         # Processes may be chosen, or have been.
-        ("init", {"num_envs": 64}),
-        ("init", {"num_envs": 4, "num_workers": 2}),
-        ("init elsewhere", {"num_envs": 4, "num_workers": 2}),
+        pytest.param("init", {"num_envs": 64}, marks=pytest.mark.slow),
+        pytest.param("init", {"num_envs": 4, "num_workers": 2}, marks=pytest.mark.slow),
+        pytest.param("init elsewhere", {"num_envs": 4, "num_workers": 2}, marks=pytest.mark.slow),
         ("step", {}),
-        ("render", {}),
-        ("close", {}),
+        pytest.param("render", {}, marks=pytest.mark.slow),
+        pytest.param("close", {}, marks=pytest.mark.slow),
     ],
 )
 def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, fields):
@@ -368,6 +441,7 @@ def _busy_threads(pid):
     return len(busy)
 
 
+@pytest.mark.slow
 def test_0_seconds_are_for_ever(quick):
     client = quick(max_call_seconds=0, idle_minutes=0.01).test_client()
     url = created(client, kwargs={"seconds": 1.0})
@@ -375,6 +449,7 @@ def test_0_seconds_are_for_ever(quick):
     assert client.post(f"{url}/step/", json={"action": 0}).status_code == 200
 
 
+@pytest.mark.slow
 def test_an_answer_for_another_never_reaches_the_next_request(strict):
     # The thread comes back while the watchdog answers for it, again and again.
     connection = http.client.HTTPConnection("127.0.0.1", strict.port, timeout=SOON)

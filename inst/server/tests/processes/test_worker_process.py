@@ -4,11 +4,10 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from conftest import ServerProcess
-from running import descendants, is_running, is_stopped
+from running import descendants, is_running
 
 from gym_server.isolation.worker import WorkerSettings, list_registry
 from gym_server.processes.worker_process import WorkerProcess
@@ -205,34 +204,7 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve):
     assert server.get("/v1/health/")[0] == 200
 
 
-def test_a_call_that_takes_too_long_ends_the_process(serve, eventually):
-    # Ample for what does not hang, also where a process starts for it.
-    server = serve("--max-call-seconds", "5")
-    other, _ = rogue(server, does="nothing")
-    url, pid = rogue(server, does="never_returns")
-    still, stopped = rogue(server, does="nothing")
-    kwargs = {"does": "never_returns", "at": "constructor"}
-    making = {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs}
-    os.kill(stopped, signal.SIGSTOP)
-    eventually(lambda: is_stopped(stopped))
-
-    def step(_=None):
-        return server.post(f"{url}/step/", {"action": 0})
-
-    # At the same time, so that the limit is waited for once.
-    with ThreadPoolExecutor() as calls:
-        # One hangs, and the others wait for it.
-        steps = calls.map(step, range(3))
-        made = calls.submit(server.post, "/v1/envs/", making)
-        # Also one that is asked while nothing moves.
-        asked = calls.submit(server.get, f"{still}/action_space/")
-        answers = [*steps, made.result(), asked.result(), step()]
-    assert [(status, answer["code"]) for status, answer in answers] == [(504, "call_too_long")] * 6
-    eventually(lambda: not is_running(pid) and not is_running(stopped))
-    assert list(server.get("/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
-    assert server.post(f"{other}/step/", {"action": 0})[0] == 200
-
-
+@pytest.mark.slow
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
     def left():
         files = len(os.listdir(f"/proc/{server.process.pid}/fd"))

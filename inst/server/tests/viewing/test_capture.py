@@ -94,7 +94,7 @@ def test_who_waits_for_others_drawing_for_long_is_told(client, create, occupied,
     assert state(client, url) == {"number": None, "state": "busy"}
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.05])
+@pytest.mark.parametrize("seconds", [0.0, pytest.param(0.05, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("draws_when_stepped", [False, True])
 def test_who_is_stepped_all_the_time_is_seen(
     app, client, faulty, watch, draws_when_stepped, seconds

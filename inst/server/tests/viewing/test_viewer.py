@@ -210,6 +210,7 @@ def test_the_latest_wins_and_is_seen_when_the_steps_end(client, create):
     assert seen["step"] == 7
 
 
+@pytest.mark.slow
 def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
     monkeypatch.setattr(viewer, "_LEAST_SECONDS", 0.2)
     url = faulty("Drawing")
