@@ -1,5 +1,6 @@
 """Processes as Linux lists them."""
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -25,7 +26,11 @@ def _state(directory):
 
 
 def descendants(pid):
-    stats = [stat.read_text() for stat in Path("/proc").glob("[0-9]*/stat")]
+    stats = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        # It may end while it is looked at.
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            stats.append(stat.read_text())
     # The number, the name in parentheses, the state, the parent's number.
     parents = {int(one.split()[0]): int(one.rpartition(")")[2].split()[1]) for one in stats}
     found = [pid]
