@@ -23,6 +23,7 @@ test_that("without means each episode draws its own", {
 })
 
 test_that("the testbed's curves are those of the book", {
+  skip_unless_all()
   # Sutton and Barto (2018), figures 2.2 and 2.4, to the eye: after 1,000 steps greedy gets about 1,
   # epsilon 0.1 about 1.4 and the best arm in four fifths of the cases.
   testbed <- bandit(arms = 10)

@@ -196,6 +196,7 @@ test_that("an error in the middle carries what was played, with its own classes 
 })
 
 test_that("a progress bar is shown when asked for and nothing is said otherwise", {
+  skip_unless_all()
   expect_silent(search_random(fake_environment(), rounds = 2, progress = FALSE))
   withr::local_options(cli.progress_show_after = 0, cli.dynamic = FALSE, cli.num_colors = 1)
   env <- fake_environment()

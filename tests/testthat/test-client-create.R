@@ -65,6 +65,7 @@ test_that("whatever way a server is dead, the error comes within the timeout, wi
 })
 
 test_that("a server that is killed or stopped in a call is noticed", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_odd_server()
   pid <- the_session$servers[[server$remote_base]]$pid
@@ -312,6 +313,7 @@ test_that("an interrupt that jumps out of libcurl leaves a client that works", {
 })
 
 test_that("interrupts at any moment leave a client that works", {
+  skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
   # R itself does not stand interrupts while it loads a package, or a function of one at its first

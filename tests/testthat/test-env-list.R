@@ -56,6 +56,7 @@ test_that("a server's limits say what to do about them", {
 })
 
 test_that("a rollout takes one environment where the memory is too little for sub-environments", {
+  skip_unless_all()
   server <- local_server(max_memory_mb = 100)
   stacked <- gym_wrap("CartPole-v1", "FrameStackObservation", stack_size = 900) |>
     gym_wrap("FrameStackObservation", stack_size = 80)

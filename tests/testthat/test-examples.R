@@ -18,6 +18,7 @@ test_that("the bandit shows that it pays to explore", {
 })
 
 test_that("Sarsa finds the shortest way through the windy gridworld", {
+  skip_unless_all()
   run <- run_example("windy-gridworld.R")
   expect_match(run$printed, "Nothing is wrong", fixed = TRUE, all = FALSE)
   expect_identical(run$env$learned$episodes$length, 15L)

@@ -40,6 +40,7 @@ as_python_prints <- function(value) {
 }
 
 test_that("what the table writes in R gives what it writes in Python", {
+  skip_unless_all()
   table <- gymnasium_table()
   wanted <- run_python_column(table)
   place <- new.env(parent = globalenv())

@@ -51,6 +51,7 @@ test_that("a session ends at once whatever has become of the servers where it cr
 })
 
 test_that("a session ends at once with a server behind a broken connection, and its own stopped", {
+  skip_unless_all()
   skip_on_os("windows")
   full <- create_GymClient(local_stalling("full"))
   run <- run_session(
@@ -171,6 +172,7 @@ test_that("a server that was stopped has nothing left to close", {
 })
 
 test_that("an error in a search closes its environment without waiting for a server that hangs", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_server()
   pid <- the_session$servers[[server$remote_base]]$pid

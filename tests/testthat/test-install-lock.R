@@ -16,6 +16,7 @@ test_that("the lock is released, also after an error", {
 })
 
 test_that("a session waits for another one, with a message", {
+  skip_unless_all()
   skip_on_cran()
   local_cache()
   done <- file.path(install_root(), "done")

@@ -57,6 +57,7 @@ test_that("a tool gets nothing of another Python's, and its words go into the lo
 })
 
 test_that("an interrupt ends the tool", {
+  skip_unless_all()
   skip_on_os("windows")
   local_cache()
   dir.create(install_root(), recursive = TRUE)

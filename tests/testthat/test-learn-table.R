@@ -29,6 +29,7 @@ test_that("nothing has learned more than can be earned", {
 
 # test-solve-table.R has the same of the other table in `make test-all`.
 if (soaks("GYM_TEST_TABLES")) test_that("a row of the table comes out the same again", {
+  skip_unless_all()
   folder <- file.path(test_path(), "../../tools/learn")
   skip_if_not(dir.exists(folder), "no tools/ beside the tests: not a source tree")
   jobs <- new.env()
@@ -44,6 +45,7 @@ if (soaks("GYM_TEST_TABLES")) test_that("a row of the table comes out the same a
 })
 
 test_that("the model that judges blackjack plays as Gymnasium does", {
+  skip_unless_all()
   folder <- file.path(test_path(), "../../tools/learn")
   skip_if_not(dir.exists(folder), "no tools/ beside the tests: not a source tree")
   blackjack <- new.env()

@@ -178,6 +178,7 @@ test_that("a large number elsewhere makes no two actions equal", {
 })
 
 test_that("slow models are solved, too", {
+  skip_unless_all()
   n <- 200
   walk <- data.frame(
     state = rep(seq_len(n - 1), each = 2), action = 0,

@@ -62,6 +62,7 @@ test_that("results are the same with none and with two workers", {
 })
 
 test_that("a search that normalises has the same moments, whoever plays beyond its end", {
+  skip_unless_all()
   search <- function() {
     search <- search_random(
       "Acrobot-v1", policy_network(c(6, 3), normalize = TRUE), rounds = 40, target = -400, seed = 1
@@ -142,6 +143,7 @@ test_that("a worker that is killed in a training is done without", {
 })
 
 test_that("a worker whose server is killed starts another one", {
+  skip_unless_all()
   alone <- what_counts(train())
   local_plan(future::cluster, workers = 1)
   kill_server <- function(training) {
@@ -157,6 +159,7 @@ test_that("a worker whose server is killed starts another one", {
 })
 
 test_that("when no worker is left the session plays on", {
+  skip_unless_all()
   alone <- what_counts(train())
   local_plan(future::multisession, workers = 2)
   kill_all <- function(training) {
@@ -167,6 +170,7 @@ test_that("when no worker is left the session plays on", {
 })
 
 test_that("a plan that is set again after it broke is used again", {
+  skip_unless_all()
   play <- function() rollout("Acrobot-v1", drawing, 20, max_steps = 5, seed = 1)$episodes
   alone <- play()
   cluster <- parallelly::makeClusterPSOCK(2)
@@ -187,6 +191,7 @@ test_that("a plan that is set again after it broke is used again", {
 })
 
 test_that("a worker that is silent counts as lost, and its part is played here in the end", {
+  skip_unless_all()
   here <- Sys.getpid()
   slow <- function(observation) {
     if (Sys.getpid() != here) Sys.sleep(30)
@@ -265,6 +270,7 @@ test_that("seeds are trained by workers, each with its own files", {
 })
 
 test_that("a future in a policy in a rollout in a future comes to an end, with the same result", {
+  skip_unless_all()
   test_client()
   asking <- function(observation) {
     turn <- future::value(future::future(1L))

@@ -142,6 +142,7 @@ test_that("a progress bar counts the episodes", {
 })
 
 test_that("what remembers earlier episodes plays them in one batch, one after the other", {
+  skip_unless_all()
   client <- test_client()
   wrapped <- gym_wrap("CartPole-v1", "NormalizeReward")
   play <- function(n) {

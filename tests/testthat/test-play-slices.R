@@ -41,6 +41,7 @@ test_that("a batch has at most 16 slices, of whole candidates where these fit", 
 })
 
 test_that("slices that are played apart come to the same as side by side", {
+  skip_unless_all()
   # Longer ones than the number of steps after which moments are added.
   ends <- function(seed, step, action) step == 1L + seed %% 7L + 70L * (seed %% 5L == 0L)
   reward <- function(seed, step, action) seed %% 3 + 10 * action

@@ -104,6 +104,7 @@ test_that("the unit's options are the server's", {
 })
 
 test_that("a proxy whose server is gone is distinguished from one that is no Gym server", {
+  skip_unless_all()
   skip_if_no_nginx()
   server <- local_locked_server(allow_host = "gym.example.org")
   proxy <- local_proxy(server)

@@ -84,6 +84,7 @@ test_that("another program at the port is named", {
 })
 
 test_that("a port that is taken: the error says what has it", {
+  skip_unless_all()
   server <- local_server()
   base <- server$remote_base
   start <- function(base) gym_server_start(port = local_place(base)$port)

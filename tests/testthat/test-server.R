@@ -186,6 +186,7 @@ test_that("the server ends with the R session and leaves no log, also when R is 
 })
 
 test_that("R that is killed while it starts a server or uses it leaves none behind", {
+  skip_unless_all()
   skip_if_not(file.exists("/proc/self/environ"), "a system that tells a process's variables")
   skip_if_no_server()
   script <- withr::local_tempfile(lines = c(

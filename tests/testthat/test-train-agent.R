@@ -441,6 +441,7 @@ test_that("the progress bar shows iterations, or steps where these are the budge
 })
 
 test_that("CartPole is solved, from the same seed in the same way", {
+  skip_unless_all()
   client <- test_client()
   play <- function() {
     train_agent(agent_ars(directions = 8, top = 4, step_size = 0.02, noise = 0.05), "CartPole-v1",

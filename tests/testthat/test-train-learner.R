@@ -35,6 +35,7 @@ test_that("a learner goes on from its checkpoint to where an undisturbed one com
 })
 
 test_that("prediction comes near to the exact values", {
+  skip_unless_all()
   exact <- solve_mdp(walk_model(), policy = policy_random())$values
   for (how in list(list(), list(n = 3), list(lambda = 0.8))) {
     learned <- rlang::exec(
@@ -75,6 +76,7 @@ test_that("`max_steps` truncates, and the value of what follows counts", {
 })
 
 test_that("the true next observation is learned from in all autoreset modes", {
+  skip_unless_all()
   # Each episode of the lake that does not slip ends at the goal or in a hole; a learner that took
   # the first state of the next episode for what follows would add its value.
   client <- test_client()

@@ -8,6 +8,7 @@ effective <- function(model) {
 }
 
 test_that("what the info forbids is never taken, with one sub-environment and with several", {
+  skip_unless_all()
   model <- env_model("Taxi-v4")
   learners <- list(
     function(...) learn_q(..., epsilon = 1), function(...) learn_q(..., double = TRUE),

@@ -62,6 +62,7 @@ last_words <- function(packages, ...) {
 }
 
 test_that("a session that forks ends in order with a server, too", {
+  skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
   # The package parallel complains when it has waited for its children in vain.

@@ -91,6 +91,7 @@ expect_shows <- function(space, batch, i, value, number) {
 }
 
 test_that("the last observation of a sub-environment is kept for every kind of space", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
   for (number in 1:40) {
