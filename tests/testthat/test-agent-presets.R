@@ -30,6 +30,7 @@ test_that("a preset belongs to an id with the same arguments", {
 })
 
 test_that("a search takes its preset, says so, and lets arguments go before it", {
+  skip_unless_all()
   client <- test_client()
   expect_message(
     trained <- search_ars("CartPole-v1", steps = 500, eval_episodes = 2, seed = 1, client = client),

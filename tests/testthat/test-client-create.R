@@ -279,6 +279,7 @@ output_of_script <- function(...) {
 }
 
 test_that("an interrupt that jumps out of libcurl leaves a client that works", {
+  skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
   # Curl asks R for the body. Then an interrupt is on its way, and it is taken at the next garbage

@@ -54,6 +54,7 @@ test_that("a script is not asked, and the error names the call that helps", {
 })
 
 test_that("with GYM_INSTALL a script installs without a question", {
+  skip_unless_all()
   python <- working_python()
   for (allowed in c("1", "true", "TRUE")) {
     calls <- local_bare_session(list(python), interactive = FALSE)

@@ -28,6 +28,7 @@ test_that("Sarsa finds the shortest way through the windy gridworld", {
 })
 
 test_that("the inventory never ends, and a rule of two numbers beats chance", {
+  skip_unless_all()
   run <- run_example("inventory.R")
   expect_match(run$printed, "No episode ended within 200 steps", fixed = TRUE, all = FALSE)
   expect_identical(unique(run$env$chance$episodes$length), 365L)

@@ -51,6 +51,7 @@ test_that("a step's answer of classic servers is taken", {
 })
 
 test_that("a step's answer says which field is wrong", {
+  skip_unless_all()
   server <- local_bad_environment()
   env_reset(server, "0a1b2c3d")
   wrong <- list(
@@ -157,6 +158,7 @@ test_that("tensors of a vector environment have a row for each", {
 })
 
 test_that("the fields of an environment's description have their types", {
+  skip_unless_all()
   about <- function(...) {
     server <- local_bad_environment(...)
     env_action_space_info(server, "0a1b2c3d")

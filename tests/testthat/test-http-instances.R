@@ -91,6 +91,7 @@ test_that("a forked child closes what it created, and nothing of its parent's", 
 })
 
 test_that("an object that was thrown away is closed when the server is next spoken to", {
+  skip_unless_all()
   server <- local_server()
   kept <- gym_make("CartPole-v1", client = server)
   speak <- list(

@@ -70,6 +70,7 @@ test_that("a batch is the same in any order of batches, and when it is played ag
 })
 
 test_that("so it is in Gymnasium's environments", {
+  skip_unless_all()
   client <- test_client()
   for (mode in c("vector_entry_point", "sync")) {
     env <- local_env("CartPole-v1", num_envs = 4, vectorization_mode = mode, client = client)

@@ -288,6 +288,7 @@ test_that("a future in a policy in a rollout in a future comes to an end, with t
 })
 
 test_that("counting the workers of a plan that is not in use sets none up", {
+  skip_unless_all()
   inner <- future::tweak(future::multisession, workers = I(3))
   local_plan(future::multisession, workers = 2)
   future::plan(list(future::tweak(future::multisession, workers = 2), inner))

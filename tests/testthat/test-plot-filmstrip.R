@@ -49,6 +49,7 @@ test_that("pictures are arranged so that they are large and fit", {
 })
 
 test_that("a filmstrip plots on any device, and leaves par alone", {
+  skip_unless_all()
   skip_if_not_installed("png")
   played <- short_rollout()
   local_device(4, 3)

@@ -39,6 +39,7 @@ test_that("by nginx and TLS a client plays as it does without", {
 })
 
 test_that("by nginx the watch page waits for what is new, and no log has its key", {
+  skip_unless_all()
   skip_if_no_nginx()
   server <- local_locked_server(allow_host = "gym.example.org")
   proxy <- local_proxy(server)

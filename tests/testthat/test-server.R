@@ -100,6 +100,7 @@ test_that("a file in the working directory takes no Python module's place", {
 })
 
 test_that("a server stops in order while a forked child lives", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_server()
   child <- parallel::mcparallel(Sys.sleep(30))
@@ -162,6 +163,7 @@ test_that("a server that another session started is not stopped here", {
 })
 
 test_that("the server ends with the R session and leaves no log, also when R is killed", {
+  skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
   for (ending in c("q('no')", "tools::pskill(Sys.getpid(), tools::SIGKILL)")) {

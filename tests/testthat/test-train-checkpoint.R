@@ -15,6 +15,7 @@ environments <- list(
 )
 
 test_that("a search goes on from the file of any batch to the result of an undisturbed one", {
+  skip_unless_all()
   for (make in environments) {
     for (target in list(Inf, 13.5)) {
       play <- function(checkpoint = NULL) {

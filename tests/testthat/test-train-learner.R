@@ -21,6 +21,7 @@ test_that("a seed fixes what is learned, and another one gives another table", {
 })
 
 test_that("a learner goes on from its checkpoint to where an undisturbed one comes", {
+  skip_unless_all()
   for (learn in list(
     function(...) learn_q(..., double = TRUE), function(...) learn_q(..., planning = 2),
     function(...) learn_sarsa(..., lambda = 0.5), function(...) learn_monte_carlo(...)
