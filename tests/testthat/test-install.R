@@ -2,6 +2,7 @@
 # downloaded once.
 
 test_that("an installation runs the server, takes extras and repairs itself", {
+  skip_unless_all()
   local_cache()
   skip_if_no_uv()
   skip_if_no_packages()

@@ -241,6 +241,7 @@ test_that("an error of a policy on a worker is that of the call, and workers go 
 })
 
 test_that("seeds are trained by workers, each with its own files", {
+  skip_unless_all()
   trained <- function(...) {
     lapply(train_agent(
       agent_ars(directions = 4, top = 2), "Acrobot-v1", policy_linear(), iterations = 2,
@@ -253,7 +254,6 @@ test_that("seeds are trained by workers, each with its own files", {
   expect_identical(trained(checkpoint = file.path(folder, "a.rds"), log = folder), alone)
   expect_setequal(list.files(folder, "rds$"), paste0("a-", 1:3, ".rds"))
   expect_setequal(list.files(folder, "^seed"), paste0("seed-", 1:3))
-  if (!tests_all()) return()
   future::plan(future::multicore, workers = 2)
   expect_identical(trained(), alone)
   inner <- future::tweak(future::multisession, workers = I(2))
