@@ -89,6 +89,7 @@ test_that("results are the same with three workers, and with 1 and 7", {
 })
 
 test_that("environments and models in R travel", {
+  skip_unless_all()
   withr::defer(gym_unregister("Travel-v0"))
   gym_register("Travel-v0", r_cartpole())
   model <- walk_model(max_episode_steps = 20)
@@ -104,6 +105,7 @@ test_that("environments and models in R travel", {
 })
 
 test_that("what cannot travel is played here, which is said once", {
+  skip_unless_all()
   withr::local_options(rlib_message_verbosity = "verbose")
   local_plan(future::multisession, workers = 2)
   env <- local_env("CartPole-v1")
@@ -221,6 +223,7 @@ test_that("another version of the package is an error that names the host", {
 })
 
 test_that("a worker without the package is an error that names the host", {
+  skip_unless_all()
   local_plan(future::cluster, workers = 1)
   future::value(future::future(.libPaths(tempfile(), include.site = FALSE), globals = FALSE))
   installed <- future::value(
@@ -234,6 +237,7 @@ test_that("a worker without the package is an error that names the host", {
 })
 
 test_that("an error of a policy on a worker is that of the call, and workers go on", {
+  skip_unless_all()
   local_plan(future::multisession, workers = 2)
   failing <- function(observation) stop("no idea")
   expect_error(rollout("Acrobot-v1", failing, 4, seed = 1), "no idea")
@@ -300,6 +304,7 @@ test_that("counting the workers of a plan that is not in use sets none up", {
 })
 
 test_that("an answer that future has read by itself is not waited for", {
+  skip_unless_all()
   local_plan(future::multisession, workers = 2)
   read <- future::future(1L)
   expect_identical(future::value(read), 1L)
