@@ -9,7 +9,6 @@ import pytest
 
 from gym_server.api.app import create_app
 from gym_server.budget import Budget
-from gym_server.http_server import connection as connection_module
 from gym_server.http_server import connections as connections_module
 from gym_server.http_server.server import Server, bind
 
@@ -24,7 +23,6 @@ def crowded(monkeypatch):
     monkeypatch.setattr(connections_module, "MOST_CONNECTIONS", MOST)
     monkeypatch.setattr(connections_module, "MOST_OF_ONE_ADDRESS", MOST)
     monkeypatch.setattr(connections_module, "EVICTED_AT_ONCE", 2)
-    monkeypatch.setattr(connection_module, "_UNREAD_SECONDS", 0.3)
     app = create_app()
     server = Server(app, bind("127.0.0.1", 0), 2**20, Budget(2**24), on_stop=app.end_watching)
     running = threading.Thread(target=server.run, args=(5,))
