@@ -15,7 +15,7 @@ help:
 	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
 	@echo '               half an hour, or a glance: make bench QUICK=1; PARTS="wire" runs that'
 	@echo 'make test      the tests of the main promises: of the server (pytest) and of the R package'
-	@echo '               (testthat); some minutes'
+	@echo '               (testthat); three minutes'
 	@echo 'make test-all  every test of both'
 	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
 	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
