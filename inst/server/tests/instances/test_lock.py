@@ -66,12 +66,18 @@ def test_it_tells_since_when_it_is_taken(lock):
     assert lock.busy_since is None
 
 
-def test_who_waits_for_the_render_thread_has_not_begun():
+def test_who_waits_for_the_render_thread_has_not_begun(eventually):
     renderer = RenderThread()
     lock = InstanceLock(lambda: unknown_instance("12345678"), lambda: None, renderer)
-    may_end = threading.Event()
-    occupying = threading.Thread(target=renderer.run, args=(may_end.wait, 10))
+    occupied, may_end = threading.Event(), threading.Event()
+
+    def occupy():
+        occupied.set()
+        may_end.wait(10)
+
+    occupying = threading.Thread(target=renderer.run, args=(occupy,))
     occupying.start()
+    assert occupied.wait(10)
 
     def draw():
         with lock:
@@ -79,11 +85,9 @@ def test_who_waits_for_the_render_thread_has_not_begun():
 
     drawing = threading.Thread(target=draw)
     drawing.start()
-    while lock.busy_since is None:
-        time.sleep(0.01)
+    eventually(lambda: lock.busy_since is not None)
     since = lock.busy_since
-    time.sleep(0.05)
-    assert lock.busy_since > since
+    eventually(lambda: lock.busy_since > since)
     may_end.set()
     drawing.join(10)
     occupying.join(10)
