@@ -173,8 +173,6 @@ look_at_repetition <- function(check, first, seed) {
 }
 
 look_at_reset_without_seed <- function(check, seed) {
-  # The seed that an environment was made with may be that of its first `reset()` without one.
-  call_and_look(check, "reset", "`reset()` without a seed", check$env$reset())
   following <- lapply(1:2, function(time) {
     check$env$reset(seed = seed)
     call_and_look(check, "reset", "`reset()` without a seed", check$env$reset())

@@ -9,7 +9,7 @@
 #'   [gym_server_start()].
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
 #'   [gym_wrap()] made of one. [env_registry()] lists the ids.
-#' @param seed Seed of the first reset that is given none, and of the sampling
+#' @param seed Seed of the first reset, unless that is given one, and of the sampling
 #'   of actions: a whole number of at least 0, `NULL` for a random one. For a vector
 #'   environment also one for each sub-environment, see [env_reset()].
 #' @param render_mode `"rgb_array"` for pictures, or `"human"` for an environment that
@@ -90,6 +90,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
   check_client(x)
   check_not_registered(env_id)
   check_named_list(kwargs)
+  kwargs <- with_random_map(env_id, kwargs, seed)
   create_and_watch(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
     name, num_workers

@@ -40,10 +40,12 @@
 #' @param ... Further arguments for the environment, by name, such as
 #'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
 #'   after how many steps its episodes are cut off, instead of its own limit; -1 for none.
-#' @param seed The seed of the first reset that is given none, and of the sampling of actions: a
-#'   whole number of at least 0, for a vector environment also one for each sub-environment, see
-#'   [env_reset()]. `NULL`, the default, draws one from R's generator, so that [set.seed()] fixes
-#'   it.
+#'   FrozenLake's random map (`desc = NULL, map_name = NULL`) is drawn from the seed, the same for
+#'   all sub-environments, and stands as `desc` in `$spec$kwargs`.
+#' @param seed The seed of the first reset, unless that is given one, and of the sampling of
+#'   actions: a whole number of at least 0, for a vector environment also one for each
+#'   sub-environment, see [env_reset()]. `NULL`, the default, draws one from R's generator, so that
+#'   [set.seed()] fixes it.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
@@ -120,6 +122,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
     ))
   }
   check_client(client, call = call)
+  kwargs <- with_random_map(env_id, kwargs, seed)
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))

@@ -167,7 +167,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   }
   with_vector_env(
     env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
-    client = client, num_workers = num_workers
+    client = client, num_workers = num_workers, seed = seed
   )
 }
 

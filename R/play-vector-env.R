@@ -7,15 +7,18 @@
 #' @param use A function of the vector environment.
 #' @param max_steps As given by the user, who is told when the environment's own limit is smaller.
 #' @param ... Further arguments of [as_vector_env()].
+#' @param seed What a random map is drawn from, see [with_random_map()].
 #' @noRd
-with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., call = rlang::caller_env()) {
+with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., seed = NULL,
+                            call = rlang::caller_env()) {
   # Errors from making the environment name the user's call, too.
   rlang::local_error_call(call)
-  vector_env <- as_vector_env(env, ..., max_envs = episodes)
+  arguments <- with_random_map(env, list(...), seed)
+  vector_env <- rlang::exec(as_vector_env, env, !!!arguments, max_envs = episodes)
   finished <- FALSE
   on.exit(vector_env$close(wait = finished))
   vector_env$call <- call
-  vector_env$recipe <- environment_recipe(env, vector_env, list(...))
+  vector_env$recipe <- environment_recipe(env, vector_env, arguments)
   warn_of_own_limit(max_steps, vector_env, call)
   inform_of_memory(vector_env, env)
   value <- use(vector_env)

@@ -131,10 +131,14 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
   in_env <- function(use, max_steps = NULL) {
     with_training_env(settings, use, max_steps, client, call)
   }
-  settings$model <- judging_model(settings, client)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
   if (is.null(seeds)) {
     file <- training_file(settings, files, call)
+    settings$seed <- file$saved$seed %||% seed %||% draw_seed()
+  }
+  settings$kwargs <- with_random_map(env, settings$kwargs, settings$seed %||% seeds)
+  settings$model <- judging_model(settings, client)
+  if (is.null(seeds)) {
     in_env(function(vector_env) {
       train_in(vector_env, settings, file, log, progress, call)
     }, max_steps)
@@ -176,7 +180,6 @@ training_file <- function(settings, files, call) {
 #' @param file As [training_file()] returns it.
 #' @noRd
 train_in <- function(vector_env, settings, file, log, progress, call) {
-  settings$seed <- file$saved$seed %||% settings$seed %||% draw_seed()
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings$env_id <- environment_label(vector_env)
   settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)

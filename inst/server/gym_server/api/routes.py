@@ -31,8 +31,8 @@ ROUTES = Table()
     Field(
         "seed",
         fields.SEED,
-        "Seeds the action space, and the first reset without a seed; with num_envs also a list "
-        "of one for each sub-environment.",
+        "Seeds the action space, and the first reset unless that has a seed; with num_envs also a "
+        "list of one for each sub-environment.",
     ),
     Field(
         "render_mode",

@@ -21,8 +21,8 @@ class EnvConfig:
 
     Attributes:
         env_id: what to create.
-        seed: for the first reset that has none; for a vector environment also a tuple with one
-            for each sub-environment.
+        seed: for the first reset, unless that has one; for a vector environment also a tuple with
+            one for each sub-environment.
         render_mode: see ``make.make_env()``.
         kwargs: handed to the environment.
         wrappers: the first one is innermost.

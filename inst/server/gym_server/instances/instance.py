@@ -67,7 +67,7 @@ class Instance:
 
         Args:
             seed: seeds the environment and the action space; None leaves both as they are, or
-                takes the seed given at creation the first time. For sub-environments one for all,
+                takes the seed given at creation in the first reset. For sub-environments one for all,
                 each of which makes its own of it, or one for each.
             options: the environment's own.
             form: what is wanted of the answer.

@@ -85,9 +85,8 @@ class LocalBackend:
         seed_to_use = self._seed_for_reset if seed is None else seed
         self._was_reset = False
         observation, info = ask(self._move, self._reset_env, seed_to_use, options, mask, form.infos)
-        if seed is None:
-            self._seed_for_reset = None
-        elif mask is None:
+        self._seed_for_reset = None
+        if seed is not None and mask is None:
             self._seed_actions(seed)
         self._was_reset = True
         env.begin_episodes(mask)

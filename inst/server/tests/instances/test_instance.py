@@ -44,9 +44,18 @@ def test_seed_0_is_a_seed(client, create):
 
 def test_the_seed_of_creation_serves_the_first_reset_that_has_none(client, create):
     url = create(seed=5)
-    client.post(f"{url}/reset/", json={"seed": 9})
     assert client.post(f"{url}/reset/").json["observation"] == in_process("CartPole-v1", seed=5)
     assert client.post(f"{url}/reset/").json["observation"] != in_process("CartPole-v1", seed=5)
+
+
+@pytest.mark.parametrize("how", [{}, {"num_envs": 2, "vectorization_mode": "sync"}])
+def test_the_reset_after_one_with_a_seed_goes_on_with_its_generator(client, create, how):
+    url = create(seed=5, **how)
+    client.post(f"{url}/reset/", json={"seed": 42})
+    env = gymnasium.make_vec("CartPole-v1", **how) if how else gymnasium.make("CartPole-v1")
+    env.reset(seed=42)
+    observation, _ = env.reset()
+    assert client.post(f"{url}/reset/").json["observation"] == observation.tolist()
 
 
 @pytest.mark.parametrize("seed", [0, 5])
