@@ -13,14 +13,18 @@ chance_of_ice <- 0.8
 #' @return The arguments, with the map as `desc`.
 #' @noRd
 with_random_map <- function(env, arguments, seed) {
-  id <- if (inherits(env, "gym_wrapped")) env$env_id else env
   seed <- stats::na.omit(unlist(seed))
-  if (rlang::is_string(id) && grepl("^FrozenLake", id) && is.numeric(seed) && length(seed) &&
-        "map_name" %in% names(arguments) && is.null(arguments$map_name) &&
-        is.null(arguments[["desc"]])) {
+  if (length(seed) && is.numeric(seed) && wants_random_map(env, arguments)) {
     arguments$desc <- with_generator(new_generator(seed[[1L]]), draw_lake())
   }
   arguments
+}
+
+# By default FrozenLake has a map with a name.
+wants_random_map <- function(env, arguments) {
+  id <- if (inherits(env, "gym_wrapped")) env$env_id else env
+  rlang::is_string(id) && grepl("^FrozenLake", id) && "map_name" %in% names(arguments) &&
+    is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
 }
 
 # As Gymnasium does: cells are drawn until there is a way from the start to the goal.

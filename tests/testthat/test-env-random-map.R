@@ -32,9 +32,9 @@ test_that("what is learned on a random map is judged on the same", {
 })
 
 test_that("a way leads to the goal of every map", {
-  slopes <- matrix(c(TRUE, FALSE, TRUE, TRUE), 2)
-  expect_true(has_way(slopes))
-  expect_false(has_way(slopes & row(slopes) == col(slopes)))
+  ice <- matrix(c(TRUE, FALSE, TRUE, TRUE), 2)
+  expect_true(has_way(ice))
+  expect_false(has_way(ice & row(ice) == col(ice)))
   expect_true(all(vapply(1:50, function(seed) {
     map <- with_generator(new_generator(seed), draw_lake())
     has_way(do.call(rbind, strsplit(map, "")) != "H")
