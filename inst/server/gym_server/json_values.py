@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,11 +44,36 @@ def plain(value: object, depth: int = 0) -> object:
 
 def brief(value: object, width: int = 80) -> str:
     """Return a value as JSON text of at most ``width`` characters, for error messages."""
-    try:
-        text = json.dumps(plain(value))
-    except (RecursionError, ValueError):
-        text = _repr(type(value))
-    return text if len(text) <= width else text[: width - 3] + "..."
+    text = ""
+    for piece in _pieces(value, width):
+        text += piece
+        # The rest is not looked at: it may be as large as a request.
+        if len(text) > width:
+            return text[: width - 3] + "..."
+    return text
+
+
+def _pieces(value: object, width: int) -> Iterator[str]:
+    """Return the JSON text of a value piece by piece; of a string no more than is shown."""
+    if isinstance(value, str):
+        yield json.dumps(value[:width])
+    elif isinstance(value, Mapping):
+        yield "{"
+        for index, (key, item) in enumerate(value.items()):
+            yield f"{', ' if index else ''}{brief(_key(key), width)}: "
+            yield from _pieces(item, width)
+        yield "}"
+    elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
+        yield "["
+        for index, item in enumerate(value):
+            yield ", " if index else ""
+            yield from _pieces(item, width)
+        yield "]"
+    else:
+        try:
+            yield json.dumps(plain(value))
+        except ValueError:
+            yield _repr(type(value))
 
 
 def _number(value: float) -> float | str:

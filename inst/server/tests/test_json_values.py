@@ -66,3 +66,24 @@ def test_brief_is_json_and_short():
     assert brief(True) == "true"
     assert brief(math.nan) == '"NaN"'
     assert len(brief("x" * 1000)) == 80
+    assert (
+        brief({"a": [1, (2.5, None)], 3: np.arange(3)}) == '{"a": [1, [2.5, null]], "3": [0, 1, 2]}'
+    )
+
+
+def test_brief_looks_at_no_more_than_it_shows():
+    class Watched(list):
+        looked_at = 0
+
+        def __iter__(self):
+            for item in super().__iter__():
+                self.looked_at += 1
+                yield item
+
+    values = Watched(range(100_000))
+    assert brief({"a": values}).endswith("...")
+    assert values.looked_at < 80
+    assert len(brief(["x" * 10**6, 1])) == 80
+    endless = []
+    endless.append(endless)
+    assert brief(endless) == "[" * 77 + "..."

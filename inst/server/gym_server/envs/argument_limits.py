@@ -38,27 +38,27 @@ _REPEATING = {
 # and Atari's.
 _REPEATING_ARGUMENTS: tuple[str, ...] = ("frame_skip", "frameskip", "noop_max")
 
-# Arguments of environments that take memory or time in proportion to their value: the size of
-# MuJoCo's pictures and what they show, Atari's own vector environment.
+# The least and the most of arguments that take memory or time in proportion to their value: the
+# size of MuJoCo's pictures and what they show, Atari's own vector environment, which never comes
+# back from a picture or a stack without a size.
 _ENVIRONMENT_LIMITS = {
-    "width": 4_096,
-    "height": 4_096,
-    "max_geom": 100_000,
-    "img_width": 1_024,
-    "img_height": 1_024,
-    "stack_num": 64,
-    "num_threads": 64,
-    "batch_size": 16_384,
+    "width": (1, 4_096),
+    "height": (1, 4_096),
+    "max_geom": (1, 100_000),
+    "img_width": (1, 1_024),
+    "img_height": (1, 1_024),
+    "stack_num": (1, 64),
+    "num_threads": (0, 64),
 }
 
-# The same of wrappers.
+# The same of wrappers, which check for themselves what is too small.
 _WRAPPER_LIMITS = {
-    "AtariPreprocessing": {"screen_size": 4_096},
-    "DelayObservation": {"delay": 1_000},
-    "DiscretizeAction": {"bins": 10_000},
-    "DiscretizeObservation": {"bins": 10_000},
-    "FrameStackObservation": {"stack_size": 1_000},
-    "ResizeObservation": {"shape": 4_096},
+    "AtariPreprocessing": {"screen_size": (-math.inf, 4_096)},
+    "DelayObservation": {"delay": (-math.inf, 1_000)},
+    "DiscretizeAction": {"bins": (-math.inf, 10_000)},
+    "DiscretizeObservation": {"bins": (-math.inf, 10_000)},
+    "FrameStackObservation": {"stack_size": (-math.inf, 1_000)},
+    "ResizeObservation": {"shape": (-math.inf, 4_096)},
 }
 
 # A map of FrozenLake of 250 x 250, which takes a second to be made.
@@ -85,7 +85,8 @@ def check_environment(
     """
     if _is_known(spec):
         _check_length(kwargs)
-        _check_sizes(kwargs, _ENVIRONMENT_LIMITS)
+        # A step of Atari's own vector environment waits for so many sub-environments.
+        _check_sizes(kwargs, {**_ENVIRONMENT_LIMITS, "batch_size": (num_envs, num_envs)})
     _check_steps(spec, kwargs, wrappers, num_envs)
 
 
@@ -125,15 +126,15 @@ def _check_length(kwargs: dict) -> None:
         )
 
 
-def _check_sizes(kwargs: dict, limits: Mapping[str, int], prefix: str = "") -> None:
-    """Refuse arguments above their limits; the prefix begins the message."""
-    for name, limit in limits.items():
+def _check_sizes(kwargs: dict, limits: Mapping[str, tuple[float, int]], prefix: str = "") -> None:
+    """Refuse arguments beyond their limits; the prefix begins the message."""
+    for name, (least, most) in limits.items():
         for number in _numbers(kwargs.get(name)):
             # NaN is refused as well.
-            if not number <= limit:
+            if not least <= number <= most:
+                must = f"at least {least}" if number < least else f"at most {most}"
                 raise GymServerError(
-                    "invalid_kwargs",
-                    f"{prefix}{name} must be at most {limit}, not {brief(number)}",
+                    "invalid_kwargs", f"{prefix}{name} must be {must}, not {brief(number)}"
                 )
 
 

@@ -33,6 +33,7 @@ class Environment(Protocol):
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
+        drawn: whether it may have been drawn, so that it is closed on the render thread.
         fails_as_a_whole: whether it needs a reset after a step that failed.
     """
 
@@ -48,6 +49,7 @@ class Environment(Protocol):
     autoreset_mode: str | None
     draws_when_stepped: bool
     draws_on_render_thread: bool
+    drawn: bool
     fails_as_a_whole: bool
 
     # Reset ---------------------------------------------------------------------------------

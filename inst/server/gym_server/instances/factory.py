@@ -51,7 +51,7 @@ def make_instance(
             config.wrappers,
             reservation,
         )
-        undo.push(_closing_quietly(partial(renderer.run, env.close)))
+        undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
         reservation.reserve(make.ask(model_bytes, env), "Its transition model")
         wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
         return _instance(SingleEnvironment(wrapped, config, renderer), config, renderer)

@@ -67,8 +67,8 @@ class Instance:
 
         Args:
             seed: seeds the environment and the action space; None leaves both as they are, or
-                takes the seed given at creation in the first reset. For sub-environments one for all,
-                each of which makes its own of it, or one for each.
+                takes the seed given at creation in the first reset. For sub-environments one for
+                all, each of which makes its own of it, or one for each.
             options: the environment's own.
             form: what is wanted of the answer.
             mask: a boolean for each sub-environment; None for all of them.

@@ -258,6 +258,7 @@ class LocalBackend:
                 f"Instance {instance_id} is already monitored",
                 "close that monitor first",
             )
+        self.env.drawn = self.env.drawn or video_every > 0
         self._monitor = Monitor.start(
             self.env.gym_env,
             root,

@@ -40,6 +40,7 @@ class SingleEnvironment:
         self.observation_space = self.single_observation_space = env.observation_space
         self.draws_when_stepped = draws_when_stepped(env)
         self.draws_on_render_thread = env.render_mode == "rgb_array"
+        self.drawn = self.draws_when_stepped
         self.statistics: Statistics = EpisodeStatistics()
         self.has_ended = False
         self._renderer = renderer
@@ -136,11 +137,12 @@ class SingleEnvironment:
 
     def draw(self, sub_env: int) -> object:
         """Draw the environment on the render thread."""
+        self.drawn = True
         return self._renderer.run(self.gym_env.render)
 
     def close(self) -> None:
-        """Close the environment on the render thread."""
-        self._renderer.run(self.gym_env.close)
+        """Close the environment."""
+        self._renderer.close(self.gym_env.close, self.drawn)
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Do nothing: this process does not end by itself."""

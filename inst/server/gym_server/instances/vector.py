@@ -57,6 +57,8 @@ class VectorEnvironment:
         self.num_workers = env.num_workers
         self.autoreset_mode: str | None = env.autoreset_mode.value
         self.draws_when_stepped = env.draws_when_stepped
+        # What runs the sub-environments knows it.
+        self.drawn = False
         self.draws_on_render_thread = env.render_mode == "rgb_array" and env.draws_in_process
         self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
 

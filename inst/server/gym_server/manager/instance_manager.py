@@ -115,7 +115,9 @@ class InstanceManager:
         wrappers.check(config.wrappers)
         if config.num_envs is None:
             vector_make.check_single(config)
-        isolated = self._isolation.wants(config.env_id, self._allowed_modules)
+        isolated = self._isolation.wants(
+            config.env_id, self._allowed_modules, config.vectorization_mode
+        )
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)

@@ -2,7 +2,7 @@
 
 There is one pygame per process: an environment's ``close()`` calls ``pygame.quit()``, which takes
 the fonts of all the others away; and an OpenGL context belongs to the thread that created it.
-So everything that draws or closes runs here, and pygame ends with the process.
+So everything that draws, or closes what was drawn, runs here, and pygame ends with the process.
 """
 
 from __future__ import annotations
@@ -69,6 +69,13 @@ class RenderThread:
         with self._job(draw, *args) as job:
             result: ResultT = job.future.result()
             return result
+
+    def close(self, close: Callable[[], object], drawn: bool) -> None:
+        """Close an environment: on the render thread where it was drawn, at once where not."""
+        if drawn:
+            self.run(close)
+        else:
+            _keep_pygame_and(close)
 
     def run_while(
         self, may_wait: Callable[[], bool], draw: Callable[..., ResultT], *args: object

@@ -37,6 +37,7 @@ class EntryPointEnv:
         """
         self._env: Any = env
         self._renderer = renderer
+        self._drawn = False
         self.num_envs = env.num_envs
         self.autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
         self.ended = np.zeros(env.num_envs, dtype=bool)
@@ -75,6 +76,7 @@ class EntryPointEnv:
                 f"draw are {_MOST_DRAWN_AT_ONCE}",
                 "create the environment with vectorization_mode 'sync'",
             )
+        self._drawn = True
         return self._renderer.run(self._env.render)[sub_env]
 
     def observed(self, sub_env: int, batch: object) -> object:
@@ -85,8 +87,8 @@ class EntryPointEnv:
         """Do nothing: this process does not end by itself."""
 
     def close(self) -> None:
-        """Close the environment on the render thread."""
-        self._renderer.run(self._env.close)
+        """Close the environment."""
+        self._renderer.close(self._env.close, self._drawn)
 
     def kill(self, why: GymServerError | None = None) -> None:
         """Do nothing: it runs in this process."""

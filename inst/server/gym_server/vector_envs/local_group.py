@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
 
@@ -16,12 +17,14 @@ class LocalGroup:
         """Take over a group; it draws on the render thread."""
         self._group = group
         self._renderer = renderer
+        self._drawn = any(map(draws_when_stepped, group.envs))
         self._call: Callable[[], Any] = lambda: None
 
     def begin(self, method: str, *args: object) -> None:
         """Note a call of one of the group's methods."""
         self._call = lambda: getattr(self._group, method)(*args)
         if method == "render":
+            self._drawn = True
             self._call = lambda: self._renderer.run(self._group.render, *args)
 
     def finish(self) -> Any:
@@ -30,4 +33,4 @@ class LocalGroup:
 
     def close(self) -> None:
         """Close the group."""
-        self._group.close()
+        self._renderer.close(self._group.close, self._drawn)

@@ -15,6 +15,7 @@ from gym_server.envs import argument_limits, make
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.registry import module_of
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
@@ -59,7 +60,7 @@ def make_vector_env(
         request = _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
         match config.vectorization_mode:
             case None:
-                env = None if _why_no_entry_point(request) else _try_entry_point(request)
+                env = _try_entry_point(request) if _is_the_same_task(request) else None
                 if env is None:
                     return _make_sub_envs(request)
             case "sync" | "async":
@@ -152,34 +153,20 @@ def _why_no_entry_point(request: _Request) -> str | None:
     return None
 
 
+def _is_the_same_task(request: _Request) -> bool:
+    """Tell whether an environment's own implementation is known to play as the single one does.
+
+    Gymnasium's own do. Atari's observes other pictures.
+    """
+    return module_of(request.spec).startswith("gymnasium.") and not _why_no_entry_point(request)
+
+
 def _try_entry_point(request: _Request) -> VectorEnv | None:
     try:
-        env = _make_entry_point(request)
-        if _is_the_same_task(env, request):
-            return env
-        env.close()
+        return _make_entry_point(request)
     except _NotPossibleError:
-        pass
-    request.memory.give_back()
-    return None
-
-
-def _is_the_same_task(env: VectorEnv, request: _Request) -> bool:
-    """Tell whether a vector environment has the spaces of the single environment.
-
-    Atari's own implementation does not: it observes other pictures. Where the single environment
-    cannot be made there is nothing to compare with, and the answer is yes.
-    """
-    try:
-        single = make.make_from_spec(request.spec, None, request.kwargs)
-    except GymServerError:
-        return True
-    same = (env.single_observation_space, env.single_action_space) == (
-        single.observation_space,
-        single.action_space,
-    )
-    request.renderer.run(single.close)
-    return same
+        request.memory.give_back()
+        return None
 
 
 def _require_entry_point(request: _Request) -> VectorEnv:

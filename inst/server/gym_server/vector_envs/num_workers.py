@@ -17,6 +17,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.processes.cores import usable_cores
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
@@ -121,4 +122,4 @@ def _measure(env: gymnasium.Env, renderer: RenderThread) -> float:
                 env.reset()
         return (time.perf_counter() - began) / _MEASURED_STEPS
     finally:
-        renderer.run(env.close)
+        renderer.close(env.close, draws_when_stepped(env))

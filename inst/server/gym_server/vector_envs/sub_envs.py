@@ -117,7 +117,7 @@ class SubEnvs:
             spaces.describe(one.action_space)
             self._describe(one, one.render_mode)
         finally:
-            self._renderer.run(one.close)
+            self._renderer.close(one.close, draws_when_stepped(one))
         self.draws_when_stepped = self.draws_in_process = False
 
     def _describe(self, env: Any, render_mode: str | None) -> None:
@@ -331,7 +331,7 @@ class SubEnvs:
         self._is_closed = True
         for group in self._groups:
             if isinstance(group, LocalGroup):
-                self._renderer.run(group.close)
+                group.close()
             else:
                 group.release()
         if self.num_workers == 0:

@@ -71,6 +71,13 @@ def test_mujocos_arguments_are_bounded(refused, kwargs):
     refused("Hopper-v5", kwargs=kwargs)
 
 
+@pytest.mark.parametrize("name", ["stack_num", "img_height", "img_width", "batch_size"])
+def test_ataris_own_vector_environment_gets_no_argument_that_hangs_it(refused, name):
+    pytest.importorskip("ale_py")
+    how = {"num_envs": 2, "vectorization_mode": "vector_entry_point", "kwargs": {name: 0}}
+    assert f"{name} must be at least" in refused("ALE/Pong-v5", **how)
+
+
 def test_arguments_are_only_so_long(refused, create):
     create("FrozenLake-v1", kwargs={"desc": ["S" + "F" * 99] * 99 + ["F" * 99 + "G"]})
     assert "at most 65,536 characters of JSON, not 1,00" in refused(

@@ -38,3 +38,12 @@ def test_only_an_id_that_nobody_knows_imports_all_modules():
     ]:
         settings = isolation.settings(env_id, ALLOWED, 5)
         assert (settings.imported, settings.max_num_envs, settings.max_mb) == (imported, 5, 100)
+
+
+def test_ataris_own_vector_environment_is_made_elsewhere():
+    pytest.importorskip("ale_py")
+    pong = ("ALE/Pong-v5", ALLOWED)
+    wanting = [mode for mode in MODES if Isolation(mode).wants(*pong, "vector_entry_point")]
+    assert wanting == ["foreign", "all"]
+    assert not Isolation("foreign").wants(*pong, "sync")
+    assert not Isolation("foreign").wants("CartPole-v1", ALLOWED, "vector_entry_point")

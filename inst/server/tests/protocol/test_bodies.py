@@ -18,6 +18,11 @@ def test_what_is_not_json_is_refused(raw):
     assert code_of(loads, raw) == "malformed_json"
 
 
+def test_json_is_only_so_long():
+    assert loads(b"{}" + b" " * (2**20 - 2)) == {}
+    assert code_of(loads, b"{}" + b" " * (2**20 - 1)) == "body_too_large"
+
+
 @pytest.mark.parametrize("raw", [b"1", b"true", b'"text"', b"[1]", b"1.5"])
 def test_what_is_not_an_object_is_refused(raw):
     assert code_of(loads, raw) == "not_an_object"

@@ -11,10 +11,7 @@ from gym_server.viewing import viewer
 
 @pytest.fixture
 def occupied(app, client, faulty, watch):
-    """Have another environment draw for as long as the test does not call what it is given.
-
-    What the test makes has to be made before: to make sub-environments takes the render thread.
-    """
+    """Have another environment draw for as long as the test does not call what it is given."""
     url = faulty("Drawing")
     instance, _ = watch(url)
     begun, over = threading.Event(), threading.Event()
@@ -73,6 +70,16 @@ def test_who_needs_no_drawing_here_does_not_wait_for_others(
     watcher, seen = in_background(state, app.test_client(), url)
     watcher.join(5)
     assert seen[0]["state"] == "running"
+
+
+@pytest.mark.parametrize(
+    "made", [{}, *({"num_envs": 2, "vectorization_mode": mode} for mode in ("sync", "async"))]
+)
+def test_what_was_never_drawn_is_made_and_closed_while_others_draw(client, create, occupied, made):
+    occupied()
+    closing, closed = in_background(lambda: client.post(f"{create(**made)}/close/"))
+    closing.join(5)
+    assert closed[0].status_code == 204
 
 
 def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occupied, eventually):
