@@ -25,7 +25,7 @@ from gym_server.budget import Budget
 from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import answer_to
+from gym_server.errors import GymServerError, answer_to
 from gym_server.instances.backend import Seed
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
@@ -38,6 +38,8 @@ from gym_server.processes.set_up import set_up_process
 from gym_server.protocol import answers
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
+
+log = logging.getLogger(__name__)
 
 # Its imports take longer than the start of a process.
 start.preload(__name__)
@@ -157,6 +159,7 @@ class _Methods:
             undo.pop_all()
         self._instance = instance
         self.is_created = True
+        instance.report_end(_end)
         return {
             "fps": instance.viewer.fps,
             "about": instance.about(),
@@ -212,6 +215,12 @@ class _Methods:
 
     def observation_contains(self, claim: dict) -> bool:
         return self._instance.observation_contains(claim)
+
+
+def _end(why: GymServerError) -> None:
+    """End with a process of sub-environments that has ended."""
+    log.warning("%s", why.message)
+    os._exit(1)
 
 
 class _Resolved:

@@ -56,6 +56,19 @@ def test_it_is_told_how_a_process_ended_and_the_instance_is_gone(server, does, h
     assert server.get("/v1/health/")[0] == 200
 
 
+def test_an_isolated_environment_ends_with_the_process_of_its_sub_environments(server, eventually):
+    before = server.get("/v1/envs/")[1]["all_envs"]
+    url = server.create(
+        "faulty_envs:Rogue-v0", num_envs=2, vectorization_mode="async", num_workers=1
+    )
+    status, answer = server.post(f"{url}/reset/")
+    assert status == 200, answer
+    os.kill(answer["info"]["pid"][0], signal.SIGKILL)
+    # Without another call.
+    eventually(lambda: server.get("/v1/envs/")[1]["all_envs"] == before)
+    assert server.post(f"{url}/reset/")[1]["code"] == "environment_died"
+
+
 def test_what_it_forked_ends_with_it(server, eventually):
     before = set(descendants(server.process.pid))
     url, pid = rogue(server, does="forks_and_exits")
