@@ -69,23 +69,28 @@ ask_program <- function(command, arguments, timeout = 30, env = NULL) {
 
 failed <- function(output) !identical(attr(output, "status"), 0L)
 
+# The address of a mirror or a proxy may hold a password.
+without_passwords <- function(texts) gsub("://[^/[:space:]]+@", "://<login>@", texts)
+
 # Errors are ignored: on a full disk the error of the installation itself says more.
 write_log <- function(lines) {
+  lines <- without_passwords(lines)
   try(suppressWarnings(cat(paste0(lines, "\n"), file = install_log(), append = TRUE, sep = "")),
       silent = TRUE)
 }
 
 abort_tool <- function(what, output, call, more = NULL) {
+  output <- without_passwords(output)
   lines <- error_lines(output)
   abort_install(
     c(
-      paste0(what, "."),
+      paste0(without_passwords(what), "."),
       x = if (length(lines)) paste(lines, collapse = "\n"),
       rlang::set_names(c(install_advice(output), more), "i"),
       i = paste0("The full output is in ", install_log(), "."),
       i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
     ),
-    output = as.character(output),
+    output = output,
     call = call
   )
 }

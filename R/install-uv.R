@@ -125,15 +125,20 @@ install_uv <- function(call) {
   unpack_uv(archive, uv, call)
 }
 
+# Five times as much as its archive has.
+most_bytes_of_uv <- 100e6
+
 download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
+  received <- 0
   handle <- curl::new_handle(
     failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
     # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
     low_speed_limit = 100, low_speed_time = 60,
     noprogress = FALSE, progressfunction = function(down, up) {
       touch_install_lock()
-      TRUE
+      received <<- down[[2L]]
+      received <= most_bytes_of_uv
     }
   )
   certificates <- Sys.getenv("SSL_CERT_FILE")
@@ -144,9 +149,14 @@ download_uv <- function(url, archive, call) {
     # Unlike curl_download() it does not replace the handle's progress function.
     curl::curl_fetch_disk(url, archive, handle = handle),
     error = function(cnd) {
-      write_log(conditionMessage(cnd))
+      problem <- if (received > most_bytes_of_uv) {
+        paste("What is there is larger than", most_bytes_of_uv / 1e6, "MB.")
+      } else {
+        conditionMessage(cnd)
+      }
+      write_log(problem)
       abort_tool(
-        paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
+        paste("uv could not be downloaded from", url), problem, call,
         more = paste(
           "uv can also be installed by hand (<https://docs.astral.sh/uv/>), and so can Python",
           "3.10 to 3.13: `gym_server_install()` takes what it finds."

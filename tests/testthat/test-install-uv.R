@@ -143,6 +143,22 @@ test_that("a download that fails says what else can be done", {
   expect_match(conditionMessage(error), "by hand", fixed = TRUE)
 })
 
+test_that("a download shows no password, and is not larger than it may be", {
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  withr::local_envvar(UV_DOWNLOAD_URL = "http://me:secret@127.0.0.1:9")
+  error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
+  expect_match(conditionMessage(error), "http://<login>@127.0.0.1:9/", fixed = TRUE)
+  shown <- c(unlist(error), readLines(install_log()))
+  expect_false(any(grepl("secret", shown, fixed = TRUE)))
+  local_binding("most_bytes_of_uv", 1000)
+  archive <- withr::local_tempfile(lines = strrep("x", 5000))
+  expect_error(
+    download_uv(paste0("file://", archive), withr::local_tempfile(), NULL), "larger than 0.001 MB",
+    class = "gym_error_install"
+  )
+})
+
 test_that("an archive without a uv that runs is refused", {
   skip_on_os("windows")
   local_cache()
