@@ -62,7 +62,10 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
 }
 
 # The codes of errors that say that an instance is gone, whether it was closed or evicted.
-gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "environment_died")
+gone_codes <- c(
+  "unknown_instance", "instance_idle_closed", "instance_memory_closed", "call_too_long",
+  "environment_died"
+)
 
 # What the client knows of an instance. The server is asked once.
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {

@@ -21,6 +21,7 @@ _STATUS = {
     "method_not_allowed": 405,
     "request_conflict": 409,
     "instance_idle_closed": 410,
+    "instance_memory_closed": 410,
     "upload_closed": 410,
     "body_too_large": 413,
     "too_many_instances": 429,
@@ -103,6 +104,17 @@ def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError
         "instance_idle_closed",
         f"Instance {instance_id} of {env_id} was closed: nobody used it for {minutes:g} minutes",
         "create it again; the server's option --idle-minutes sets the limit",
+    )
+
+
+def memory_closed(instance_id: str, env_id: str, megabytes: float) -> GymServerError:
+    """The server has closed an instance that took more memory than there was."""
+    return GymServerError(
+        "instance_memory_closed",
+        f"Instance {instance_id} of {env_id} was closed: all environments together held more "
+        f"memory than they may, and this one had grown most, by {megabytes:,.0f} MiB",
+        "draw fewer sub-environments, or smaller pictures; the server's option --max-memory-mb "
+        "sets the limit",
     )
 
 

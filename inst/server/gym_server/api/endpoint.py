@@ -74,6 +74,8 @@ class Endpoint:
         def perform() -> Outcome:
             try:
                 fields = read(body, route.fields)
+                if route.grows:
+                    self._services.instances.account.check()
                 call = Call(
                     self._services,
                     match.variables,

@@ -17,6 +17,7 @@ ROUTES = Table()
     "each state to be the first of an episode; state, action, next_state, probability, reward and "
     "terminated, each with one element for each transition of a probability above 0, by state and "
     "action. A limit of time is no part of it",
+    grows=True,
     schema=schemas.json_object({"model": schemas.TRANSITION_MODEL}),
 )
 def env_model(call: Call) -> dict | Ready:

@@ -65,6 +65,7 @@ ROUTES = Table()
     Field("name", fields.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
     once=True,
+    grows=True,
     schema=schemas.json_object({"instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}),
 )
 def env_create(call: Call) -> dict:
@@ -135,6 +136,8 @@ def env_about(call: Call) -> dict:
 def env_reset(call: Call) -> dict | Ready:
     """Start an episode."""
     fields = call.fields
+    if isinstance(fields["seed"], tuple):
+        call.services.instances.account.check()
     return call.instance.reset(
         fields["seed"], fields["options"], call.wanted_form, fields["reset_mask"]
     )
@@ -262,6 +265,7 @@ def env_observation_space_contains(call: Call) -> dict:
     INSTANCE + "render/",
     Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
     answer="the current frame",
+    grows=True,
     content_type="image/png",
     tensors=True,
 )
@@ -280,6 +284,7 @@ def env_render(call: Call) -> Content:
     Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
     Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
     Field("video_callable", fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    grows=True,
 )
 def env_monitor_start(call: Call) -> None:
     """Record the episodes that start from now on."""

@@ -41,6 +41,7 @@ class Route:
         callers: who may call it.
         once: whether the body may also hold an idempotency key, by which the request is done once
             however often it arrives.
+        grows: whether it makes the server or its processes hold more memory.
         ends_instance: whether the instance in the path is gone afterwards.
         content_type: what an ordinary answer is.
         tensors: whether the answer may also be tensors, when the client accepts them.
@@ -58,6 +59,7 @@ class Route:
     schema: dict[str, Any] | None = None
     callers: Callers = Callers.TOKEN
     once: bool = False
+    grows: bool = False
     ends_instance: bool = False
     content_type: str = JSON
     tensors: bool = False

@@ -131,6 +131,7 @@ def env_watch_script(call: Call) -> Content:
     "reward_threshold, fps (null unless it is shown in real time), frame (a PNG in Base64, or "
     "null), and without a frame why_no_picture, hint and observation (names, values, size)",
     callers=Callers.WATCHERS,
+    grows=True,
     schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
 def env_watch_state(call: Call) -> Content:

@@ -102,8 +102,8 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "--max-memory-mb",
         type=_number(1, 2**24),
         default=Limits.max_memory_mb,
-        help="memory that all environments together may be estimated to take at their most "
-        "(%(default)s)",
+        help="memory that all environments together may take, estimated before they are created "
+        "and measured afterwards (%(default)s)",
     )
     limits.add_argument(
         "--max-watchers",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from gym_server.errors import GymServerError
@@ -26,6 +26,8 @@ class Backend(Protocol):
         steps: how many steps its sub-environments have taken.
         draws_when_stepped: whether its steps run on the render thread.
         draws_on_render_thread: whether its frames are drawn on the render thread.
+        grown: by how many bytes drawing has made the server's process grow.
+        pids: the processes that run it, beside the server's.
         can_be_killed: whether ``kill()`` ends every call on it, so that none can be stuck.
     """
 
@@ -36,6 +38,14 @@ class Backend(Protocol):
     draws_when_stepped: bool
     draws_on_render_thread: bool
     can_be_killed: bool
+
+    @property
+    def grown(self) -> int:
+        """See above."""
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """See above."""
 
     # Called by the thread that has the lock ------------------------------------------------
 

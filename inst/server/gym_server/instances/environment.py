@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from gymnasium.spaces import Space
@@ -34,6 +34,8 @@ class Environment(Protocol):
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
         drawn: whether it may have been drawn, so that it is closed on the render thread.
+        grown: by how many bytes drawing has made this process grow.
+        pids: the processes that run it, beside this one.
         fails_as_a_whole: whether it needs a reset after a step that failed.
     """
 
@@ -50,6 +52,15 @@ class Environment(Protocol):
     draws_when_stepped: bool
     draws_on_render_thread: bool
     drawn: bool
+
+    @property
+    def grown(self) -> int:
+        """See above."""
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """See above."""
+
     fails_as_a_whole: bool
 
     # Reset ---------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from gym_server.envs.config import EnvConfig
@@ -267,6 +267,16 @@ class Instance:
         """Stop recording and finish the files, if it is recorded."""
         with self.lock:
             self._backend.close_monitor()
+
+    @property
+    def grown(self) -> int:
+        """By how many bytes drawing has made the server's process grow."""
+        return self._backend.grown
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """The processes that run it, beside the server's."""
+        return self._backend.pids
 
     # Beginning and end ----------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +61,7 @@ class LocalBackend:
         self.draws_on_render_thread = env.draws_on_render_thread
         self._monitor: Monitor | None = None
         self._seed_for_reset: Seed = config.seed
+        self._seed_bytes = 0
         self._was_reset = False
         self._observation: object = None
         self._max_episode_steps = time_limit(env.gym_env)
@@ -86,6 +87,7 @@ class LocalBackend:
         self._was_reset = False
         observation, info = ask(self._move, self._reset_env, seed_to_use, options, mask, form.infos)
         self._seed_for_reset = None
+        self._seed_bytes = _held_by(seed)
         if seed is not None and mask is None:
             self._seed_actions(seed)
         self._was_reset = True
@@ -236,6 +238,16 @@ class LocalBackend:
             "isolated": False,
         }
 
+    @property
+    def grown(self) -> int:
+        """By how many bytes drawing and seeds for later episodes have made this process grow."""
+        return self.env.grown + self._seed_bytes
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """The processes that run it, beside this one."""
+        return self.env.pids
+
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """From now on report when a process of sub-environments ends by itself."""
         self.env.report_end(on_end)
@@ -295,3 +307,9 @@ class LocalBackend:
             self.close_monitor()
         with contextlib.suppress(BaseException):
             self.env.close()
+
+
+def _held_by(seed: Seed) -> int:
+    """Return the bytes of the seeds for later episodes: each is an object in a list."""
+    lists = [one for one in seed if isinstance(one, tuple)] if isinstance(seed, tuple) else []
+    return 40 * sum(map(len, lists))

@@ -17,6 +17,7 @@ from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
+from gym_server.processes.memory import measured
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
@@ -31,6 +32,7 @@ class SingleEnvironment:
     num_workers: int | None = None
     autoreset_mode: str | None = None
     fails_as_a_whole = False
+    pids = ()
 
     def __init__(self, env: gymnasium.Env, config: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment."""
@@ -41,6 +43,7 @@ class SingleEnvironment:
         self.draws_when_stepped = draws_when_stepped(env)
         self.draws_on_render_thread = env.render_mode == "rgb_array"
         self.drawn = self.draws_when_stepped
+        self.grown = 0
         self.statistics: Statistics = EpisodeStatistics()
         self.has_ended = False
         self._renderer = renderer
@@ -138,7 +141,9 @@ class SingleEnvironment:
     def draw(self, sub_env: int) -> object:
         """Draw the environment on the render thread."""
         self.drawn = True
-        return self._renderer.run(self.gym_env.render)
+        frame, grown = self._renderer.run(measured, self.gym_env.render)
+        self.grown += grown
+        return frame
 
     def close(self) -> None:
         """Close the environment."""

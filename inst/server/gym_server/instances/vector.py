@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -247,6 +247,16 @@ class VectorEnvironment:
     def decode(self, space: Space, value: object) -> object:
         """Return the members of a space in a list that has one for each sub-environment."""
         return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
+
+    @property
+    def grown(self) -> int:
+        """By how many bytes drawing has made this process grow."""
+        return int(self.gym_env.grown)
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """The processes that they run in."""
+        return list(self.gym_env.pids)
 
     @property
     def has_ended(self) -> bool:

@@ -41,6 +41,7 @@ class WorkerBackend:
     draws_when_stepped = False
     draws_on_render_thread = False
     can_be_killed = True
+    grown = 0
 
     def __init__(self, config: EnvConfig, settings: WorkerSettings) -> None:
         """Start the process; ``create()`` waits for the environment.
@@ -160,6 +161,11 @@ class WorkerBackend:
         except TimeoutError:
             log.info("The process of %s does not answer at the moment", self.env_id)
         return {**self._about, "isolated": True}
+
+    @property
+    def pids(self) -> list[int]:
+        """Its process."""
+        return [self._worker.pid]
 
     @property
     def busy_since(self) -> float | None:

@@ -15,13 +15,21 @@ from gym_server.envs import registry, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import GymServerError, call_too_long, idle_closed, shutting_down
+from gym_server.errors import (
+    GymServerError,
+    call_too_long,
+    idle_closed,
+    memory_closed,
+    shutting_down,
+)
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.isolation.policy import Isolation
 from gym_server.isolation.worker_backend import WorkerBackend
+from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
 from gym_server.manager.tombstones import Tombstones
+from gym_server.processes import memory
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt, interrupted_by
@@ -94,6 +102,9 @@ class InstanceManager:
         # collects it, sets this back.
         self.left_garbage = False
         self._budget = Budget(self._limits.max_memory_mb * 2**20)
+        self.account = Account(self._budget.limit)
+        # While an instance that took too much is being closed.
+        self._evicting = threading.Event()
         # By creation until it ends, then by instance_id until the instance is closed.
         self._shares: dict[_Creation | str, _Share] = {}
         # The creations, each with the thread that does it; the instances that are being closed.
@@ -153,7 +164,9 @@ class InstanceManager:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
             if not config.wants_workers:
                 workers = min(workers, max(0, self._limits.max_processes - taken.processes))
-            room = Room(config.num_envs or 1, isolated + workers)
+            # An isolated environment starts its workers by a fork server of its own.
+            fork_server = bool(isolated and workers)
+            room = Room(config.num_envs or 1, isolated + fork_server + workers)
             share = _Share(room, reservation)
             creation = _Creation(replace(config, max_workers=workers), share)
             instances = len(self._instances) + len(self._creating)
@@ -349,6 +362,39 @@ class InstanceManager:
         self._tombstones.add(instance_id, why)
         self._closing.pop(instance_id, None)
         self._release(instance_id)
+
+    def evict_largest(self) -> None:
+        """Close the instance that has grown most, if all together hold too much.
+
+        What nobody uses at the moment goes first.
+        """
+        self.account.measure()
+        if not self.account.is_exceeded or self._evicting.is_set():
+            return
+        warm_processes.end()
+        memory.give_back()
+        self.account.measure()
+        if not self.account.is_exceeded:
+            return
+        with self._lock:
+            instances = list(self._instances.values())
+        sizes = [one.grown + self.account.of(one.pids) for one in instances]
+        largest = max(range(len(instances)), key=sizes.__getitem__, default=None)
+        if largest is None or sizes[largest] <= 0:
+            return
+        instance = instances[largest]
+        why = memory_closed(instance.instance_id, instance.env_id, sizes[largest] / 2**20)
+        if self._unlist(instance.instance_id, why) is not None:
+            log.warning("%s", why.message)
+            self._evicting.set()
+            threading.Thread(target=self._close_evicted, args=(instance,), daemon=True).start()
+
+    def _close_evicted(self, instance: Instance) -> None:
+        try:
+            self._close_and_log(instance)
+            memory.give_back()
+        finally:
+            self._evicting.clear()
 
     def evict_idle(self, minutes: float) -> None:
         """Evict the instances that nobody has used or watched for so long, and close them."""

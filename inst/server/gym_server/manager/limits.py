@@ -40,8 +40,9 @@ class Limits:
             there are, each takes 7 MB of its own when it is created and 20 MB in use, two threads
             and 15 files, whether it is used or not; this is a class in which everybody has some
             isolated ones, or sub-environments in processes.
-        max_memory_mb: how much memory all of them may be estimated to take together at their most,
-            in MiB; see ``memory_estimate``. Half of what a small machine has.
+        max_memory_mb: how much memory all of them may take together, in MiB, as it is estimated
+            beforehand (``memory_estimate``) and measured afterwards (``Account``). Half of what a
+            small machine has.
         max_watchers: how many pages may be shown something at a time.
         max_call_seconds: how long one call may take before its instance is evicted; 0 for no limit.
             Longer than an ordinary call takes, and short enough that somebody who comes back from

@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
 
+# How often the memory of processes is measured, which takes some milliseconds.
+_MEASURE_SECONDS = 1.0
+
 # How often memory is given back to the system, which costs some milliseconds, and where there are
 # many thousands of sub-environments some tenths of a second.
 _GIVE_BACK_SECONDS = 30.0
@@ -49,7 +52,7 @@ class Watchdog:
         self._limits = limits
         self._answer_for = answer_for
         self._forget = forget
-        self._gave_back = time.monotonic()
+        self._gave_back = self._measured = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         thread.start()
@@ -72,6 +75,9 @@ class Watchdog:
             self._instances.evict_overdue(self._limits.max_call_seconds, self._answer_for)
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
+        if time.monotonic() > self._measured + _MEASURE_SECONDS:
+            self._instances.evict_largest()
+            self._measured = time.monotonic()
         self._forget()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
             garbage, self._instances.left_garbage = self._instances.left_garbage, False

@@ -1,11 +1,18 @@
-"""Return memory that is no longer used to the system."""
+"""How much memory this process and those below it have to themselves, and giving it back."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
+import os
 import sys
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+ResultT = TypeVar("ResultT")
 
 # glibc's numbers of two settings of mallopt(), and our values. A block from _LARGE_BYTES on, such
 # as a request's body, is a mapping of its own, which goes back to the system when it is freed. A
@@ -56,3 +63,68 @@ def give_back(garbage: bool = True) -> None:
         gc.collect()
     if _malloc_trim is not None:
         _malloc_trim(0)
+
+
+# Measuring ----------------------------------------------------------------------------------
+
+_PROC = Path("/proc")
+_MEASURES = sys.platform == "linux"
+_PAGE = os.sysconf("SC_PAGE_SIZE") if _MEASURES else 0
+
+
+def own_bytes() -> int:
+    """Return what this process has in memory and shares with no other; 0 where that is unknown."""
+    return _resident(os.getpid()) if _MEASURES else 0
+
+
+def measured(call: Callable[[], ResultT]) -> tuple[ResultT, int]:
+    """Call a function; return its result, and how many bytes this process has grown meanwhile."""
+    before = own_bytes()
+    result = call()
+    return result, own_bytes() - before
+
+
+def descendants() -> dict[int, int]:
+    """Return the processes below this one, each with the one that started it."""
+    children: dict[int, list[int]] = defaultdict(list)
+    for pid, parent in _parents() if _MEASURES else ():
+        children[parent].append(pid)
+    found: dict[int, int] = {}
+    waiting = [os.getpid()]
+    while waiting:
+        parent = waiting.pop()
+        for pid in children[parent]:
+            found[pid] = parent
+            waiting.append(pid)
+    return found
+
+
+def bytes_of(pid: int, exactly: bool) -> int:
+    """Return what another process has in memory and shares with no other; 0 for one that is gone.
+
+    Args:
+        pid: its number.
+        exactly: whether to leave out the pages that a fork shares with its parent until one of them
+            writes there, which takes a millisecond or more.
+    """
+    if not exactly:
+        return _resident(pid)
+    with contextlib.suppress(OSError):
+        lines = (_PROC / str(pid) / "smaps_rollup").read_text().splitlines()
+        return 1024 * sum(int(line.split()[1]) for line in lines if line.startswith("Private_"))
+    return 0
+
+
+def _resident(pid: int) -> int:
+    with contextlib.suppress(OSError):
+        _, resident, shared, *_ = (_PROC / str(pid) / "statm").read_text().split()
+        return (int(resident) - int(shared)) * _PAGE
+    return 0
+
+
+def _parents() -> Iterator[tuple[int, int]]:
+    for entry in _PROC.glob("[0-9]*"):
+        # It may end while it is looked at.
+        with contextlib.suppress(OSError):
+            # The number, the name in parentheses, the state, the parent's number.
+            yield int(entry.name), int((entry / "stat").read_text().rpartition(")")[2].split()[1])

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server.errors import GymServerError
+from gym_server.processes.memory import measured
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import member_of
 
@@ -27,6 +28,7 @@ class EntryPointEnv:
     draws_in_process = True
     num_workers = None
     moved = None
+    pids = ()
 
     def __init__(self, env: VectorEnv, renderer: RenderThread) -> None:
         """Take over an environment.
@@ -38,6 +40,7 @@ class EntryPointEnv:
         self._env: Any = env
         self._renderer = renderer
         self._drawn = False
+        self.grown = 0
         self.num_envs = env.num_envs
         self.autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
         self.ended = np.zeros(env.num_envs, dtype=bool)
@@ -77,7 +80,9 @@ class EntryPointEnv:
                 "create the environment with vectorization_mode 'sync'",
             )
         self._drawn = True
-        return self._renderer.run(self._env.render)[sub_env]
+        frames, grown = self._renderer.run(measured, self._env.render)
+        self.grown += grown
+        return frames[sub_env]
 
     def observed(self, sub_env: int, batch: object) -> object:
         """Return the last observation of a sub-environment, given that of the last move."""

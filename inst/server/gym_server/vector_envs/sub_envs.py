@@ -320,6 +320,11 @@ class SubEnvs:
             self._on_end(why)
 
     @property
+    def grown(self) -> int:
+        """By how many bytes drawing them has made this process grow."""
+        return sum(group.grown for group in self._groups if isinstance(group, LocalGroup))
+
+    @property
     def pids(self) -> list[int]:
         """The numbers of its processes."""
         return [group.pid for group in self._groups if isinstance(group, GroupProcess)]

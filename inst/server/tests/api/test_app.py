@@ -3,6 +3,8 @@ import json
 
 import pytest
 
+from gym_server.protocol.safetensors import TENSORS, Tensor, write
+
 CREATE = {"env_id": "CartPole-v1"}
 
 
@@ -27,9 +29,17 @@ def test_an_enormous_body_is_413(client):
     assert (answer.status_code, answer.json["code"]) == (413, "body_too_large")
 
 
-def test_a_large_body_is_fine(client):
-    body = b'{"env_id":"CartPole-v1"}' + b" " * (15 * 2**20)
-    assert client.post("/v1/envs/", data=body).status_code == 200
+def test_json_may_have_a_mebibyte_and_tensors_more(client, create):
+    body = b'{"env_id":"CartPole-v1"}'
+    assert client.post("/v1/envs/", data=body.ljust(2**20)).status_code == 200
+    refusal = client.post("/v1/envs/", data=body.ljust(2**20 + 1))
+    assert (refusal.status_code, refusal.json["code"]) == (413, "body_too_large")
+    assert "safetensors" in refusal.json["hint"]
+    url = create()
+    client.post(f"{url}/reset/")
+    large = write({"action": Tensor("U8", (15 * 2**20,), bytes(15 * 2**20))}, {})
+    step = client.post(f"{url}/step/", data=large, content_type=TENSORS)
+    assert (step.status_code, step.json["code"]) == (400, "action_not_in_space")
 
 
 def test_what_does_not_exist_is_404_in_json(client):

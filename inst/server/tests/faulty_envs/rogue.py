@@ -90,6 +90,9 @@ class Rogue(Counting):
     def hoards(self):
         self.hoard.append(np.ones(2**27))
 
+    def grows(self):
+        self.hoard.append(np.ones(2**24))
+
     def never_returns(self):
         # Nor does any other thread of its process run meanwhile.
         ctypes.PyDLL(None).sleep(3600)

@@ -1,8 +1,10 @@
 """How much there is for all clients together."""
 
+import os
 import threading
 
 import pytest
+from running import descendants
 
 from gym_server.api.app import Config, create_app
 from gym_server.errors import GymServerError
@@ -179,7 +181,7 @@ def test_what_an_isolated_environment_tells_of_its_processes_frees_no_room(
 ):
     about = WorkerBackend.about
     monkeypatch.setattr(WorkerBackend, "about", lambda self: {**about(self), "num_workers": told})
-    client = limited(isolate="all", max_processes=3)
+    client = limited(isolate="all", max_processes=4)
     assert ask_for_processes(client, 2).status_code == 200
     assert refused(make(client), "too_many_processes")
 
@@ -221,9 +223,13 @@ def test_processes_count_until_they_have_ended(limited, monkeypatch):
 
 
 def test_isolated_environments_and_their_processes_count(limited):
-    client = limited(max_processes=4, isolate="all")
+    client = limited(max_processes=5, isolate="all")
+    # Its own, a fork server and those that it forks.
+    before = len(descendants(os.getpid()))
     first = ask_for_processes(client, 2)
     assert first.status_code == 200
+    # The server has a fork server and a tracker of resources, once.
+    assert len(descendants(os.getpid())) - before <= 4 + 2
     assert refused(ask_for_processes(client, 1), "too_many_processes")
     second = make(client)
     assert second.status_code == 200

@@ -1,8 +1,6 @@
 """What is measured to choose the number of processes."""
 
-import threading
 
-import faulty_envs
 import gymnasium
 import pytest
 
@@ -40,12 +38,3 @@ def test_what_is_measured_is_remembered_for_so_many_only(choose, monkeypatch):
     assert not made
     choose(length=1)
     assert made
-
-
-def test_what_was_measured_closes_where_all_close(choose, monkeypatch):
-    closed_on = []
-    monkeypatch.setattr(
-        faulty_envs.Counting, "close", lambda _: closed_on.append(threading.current_thread().name)
-    )
-    choose()
-    assert closed_on == ["render"]
