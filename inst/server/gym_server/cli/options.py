@@ -147,8 +147,8 @@ def _add_isolation(options: argparse.ArgumentParser) -> None:
         "--max-worker-mb",
         type=_worker_mb,
         default=0,
-        help="memory that such a process may have, on Linux; 0 for as much as there is "
-        "(%(default)s)",
+        help="memory that such a process may have, on Linux; 0 for what is left of "
+        "--max-memory-mb (%(default)s)",
     )
 
 

@@ -41,6 +41,9 @@ from gym_server.rendering.render_thread import RenderThread
 
 log = logging.getLogger(__name__)
 
+# What a process may have beside its environment: modules, and pictures by OpenGL.
+_OWN_MB = 512
+
 # Its imports take longer than the start of a process.
 start.preload(__name__)
 
@@ -54,7 +57,7 @@ class WorkerSettings:
         imported: those that are imported before anything is created.
         max_num_envs: how many sub-environments an environment may have.
         memory: how many bytes the environment may be estimated to take; see ``memory_estimate``.
-        max_mb: how much memory the process may have, in MiB; 0 for no limit.
+        max_mb: how much memory the process may have, in MiB; 0 for what is left for all.
         log_level: what goes to standard error.
     """
 
@@ -64,6 +67,12 @@ class WorkerSettings:
     memory: float = math.inf
     max_mb: int = 0
     log_level: int = logging.WARNING
+
+    @property
+    def most_mb(self) -> int:
+        """How much memory the system lets the process have, in MiB; 0 for no limit."""
+        left = int(self.memory / 2**20) + _OWN_MB if math.isfinite(self.memory) else 0
+        return self.max_mb or left
 
 
 def serve_instance(
@@ -81,7 +90,7 @@ def serve_instance(
         config: what the client wants.
         settings: what is to be known of the server.
     """
-    set_up_process(settings.log_level, settings.max_mb)
+    set_up_process(settings.log_level, settings.most_mb)
     methods = _Methods(config, settings)
     pipe = Pipe(calls)
     _answer(pipe, 0, methods.create)
@@ -94,7 +103,7 @@ def list_registry(
     answers: Connection, _: Connection, search: str | None, settings: WorkerSettings
 ) -> None:
     """Answer what can be created with the allowed modules."""
-    set_up_process(settings.log_level, settings.max_mb)
+    set_up_process(settings.log_level, settings.most_mb)
     _answer(Pipe(answers), 0, partial(registry.search, search, settings.allowed_modules))
 
 

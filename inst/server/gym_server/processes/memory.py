@@ -100,7 +100,7 @@ def descendants() -> dict[int, int]:
 
 
 def bytes_of(pid: int, exactly: bool) -> int:
-    """Return what another process has in memory and shares with no other; 0 for one that is gone.
+    """Return what a process has in memory and shares with no other; 0 for one that is gone.
 
     Args:
         pid: its number.

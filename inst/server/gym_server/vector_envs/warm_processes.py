@@ -1,7 +1,7 @@
 """Processes that have no group at the moment and wait for the next one.
 
 To start a process takes 20 ms, and a second on Windows. One that has run environments of foreign
-packages is not kept: who knows what they have left in it.
+packages is not kept: who knows what they have left in it. Nor is one that has become large.
 """
 
 from __future__ import annotations
@@ -10,7 +10,11 @@ import threading
 import time
 
 from gym_server.processes.cores import usable_cores
+from gym_server.processes.memory import bytes_of
 from gym_server.vector_envs.group_process import GroupProcess
+
+# What has drawn with MuJoCo keeps 110 MiB.
+_MOST_BYTES = 128 * 2**20
 
 # After so many seconds without a group a process ends.
 _IDLE_SECONDS = 600.0
@@ -45,9 +49,10 @@ class WarmProcesses:
     def put(self, process: GroupProcess) -> None:
         """Keep a process that has closed its group, or end it if there are enough."""
         process.release()
+        is_small = bytes_of(process.pid, exactly=True) <= _MOST_BYTES
         with self._lock:
             self._idle = [one for one in self._idle if one[1].is_alive]
-            keeps = process.is_alive and len(self._idle) < self._most
+            keeps = process.is_alive and is_small and len(self._idle) < self._most
             if keeps:
                 self._idle.append((time.monotonic(), process))
             if keeps and self._timer is None:

@@ -208,8 +208,9 @@ def _without_answer(server, url):
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="Linux limits memory so")
-def test_a_process_gets_no_more_memory_than_it_may_have(serve):
-    server = serve("--max-worker-mb", "600")
+@pytest.mark.parametrize("limit", [("--max-worker-mb", "600"), ("--max-memory-mb", "100")])
+def test_a_process_gets_no_more_memory_than_it_may_have(serve, limit):
+    server = serve(*limit)
     url, _ = rogue(server, does="hoards")
     status, answer = server.post(f"{url}/step/", {"action": 0})
     assert (status, answer["code"]) == (500, "environment_error")

@@ -1,5 +1,6 @@
 import os
 import signal
+import sys
 import threading
 from types import SimpleNamespace
 
@@ -51,6 +52,16 @@ def test_a_process_runs_one_group_after_the_other(warm):
     assert sorted(third.pids) == sorted(pids)
     assert third.reset(3, None, None)[0].tolist() == start.tolist()
     third.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
+def test_what_has_become_large_is_not_kept(warm, monkeypatch, eventually):
+    warm(most=2)
+    env = make()
+    pids = env.pids
+    monkeypatch.setattr("gym_server.vector_envs.warm_processes._MOST_BYTES", 2**20)
+    env.close()
+    eventually(lambda: not any(map(is_running, pids)))
 
 
 def test_no_more_than_so_many_are_kept(warm, eventually):
