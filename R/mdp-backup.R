@@ -5,12 +5,13 @@
 #'
 #' Row s + S * (a - 1) is that of state s and action a, both counted from 1, of S states; the
 #' columns are the transitions from there, of which the last may be empty.
+#' @param call The user's call.
 #' @return A list: `states` and `actions`, how many there are; `next_state` (from 1), `probability`,
 #'   `terminated` and `weight`, matrices, the weight being the probability that the episode goes on
 #'   there; `expected`, the expected reward of each row; `possible`, whether the action can be
 #'   taken.
 #' @noRd
-backup_of <- function(model) {
+backup_of <- function(model, call) {
   table <- model$transitions
   states <- length(model$start)
   actions <- as.integer(model$action_space$n)
@@ -18,7 +19,12 @@ backup_of <- function(model) {
   table <- table[order(row, method = "radix"), ]
   row <- sort(row)
   place <- sequence(rle(row)$lengths)
-  shape <- c(states * actions, max(place))
+  shape <- c(as.double(states) * actions, max(place))
+  check_fits_memory(
+    prod(shape), paste0("Solving ", model$spec$id, ", with ", count_of(states, "state"), ", ",
+                        count_of(actions, "action"), " and up to ",
+                        count_of(shape[[2L]], "transition"), " of each"), call
+  )
   at <- cbind(row, place)
   filled <- function(values, empty = 0) {
     matrix <- array(empty, shape)
@@ -26,13 +32,31 @@ backup_of <- function(model) {
     matrix
   }
   probability <- filled(table$probability)
+  rewards <- probability * filled(table$reward)
+  expected <- rowSums(rewards)
+  # Rewards that cancel out leave nothing but rounding.
+  expected[abs(expected) <= 4 * .Machine$double.eps * rowSums(abs(rewards))] <- 0
   list(
     states = states, actions = actions,
     next_state = filled(state_rows(model, table$next_state), 1L),
     probability = probability, terminated = filled(table$terminated, TRUE),
     weight = filled(table$probability * !table$terminated),
-    expected = rowSums(probability * filled(table$reward)), possible = seq_len(shape[[1L]]) %in% row
+    expected = expected, possible = seq_len(shape[[1L]]) %in% row
   )
+}
+
+# The most numbers in a table: 0.8 GB, and several such tables are needed.
+most_cells <- 1e8
+
+check_fits_memory <- function(cells, what, call) {
+  if (cells > most_cells) {
+    text <- function(x) format(x, big.mark = ",", scientific = FALSE)
+    gym_abort(
+      paste0(what, " takes tables of ", text(cells), " numbers, and at most ", text(most_cells),
+             " are possible."),
+      class = "gym_error_argument", argument = "model", call = call
+    )
+  }
 }
 
 # Numbers of states and actions, counted from 1.
@@ -70,30 +94,44 @@ mean_values <- function(q, probabilities) {
   .rowSums(q * probabilities, nrow(q), ncol(q))
 }
 
+# Up to so many states a policy's moves are a full matrix: loading the package Matrix takes longer
+# than such a matrix costs.
+full_states <- 500L
+
 #' How a policy moves from state to state
 #'
 #' @param probabilities A matrix with a row for each state and a column for each action.
 #' @return A list: `weight`, a matrix of how likely state j follows on state i, the rest of a row
-#'   being the end of the episode; `reward`, the expected reward in each state; `ends`, the states
-#'   in which the episode may end.
+#'   being the end of the episode, which is sparse where there are many states; `from` and `to`, the
+#'   states of each of its moves; `reward`, the expected reward in each state; `ends`, the states in
+#'   which the episode may end.
 #' @noRd
 chain_of <- function(backup, probabilities) {
   states <- backup$states
-  taken <- as.vector(probabilities)
-  from <- rep(rep(seq_len(states), backup$actions), ncol(backup$weight))
-  weight <- backup$weight * taken
-  used <- weight > 0
-  flow <- matrix(0, states, states)
-  cell <- from[used] + states * (backup$next_state[used] - 1L)
-  sums <- rowsum(weight[used], cell)
-  flow[as.integer(rownames(sums))] <- sums
+  weight <- backup$weight * as.vector(probabilities)
+  used <- which(weight > 0)
+  from <- (used - 1L) %% states + 1L
+  to <- backup$next_state[used]
   mean_of <- function(x) mean_values(array(x, dim(probabilities)), probabilities)
   end <- rowSums(backup$probability * backup$terminated)
   list(
-    weight = flow, reward = mean_of(backup$expected),
-    ends = mean_of(end) > 0 | rowSums(probabilities) == 0
+    weight = flow_matrix(from, to, weight[used], states), from = from, to = to,
+    reward = mean_of(backup$expected), ends = mean_of(end) > 0 | rowSums(probabilities) == 0
   )
 }
+
+flow_matrix <- function(from, to, weight, states) {
+  if (states > full_states) {
+    return(Matrix::sparseMatrix(i = from, j = to, x = weight, dims = c(states, states)))
+  }
+  flow <- matrix(0, states, states)
+  sums <- rowsum(weight, from + states * (to - 1L))
+  flow[as.integer(rownames(sums))] <- sums
+  flow
+}
+
+# A matrix, full or sparse, times a vector.
+times <- function(matrix, vector) as.vector(matrix %*% as.double(vector))
 
 #' The states from which some are reached
 #'

@@ -31,7 +31,7 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   check_discount(discount)
   if (!identical(max_steps, Inf)) check_count(max_steps, allow_null = TRUE)
   call <- rlang::current_env()
-  backup <- backup_of(env)
+  backup <- backup_of(env, call)
   limit <- max_steps %||% env$spec$max_episode_steps %||% Inf
   several <- is.list(policy) && !is.object(policy)
   policies <- if (several) policy else list(policy)
@@ -43,8 +43,8 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   counting$expected <- rep(1, length(backup$expected))
   rows <- lapply(seq_along(policies), function(i) {
     probabilities <- policy_matrix(policies[[i]], env, call)
-    returns <- limited_values(backup, probabilities, limit, discount)
-    lengths <- limited_values(counting, probabilities, limit, 1)
+    returns <- limited_values(backup, probabilities, limit, discount, call)
+    lengths <- limited_values(counting, probabilities, limit, 1, call)
     data.frame(
       candidate = i, mean_return = start_mean(env, returns),
       mean_length = start_mean(env, lengths), max_steps = as.double(limit)
@@ -55,9 +55,9 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   evaluated
 }
 
-limited_values <- function(backup, probabilities, limit, discount) {
+limited_values <- function(backup, probabilities, limit, discount, call) {
   if (limit == Inf) {
-    policy_values(backup, probabilities, discount)
+    policy_values(backup, probabilities, discount, call)$values
   } else {
     horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities))
   }

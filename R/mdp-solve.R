@@ -90,13 +90,14 @@ solve_mdp <- function(model, policy = NULL, discount = 1, horizon = NULL,
   method <- check_choice(method[1L], c("value_iteration", "policy_iteration"), arg = "method")
   check_flag(trace)
   call <- rlang::current_env()
-  backup <- backup_of(model)
+  backup <- backup_of(model, call)
   probabilities <- if (!is.null(policy)) policy_matrix(policy, model, call)
   notes <- new_sweep_notes(backup, trace)
   found <- if (!is.null(horizon)) {
-    solve_horizon(backup, horizon, discount, probabilities, notes)
+    solve_horizon(backup, horizon, discount, probabilities, notes, call)
   } else if (!is.null(policy)) {
-    list(values = policy_values(backup, probabilities, discount), sweeps = 0L)
+    values <- policy_values(backup, probabilities, discount, call)$values
+    list(values = values, sweeps = 0L)
   } else {
     best_endless_values(backup, discount, method, notes$see, call)
   }
@@ -131,19 +132,23 @@ new_sweep_notes <- function(backup, trace) {
 }
 
 # The sweep after which i steps are to go chooses the action of the i-th step from the end.
-solve_horizon <- function(backup, horizon, discount, probabilities, notes) {
+solve_horizon <- function(backup, horizon, discount, probabilities, notes, call) {
   best <- is.null(probabilities)
+  if (best) {
+    check_fits_memory(as.double(horizon) * backup$states, "Keeping the action of each step", call)
+  }
+  sizes <- numeric(backup$states)
   values_of <- if (best) best_values else function(q) mean_values(q, probabilities)
   values <- horizon_values(backup, horizon, discount, values_of, function(values, q) {
     notes$see(values, q)
     notes$q <- q
-    if (best) notes$choices[[length(notes$choices) + 1L]] <- best_choice(q)
+    if (best) {
+      sizes <<- pmax(sizes, abs(values))
+      notes$choices[[length(notes$choices) + 1L]] <- first_of(tied_actions(q, sizes))
+    }
   })
   list(values = values, sweeps = horizon, q = notes$q)
 }
-
-# The number of the best action in each state, from 1; of equal ones, up to rounding, the first.
-best_choice <- function(q) max.col(tied_actions(q) + 0, "first")
 
 new_solution <- function(model, backup, found, policy, probabilities, discount, horizon, method,
                          notes) {

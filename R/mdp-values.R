@@ -1,9 +1,14 @@
 # Values of a given policy, and best ones: within a number of steps, and without a limit.
 
-# When sweeps end: the values are off by less than this, relative to the largest of them, as far as
-# the discount tells. Where they take longer than this, policy iteration goes on.
+# When value iteration ends: no state's value changes by more than this, relative to its size, as
+# far as the discount tells. Where that takes longer, policy iteration goes on.
 sweep_tolerance <- 1e-13
 most_sweeps <- 20000L
+
+# Actions whose values differ by less than this, relative to their size, are equal. But a gain that
+# is smaller still is worth to be taken where it comes often, down to what rounding makes.
+tie_tolerance <- 1e-12
+least_gain <- 1e-14
 
 # Within a number of steps ------------------------------------------------------------
 
@@ -30,37 +35,41 @@ horizon_values <- function(backup, horizon, discount, values_of, see = function(
 #' Solves the policy's linear equations. With a discount of 1 only the states from which episodes
 #' end have equations: those from which the policy never ends have 0 where no reward comes any more,
 #' an infinite value where rewards of one sign come for ever, and otherwise `NaN`.
+#' @return A list: `values`, and `sizes`, what they would be if no reward were negative: by these
+#'   it is judged which differences are only rounding.
 #' @noRd
-policy_values <- function(backup, probabilities, discount) {
+policy_values <- function(backup, probabilities, discount, call) {
   chain <- chain_of(backup, probabilities)
   weight <- discount * chain$weight
-  solved <- function(which) {
-    solve(diag(sum(which)) - weight[which, which, drop = FALSE], chain$reward[which])
+  values <- sizes <- numeric(backup$states)
+  equations <- rep(TRUE, backup$states)
+  if (discount == 1) {
+    leads <- function(reached) times(weight, reached) > 0
+    resting <- never_rewarded(chain)
+    good <- closure(leads, chain$ends | resting)
+    # Also from a state that can come to the end one that never does may be reached.
+    endless <- if (all(good)) !good else closure(leads, !good)
+    equations <- good & !resting & !endless
+    values[endless] <- endless_values(chain, leads, !good)[endless]
+    sizes[endless] <- Inf
   }
-  if (discount < 1) {
-    return(solved(rep(TRUE, backup$states)))
-  }
-  leads <- function(reached) drop(weight %*% reached) > 0
-  resting <- never_rewarded(chain)
-  good <- closure(leads, chain$ends | resting)
-  # Also from a state that can come to the end one that never does may be reached.
-  endless <- if (all(good)) !good else closure(leads, !good)
-  values <- numeric(backup$states)
-  equations <- good & !resting & !endless
   if (any(equations)) {
-    values[equations] <- solved(equations)
+    reward <- chain$reward[equations]
+    if (!all(equations)) weight <- weight[equations, equations, drop = FALSE]
+    worth <- chain_solver(weight, call)
+    gains <- worth(pmax(reward, 0))
+    losses <- worth(pmax(-reward, 0))
+    values[equations] <- gains - losses
+    sizes[equations] <- gains + losses
   }
-  if (any(endless)) {
-    values[endless] <- endless_values(weight, chain$reward, endless, !good)
-  }
-  values
+  list(values = values, sizes = sizes)
 }
 
 # The states that no reward follows on, and no end.
 never_rewarded <- function(chain) {
   resting <- chain$reward == 0 & !chain$ends
   repeat {
-    stays <- resting & drop(chain$weight %*% !resting) == 0
+    stays <- resting & times(chain$weight, !resting) == 0
     if (identical(stays, resting)) {
       return(resting)
     }
@@ -68,29 +77,149 @@ never_rewarded <- function(chain) {
   }
 }
 
-# What comes for ever are the rewards of the states that are always come back to: those that are
-# reached again from wherever they lead.
-endless_values <- function(weight, reward, endless, never_ends) {
-  reach <- reachable(weight > 0)
-  returns <- vapply(seq_along(reward), function(state) {
-    never_ends[[state]] && all(reach[reach[state, ], state])
-  }, NA)
-  vapply(which(endless), function(state) {
-    signs <- unique(sign(reward[reach[state, ] & returns]))
-    signs <- signs[signs != 0]
-    if (length(signs) == 1L) signs * Inf else NaN
-  }, 0)
+# What comes for ever are the rewards of the states that are always come back to.
+endless_values <- function(chain, leads, never_ends) {
+  returns <- returning_states(chain, never_ends)
+  gains <- closure(leads, returns & chain$reward > 0)
+  losses <- closure(leads, returns & chain$reward < 0)
+  ifelse(gains & losses, NaN, ifelse(gains, Inf, -Inf))
 }
 
-# Which states are reached from which, in at least one step, a logical matrix.
-reachable <- function(leads) {
-  repeat {
-    further <- leads | (leads %*% leads) > 0
-    if (identical(further, leads)) {
-      return(leads)
+#' The states that are always come back to
+#'
+#' They lie in classes from which nothing leads away, and in which every state reaches all others.
+#' The lowest number that a state reaches is the same in all of a class: so the state with this
+#' number reaches it itself, and reaches nothing from which it is not reached again.
+#' @param among A logical vector of states, from which only such states are reached.
+#' @noRd
+returning_states <- function(chain, among) {
+  inside <- among[chain$from]
+  from <- chain$from[inside]
+  to <- chain$to[inside]
+  # Of several values that are assigned to a state the last one stays, which is the lowest.
+  lowest <- function(labels) {
+    repeat {
+      sorted <- order(labels[to], decreasing = TRUE, method = "radix")
+      new <- labels
+      new[from[sorted]] <- labels[to[sorted]]
+      new <- pmin(labels, new)
+      if (identical(new, labels)) {
+        return(labels)
+      }
+      labels <- new
     }
-    leads <- further
   }
+  number <- seq_along(among)
+  label <- lowest(number)
+  highest <- -lowest(-label)
+  closure(
+    function(reached) number %in% to[reached[from]], among & label == number & highest == number
+  )
+}
+
+# Linear equations -----------------------------------------------------------------------
+
+# Up to so many states equations are solved at once; sweeps would take longer.
+unswept_states <- 100L
+
+#' Prepare to solve `values = rewards + weight %*% values`
+#'
+#' @param weight A square matrix, full or sparse, without negative numbers.
+#' @return A function of rewards, none of which may be negative: so each value is accurate relative
+#'   to its own size, also one that is tiny beside the others.
+#' @noRd
+chain_solver <- function(weight, call) {
+  solver <- NULL
+  function(rewards) {
+    if (all(rewards == 0)) {
+      return(rewards)
+    }
+    swept <- if (length(rewards) > unswept_states) swept_values(weight, rewards)
+    if (is.null(swept)) {
+      solver <<- solver %||% new_solver(weight, call)
+    }
+    swept %||% solved_values(weight, rewards, solver, call)
+  }
+}
+
+#' Apply a policy's equations until the values stay
+#'
+#' Where after k sweeps from 0 no value grows by more than a share e of itself, none grows by more
+#' than a share of about 2 k e in the k sweeps that follow, and so on: this is how far off they are
+#' at most.
+#' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
+#' @noRd
+swept_values <- function(weight, rewards, most = 5000L, every = 200L, enough = 1e-15) {
+  values <- rewards
+  before <- Inf
+  for (sweep in seq_len(most)) {
+    new <- rewards + as.vector(weight %*% values)
+    growth <- max((new - values) / pmax(new, .Machine$double.xmin))
+    values <- new
+    if (growth <= enough) {
+      return(values)
+    }
+    if (sweep %% every == 0L) {
+      # How many more sweeps it takes when growth shrinks as it did.
+      if (growth >= before || every * log(enough / growth) / log(growth / before) > most - sweep) {
+        break
+      }
+      before <- growth
+    }
+  }
+  NULL
+}
+
+new_solver <- function(weight, call) {
+  tryCatch(
+    if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight),
+    error = function(e) abort_unsolved(nrow(weight), call)
+  )
+}
+
+solved_values <- function(weight, rewards, solver, call) {
+  values <- solver(rewards)
+  # What solving left over is solved again, until it is only rounding in every single state.
+  for (round in 1:3) {
+    left <- rewards + times(weight, values) - values
+    if (!all(is.finite(left))) {
+      abort_unsolved(length(rewards), call)
+    }
+    if (all(abs(left) <= 4 * .Machine$double.eps * values)) break
+    values <- pmax(values + solver(left), 0)
+  }
+  values
+}
+
+full_solver <- function(weight) {
+  inverse <- solve(diag(nrow(weight)) - weight, tol = 0)
+  function(rewards) times(inverse, rewards)
+}
+
+sparse_solver <- function(weight) {
+  all <- seq_len(nrow(weight))
+  equations <- Matrix::sparseMatrix(
+    i = c(all, weight@i + 1L), j = c(all, rep(all, diff(weight@p))),
+    x = c(rep(1, length(all)), -weight@x), dims = dim(weight)
+  )
+  # With such a tolerance the pivots are those of the diagonal, which are the accurate ones where
+  # all other numbers are negative, and which leave more zeros.
+  factors <- Matrix::lu(equations, tol = 1e-300)
+  function(rewards) {
+    values <- numeric(length(rewards))
+    half <- Matrix::solve(factors@L, rewards[factors@p + 1L])
+    values[factors@q + 1L] <- as.vector(Matrix::solve(factors@U, half))
+    values
+  }
+}
+
+abort_unsolved <- function(states, call) {
+  gym_abort(
+    c(paste0("The equations of ", count_of(states, "state"), " cannot be solved: either memory ",
+             "does not suffice for so many, or episodes hardly ever end."),
+      i = "Give a lower `discount`, or a `horizon`."),
+    class = "gym_error_argument", argument = "discount", call = call
+  )
 }
 
 # The best, without a limit --------------------------------------------------------------
@@ -108,64 +237,88 @@ best_endless_values <- function(backup, discount, method, see, call) {
   if (any(task$hopeless)) {
     check_hopeless(backup, task$hopeless, call)
   }
-  sweeps <- 0L
-  if (method == "value_iteration") {
-    swept <- iterate_values(task$backup, discount, see)
-    sweeps <- swept$sweeps
-    choice <- ending_choice(task$backup, tied_actions(swept$q))
-  } else {
-    choice <- ending_choice(task$backup, possible_of(task$backup))
-  }
-  found <- iterate_policies(task$backup, choice, discount, if (sweeps) NULL else see, call)
+  swept <- if (method == "value_iteration") iterate_values(task$backup, discount, see)
+  choice <- starting_choice(task$backup, swept$tied, discount)
+  found <- iterate_policies(
+    task$backup, choice, discount, if (is.null(swept)) see else function(values, q) NULL, call
+  )
+  choice <- soonest_choice(task$backup, found, discount, call)
   values <- found$values
   values[task$hopeless] <- -Inf
   list(
-    values = values, sweeps = if (sweeps) sweeps else found$sweeps,
-    choice = if (discount < 1) found$choice else without_rest(found$choice, backup, task)
+    values = values, sweeps = swept$sweeps %||% found$sweeps,
+    choice = if (discount < 1) choice else without_rest(choice, backup, task)
   )
 }
 
 iterate_values <- function(backup, discount, see) {
-  values <- numeric(backup$states)
+  values <- sizes <- numeric(backup$states)
   enough <- sweep_tolerance * max(1 - discount, 0.01)
   for (sweep in seq_len(most_sweeps)) {
     q <- action_values(backup, values, discount)
     new <- best_values(q)
     see(new, q)
-    change <- max(abs(new - values))
+    change <- abs(new - values)
     values <- new
-    if (change <= enough * max(1, abs(values))) break
+    # A value that came down to 0 is as accurate as what it came from.
+    sizes <- pmax(sizes, abs(values))
+    if (all(change <= enough * sizes)) break
   }
-  list(q = action_values(backup, values, discount), sweeps = sweep)
+  list(tied = tied_actions(action_values(backup, values, discount), sizes), sweeps = sweep)
+}
+
+# Where policy iteration starts: a policy that ends where it must, of the actions that are tied, if
+# there are some and they do.
+starting_choice <- function(backup, tied, discount) {
+  possible <- possible_of(backup)
+  ending <- surely_ending(backup, tied %||% possible)
+  if (discount == 1 && any(!ending$states & rowSums(possible) > 0)) {
+    ending <- surely_ending(backup, possible)
+  }
+  ending$choice
 }
 
 #' Improve a policy until no action is better by more than rounding
-#' @param see `NULL`, or as for [horizon_values()].
+#' @param see As for [horizon_values()].
+#' @param least By how much an action must be better, relative to the size of the values.
+#' @return A list: `values` and `sizes`, `choice`, `tied` (which actions are as good), and `sweeps`.
 #' @noRd
-iterate_policies <- function(backup, choice, discount, see, call) {
+iterate_policies <- function(backup, choice, discount, see, call, least = least_gain) {
+  seen <- list()
   for (sweep in seq_len(1000L)) {
-    values <- policy_values(backup, choice_probabilities(backup, choice), discount)
+    found <- policy_values(backup, choice_probabilities(backup, choice), discount, call)
+    values <- found$values
     if (!all(is.finite(values))) {
+      if (least < tie_tolerance) { # It may be rounding that led into a circle.
+        return(iterate_policies(backup, c(seen, list(choice))[[1L]], discount, see, call,
+                                tie_tolerance))
+      }
       abort_endless(which(!is.finite(values))[[1L]], call)
     }
     q <- action_values(backup, values, discount)
-    if (!is.null(see)) see(values, q)
-    own <- q[cbind(seq_along(choice), choice)]
-    better <- own < best_values(q) - tie_tolerance(q) & own > -Inf
-    if (!any(better)) {
-      # Of equal actions those that end episodes soonest.
-      choice <- ending_choice(backup, tied_actions(q))
-      return(list(values = values, choice = choice, sweeps = sweep))
-    }
+    see(values, q)
+    own <- cbind(seq_along(choice), choice)
+    better <- !tied_actions(q, found$sizes, least)[own] & q[own] > -Inf
+    seen[[sweep]] <- choice
     choice[better] <- best_column(q)[better]
+    # A policy that comes again was better by rounding only.
+    if (any(vapply(seen, identical, NA, choice))) {
+      tied <- tied_actions(q, found$sizes)
+      tied[own] <- q[own] > -Inf
+      return(c(found, list(choice = seen[[sweep]], tied = tied, sweeps = sweep)))
+    }
   }
   abort_endless(which.max(abs(values)), call)
 }
 
-# Actions that are worth the same as the best one of their state, up to rounding.
-tied_actions <- function(q) q >= row_max(q) - tie_tolerance(q) & q > -Inf
+# Actions that are worth the same as the best one of their state, up to rounding; `sizes` is what
+# values of each state were added up from.
+tied_actions <- function(q, sizes, tolerance = tie_tolerance) {
+  q >= row_max(q) - tolerance * pmax(abs(q), sizes) & q > -Inf
+}
 
-tie_tolerance <- function(q) 1e-9 * pmax(1, abs(best_values(q)))
+# The first of some actions in each state, a logical matrix.
+first_of <- function(actions) best_column(actions + 0)
 
 possible_of <- function(backup) array(backup$possible, c(backup$states, backup$actions))
 
@@ -226,9 +379,9 @@ resting_actions <- function(backup) {
 # To rest is to take an action that stays where no reward comes.
 without_rest <- function(choice, backup, task) {
   rests <- choice > backup$actions
-  choice[rests] <- best_column(task$stays + 0)[rests]
+  choice[rests] <- first_of(task$stays)[rests]
   # Where nothing ends all actions are as good.
-  choice[task$hopeless] <- best_column(possible_of(backup) + 0)[task$hopeless]
+  choice[task$hopeless] <- first_of(possible_of(backup))[task$hopeless]
   choice
 }
 
@@ -243,36 +396,46 @@ check_hopeless <- function(backup, hopeless, call) {
 
 # Choosing among equals ---------------------------------------------------------------
 
+# The tied actions by which episodes end soonest, unless what is lost in each step adds up.
+soonest_choice <- function(backup, found, discount, call) {
+  choice <- ending_choice(backup, found$tied, call)
+  if (identical(choice, found$choice)) {
+    return(choice)
+  }
+  values <- policy_values(backup, choice_probabilities(backup, choice), discount, call)$values
+  if (all(values >= found$values - 10 * tie_tolerance * found$sizes)) choice else found$choice
+}
+
 #' Choose an action in each state so that episodes end, and soon
 #'
 #' Where several actions have the same value, some of them may lead in a circle for ever. Of the
 #' actions that are allowed it takes those that bring the end in the fewest steps on average, found
-#' by value iteration with a cost of 1 for each step.
+#' by policy iteration with a cost of 1 for each step.
 #' @param allowed A logical matrix with a row for each state and a column for each action.
 #' @return The number of an action for each state, from 1.
 #' @noRd
-ending_choice <- function(backup, allowed) {
+ending_choice <- function(backup, allowed, call) {
   ending <- surely_ending(backup, allowed)
+  if (!any(rowSums(ending$allowed) > 1)) {
+    return(ending$choice)
+  }
   steps <- backup
   steps$expected <- rep(-1, length(backup$expected))
   steps$possible <- as.vector(ending$allowed)
-  values <- numeric(backup$states)
-  for (sweep in seq_len(most_sweeps)) {
-    q <- action_values(steps, values, 1)
-    new <- best_values(q)
-    if (max(abs(new - values)) <= 1e-9 * max(1, abs(new))) break
-    values <- new
-  }
-  # Where nothing ends the first of the allowed ones.
-  q[!ending$states, ] <- ifelse(allowed[!ending$states, ], 0, -Inf)
-  # Differences that are only rounding must not decide.
-  max.col(round(q, 6), "first")
+  found <- iterate_policies(steps, ending$choice, 1, function(values, q) NULL, call)
+  # Differences that are only rounding must not decide, unless there are so many steps that one
+  # more is only rounding, too.
+  soonest <- first_of(found$tied)
+  chosen <- choice_probabilities(steps, soonest) > 0
+  ends <- identical(surely_ending(backup, chosen)$states, ending$states)
+  ifelse(ending$states, if (ends) soonest else found$choice, ending$choice)
 }
 
 #' The states from which the allowed actions can be so chosen that every episode ends
 #'
-#' @return A list: `states`, a logical vector, and `allowed`, the actions that lead to no other
-#'   states, a logical matrix.
+#' @return A list: `states`, a logical vector; `allowed`, the actions that lead to no other states,
+#'   a logical matrix; and `choice`, an action for each state by which every episode ends: one that
+#'   may lead nearer to the end. Where nothing ends it is the first of the allowed ones.
 #' @noRd
 surely_ending <- function(backup, allowed) {
   shape <- c(backup$states, backup$actions)
@@ -284,12 +447,18 @@ surely_ending <- function(backup, allowed) {
   repeat {
     leaves <- any_of(goes_on & !states[backup$next_state])
     safe <- allowed & !leaves
-    leads <- function(reached) {
-      rowSums(safe & any_of(goes_on & reached[backup$next_state])) > 0
+    choice <- integer(backup$states)
+    nearer <- safe & can_end
+    repeat {
+      more <- choice == 0L & rowSums(nearer) > 0
+      if (!any(more)) break
+      choice[more] <- first_of(nearer)[more]
+      nearer <- safe & any_of(goes_on & (choice > 0L)[backup$next_state])
     }
-    reached <- closure(leads, rowSums(safe & can_end) > 0)
+    reached <- choice > 0L
     if (identical(reached & states, states)) {
-      return(list(states = states, allowed = safe & states))
+      choice[!reached] <- first_of(allowed)[!reached]
+      return(list(states = states, allowed = safe & states, choice = choice))
     }
     states <- reached & states
   }

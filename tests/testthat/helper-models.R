@@ -16,3 +16,23 @@ endless_model <- function(reward = -1) {
     state = c(0, 0), action = c(0, 1), next_state = c(0, 1), reward = c(reward, 5)
   ), start = 0)
 }
+
+# Each action leads to a few states that are drawn, at a cost that is drawn.
+random_table <- function(states, actions, successors) {
+  table <- expand.grid(
+    way = seq_len(successors), action = seq_len(actions) - 1, state = seq_len(states) - 1
+  )
+  table$next_state <- sample(states, nrow(table), replace = TRUE) - 1
+  table$probability <- 1 / successors
+  table$reward <- -stats::runif(nrow(table))
+  table[-1L]
+}
+
+# A gambler wins or loses 1 until nothing is left, or `goal`, which is worth 1.
+ruin_model <- function(goal, win) {
+  state <- rep(seq_len(goal - 1), each = 2)
+  next_state <- state + c(-1, 1)
+  gym_model(data.frame(
+    state, action = 0, next_state, probability = c(1 - win, win), reward = +(next_state == goal)
+  ), start = 1)
+}

@@ -207,3 +207,127 @@ test_that("a policy that draws its actions is not taken for one that does not", 
                class = "gym_error_draws")
   expect_error(solve_mdp(walk_model(), policy = draws), class = "gym_error_argument")
 })
+
+# The best values, the same by both methods and with a horizon.
+expect_best <- function(table, values, actions, horizon = 30) {
+  model <- gym_model(table, start = 0)
+  for (given in list(list(method = "value_iteration"), list(method = "policy_iteration"),
+                     list(horizon = horizon))) {
+    solved <- rlang::exec(solve_mdp, model, !!!given)
+    seen <- seq_along(values)
+    expect_equal(unname(solved$values)[seen] / values, rep(1, length(values)), tolerance = 1e-11)
+    expect_identical(as.matrix(solved$actions)[seen, 1L], actions)
+  }
+}
+
+# A state that chooses among rewards, each of which ends the episode.
+choice_table <- function(rewards) {
+  data.frame(
+    state = 0, action = seq_along(rewards) - 1, next_state = 1, reward = rewards
+  )
+}
+
+test_that("a small difference between rewards is none of rounding, whatever their size", {
+  expect_best(choice_table(c(0, 1e-10)), 1e-10, 1L)
+  expect_best(choice_table(c(1e9, 1e9 + 0.5)), 1e9 + 0.5, 1L)
+  expect_best(choice_table(c(-1e-10, -2e-10, -5e-11)), -5e-11, 2L)
+  expect_best(choice_table(c(0, 1e-300)), 1e-300, 1L)
+  # What is only rounding decides nothing.
+  expect_best(choice_table(c(1e-9, 1e-9 * (1 + 1e-13))), 1e-9, 0L)
+})
+
+test_that("a rare event counts", {
+  # Ten steps, each of which succeeds in one case of ten, or nothing.
+  steps <- data.frame(
+    state = rep(0:9, each = 3), action = c(0, 1, 1), probability = c(1, 0.1, 0.9),
+    next_state = as.vector(rbind(11, 1:10, 11)), reward = 0
+  )
+  steps$reward[steps$next_state == 10] <- 1
+  expect_best(steps, 0.1^(10:1), rep(1L, 10))
+  # To win ends the episode hardly ever, to give up at once.
+  rare <- data.frame(
+    state = 0, action = c(0, 1, 1), probability = c(1, 1 - 1e-9, 1e-9), next_state = c(1, 0, 1),
+    reward = c(0.9999, 0, 1)
+  )
+  for (method in c("value_iteration", "policy_iteration")) {
+    expect_identical(solve_mdp(gym_model(rare, start = 0), method = method)$actions[[1L]], 1L)
+  }
+})
+
+test_that("rewards of another size have values of that size, and the same best policy", {
+  set.seed(1)
+  random <- random_table(states = 12, actions = 3, successors = 3)
+  random$reward[random$state == 3] <- 1e-8 * random$reward[random$state == 3]
+  random$terminated <- random$next_state == 0
+  random$reward[random$terminated] <- random$reward[random$terminated] + 3
+  # A game that is fair in each step, and one that is so in three.
+  fair <- data.frame(
+    state = c(0, 0, 0, 1, 2, 3), action = c(0, 0, 1, 0, 0, 0),
+    probability = c(0.25, 0.75, 1, 1, 1, 1), next_state = c(0, 0, 1, 2, 3, 4),
+    reward = c(3, -1, 0.1, 0.2, -0.3, 0)
+  )
+  for (table in list(random, fair)) {
+    for (given in list(
+      list(), list(method = "policy_iteration"), list(discount = 0.9), list(horizon = 9),
+      list(discount = 0.9, method = "policy_iteration")
+    )) {
+      plain <- rlang::exec(solve_mdp, gym_model(table, start = 0), !!!given)
+      for (scale in c(1e-9, 1e-3, 1e9)) {
+        scaled <- table
+        scaled$reward <- scale * table$reward
+        solved <- rlang::exec(solve_mdp, gym_model(scaled, start = 0), !!!given)
+        expect_identical(solved$actions, plain$actions)
+        expect_equal(solved$values / scale, plain$values, tolerance = 1e-12)
+      }
+    }
+  }
+})
+
+test_that("an end that costs more than many sweeps is found", {
+  expect_solved(model_of(
+    state = 0, action = c(0, 1), next_state = c(0, 1), reward = c(-1, -30000)
+  ), c(-30000, 0))
+})
+
+test_that("many states are solved as exactly as few", {
+  set.seed(2)
+  random <- gym_model(random_table(states = 600, actions = 2, successors = 4), start = 0)
+  arrays <- model_arrays(random)
+  exact <- function(solved, discount) {
+    rows <- cbind(seq_len(600), solved$actions + 1L)
+    moves <- t(vapply(seq_len(600), function(i) arrays$P[i, -601L, rows[i, 2L]], numeric(600)))
+    unname(solve(diag(600) - discount * moves, arrays$R[rows]))
+  }
+  for (method in c("value_iteration", "policy_iteration")) {
+    solved <- solve_mdp(random, discount = 0.95, method = method)
+    expect_equal(unname(solved$values), exact(solved, 0.95), tolerance = 1e-12)
+  }
+  # So slow that its equations are solved, and one of its values is tiny.
+  slow <- solve_mdp(random, policy = solved$policy, discount = 0.9999)
+  expect_equal(unname(slow$values), exact(solved, 0.9999), tolerance = 1e-11)
+  line <- ruin_model(800, win = 0.4)
+  solved <- solve_mdp(line)
+  # The gambler's ruin, Feller (1968), chapter XIV.
+  theirs <- (1.5^(0:800) - 1) / (1.5^800 - 1)
+  expect_equal(unname(solved$values)[2:800] / theirs[2:800], rep(1, 799), tolerance = 1e-11)
+})
+
+test_that("a policy that never ends is told apart in a large model, too", {
+  ring <- 601:1200
+  model <- gym_model(data.frame(
+    state = c(0, 0, 1:600, ring), action = 0, probability = c(0.5, 0.5, rep(1, 1200)),
+    next_state = c(1, 601, 2:600, 1201, 602:1200, 601), reward = c(numeric(1000), 1, numeric(201))
+  ), start = 0)
+  values <- solve_mdp(model, policy = numeric(1202))$values
+  expect_identical(unname(values[c(1, 2, 602, 1201, 1202)]), c(Inf, 0, Inf, Inf, 0))
+})
+
+test_that("what no memory holds is refused, with its number", {
+  wide <- data.frame(
+    state = 0, action = 0, next_state = c(1:299, 4e5), probability = 1 / 300, reward = 0
+  )
+  model <- gym_model(wide, start = 0)
+  expect_error(solve_mdp(model), "takes tables of 120,000,300 numbers", class = "gym_error_argument")
+  expect_error(solve_mdp(walk_model(), horizon = 1e8), "400,000,000 numbers",
+               class = "gym_error_argument")
+})
