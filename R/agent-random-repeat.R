@@ -71,6 +71,7 @@
 search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seeds = 1:100,
                           progress = rlang::is_interactive(), client = gym_client()) {
+  seeds <- plain_numbers(seeds)
   check_seeds(seeds)
   check_flag(progress)
   call <- rlang::current_env()

@@ -220,7 +220,7 @@ independent_sub_envs <- function(env) {
     seed <- rep(if (some) NA_real_ else seeds, length.out = n)
     seed[which] <- seeds
     observation <- if (some) {
-      env$reset(seed = seed, mask = seq_len(n) %in% which)
+      narrow_values(env$reset(seed = seed, mask = seq_len(n) %in% which))
     } else {
       begin_all(env, seed)
     }

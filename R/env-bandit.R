@@ -27,6 +27,7 @@ bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
                    steps = 1000) {
   if (missing(arms) && !is.null(mean)) arms <- length(mean)
   check_count(arms)
+  mean <- plain_numbers(mean)
   if (!is.null(mean) && !(is.numeric(mean) && length(mean) == arms && all(is.finite(mean)))) {
     abort_argument(mean, paste("a finite number for each of", count_of(arms, "arm"), "or NULL"),
                    "mean", rlang::current_env())

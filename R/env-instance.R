@@ -154,6 +154,7 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (inherits(seed, "gym_seed_lists")) {
     return(encode_seed_lists(seed, num_envs, call))
   }
+  seed <- plain_numbers(seed, call = call)
   if (is.null(num_envs) || length(seed) == 1L) {
     check_count(seed, min = 0, max = 2^53, call = call)
     return(whole_text(seed))

@@ -148,12 +148,16 @@ replace_methods <- function(env, methods) {
 class_sub_env <- function(env, task) {
   reset <- env$reset
   takes <- intersect(c("seed", "options"), names(formals(reset)))
-  new_sub_env(
-    task,
+  functions <- plain_results(list(
     reset = function(seed, options) {
       if (length(takes)) do.call(reset, list(seed = seed, options = options)[takes]) else reset()
     },
-    step = env$step,
+    step = env$step
+  ))
+  new_sub_env(
+    task,
+    reset = functions$reset,
+    step = functions$step,
     render = if (overrides(env, "render")) env$render,
     takes_options = "options" %in% takes
   )

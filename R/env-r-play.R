@@ -14,6 +14,7 @@ checked_methods <- function(sub_env) {
 
 reset_r_env <- function(sub_env, seed, options, return_info, call = rlang::caller_env()) {
   check_sub_env_open(sub_env, call)
+  seed <- plain_numbers(seed, call = call)
   check_count(seed, min = 0, allow_null = TRUE, call = call)
   check_flag(return_info, call = call)
   if (!is.null(options)) {
@@ -27,6 +28,7 @@ step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
   check_sub_env_open(sub_env, call)
   check_was_reset(sub_env, call)
   task <- sub_env$task
+  action <- narrow_values(action)
   if (is.null(sub_env$num_envs)) {
     check_value(task$action_rules, action, "", call, bounds = TRUE)
     action <- tidy_value(task$action_space, action)

@@ -27,6 +27,17 @@ new_sub_env <- function(task, reset, step, render = NULL, takes_options = FALSE,
   sub_env
 }
 
+#' Make what a user's functions return plain numbers, where it is an integer64
+#' @param functions A list of `reset` and `step`.
+#' @noRd
+plain_results <- function(functions) {
+  reset <- functions$reset
+  step <- functions$step
+  functions$reset <- function(seed, options) narrow_values(reset(seed, options))
+  functions$step <- function(action) plain_step(step(action))
+  functions
+}
+
 #' Start an episode
 #'
 #' @param seed What its generator is to begin with; `NULL` goes on with the generator as it is. An

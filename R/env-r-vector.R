@@ -176,7 +176,7 @@ observation_stacker <- function(space) {
     function(values) is.null(unlist(lapply(values, dim))) && all(lengths(values) == size)
   }
   function(values, n) {
-    if (!has_shape(values)) {
+    if (any(vapply(values, is.object, NA)) || !has_shape(values)) {
       return(NULL)
     }
     numbers <- unlist(values, recursive = FALSE, use.names = FALSE)

@@ -136,6 +136,7 @@ wrap_rescale_observation <- function(task, min_obs, max_obs, call) {
       rescale <- rescaler(space, outside, num_envs)
       size <- prod(space$shape) * (num_envs %||% 1L)
       change_observation(inner, function(observation) {
+        observation <- double_from_integer64(observation)
         # What is no such observation is found by the checks that follow.
         if (is.numeric(observation) && length(observation) == size) {
           rescale(observation)
@@ -179,6 +180,7 @@ wrap_normalize_observation <- function(task, epsilon = 1e-8, call) {
     moments <- running_moments(size)
     playing <- playing_sub_envs(n)
     inner <- change_observation(inner, function(observation) {
+      observation <- double_from_integer64(observation)
       if (!is.numeric(observation) || length(observation) != n * size) {
         return(observation)
       }
@@ -234,7 +236,7 @@ change_spaces <- function(task, observation_space = task$observation_space,
 
 change_action <- function(inner, change) {
   step <- inner$step
-  inner$step <- function(action) step(change(action))
+  inner$step <- function(action) step(change(double_from_integer64(action)))
   inner
 }
 

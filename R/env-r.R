@@ -171,6 +171,7 @@ definition_sub_env <- function(definition, num_envs = NULL) {
     },
     step = function(action) step(self, action)
   )
+  functions <- plain_results(functions)
   for (wrap_around in definition$wrappers) {
     functions <- wrap_around(functions, num_envs)
   }

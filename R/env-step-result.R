@@ -7,7 +7,7 @@ is_server_env <- function(env) inherits(env, "gym_server_env")
 
 # Nobody wants the infos of what is played: they are not asked for where a server would send them.
 begin_all <- function(env, seeds) {
-  if (is_server_env(env)) reset_bare(env, seeds) else env$reset(seed = seeds)
+  if (is_server_env(env)) reset_bare(env, seeds) else narrow_values(env$reset(seed = seeds))
 }
 
 #' Take a step, and check what it returns where a user has written the environment
@@ -19,10 +19,21 @@ take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   if (is_server_env(env)) {
     return(step_bare(env, action, which, finals))
   }
-  out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
+  out <- plain_step(if (is.null(which)) env$step(action) else env$step(action, which = which))
   if (!inherits(env, "gym_r_env")) {
     where <- "`step()` of this environment"
     check_step_parts(out, n, where, NULL, needed = c("observation", "reward", flags))
+  }
+  out
+}
+
+# What a step returned, with plain numbers where it has an integer64.
+plain_step <- function(out) {
+  if (is.list(out)) {
+    for (name in intersect(c("observation", "next_observation"), names(out))) {
+      out[name] <- list(narrow_values(out[[name]]))
+    }
+    if (is_integer64(out$reward)) out$reward <- plain_numbers(out$reward, "reward", NULL)
   }
   out
 }

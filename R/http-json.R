@@ -88,8 +88,8 @@ json_atoms <- function(x) {
   if (is.factor(x)) {
     x <- as.character(x)
   }
-  if (inherits(x, "integer64")) {
-    return(as.character(x))
+  if (is_integer64(x)) {
+    return(ifelse(is.na(double_from_integer64(x)), "null", whole_text(x)))
   }
   switch(typeof(x),
     logical = ifelse(is.na(x), "null", ifelse(x, "true", "false")),

@@ -62,6 +62,7 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
     max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
   )
   table <- check_transitions(transitions)
+  start <- plain_numbers(start)
   states <- spanned_space(c(table$state, table$next_state), "states")
   if (is_number(start)) {
     start <- start_in(start, table, states)
@@ -127,6 +128,9 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
       paste0("`", arg, "` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
       class = "gym_error_argument", argument = arg, value = x, call = call
     )
+  }
+  for (name in intersect(c(needed, "probability"), names(x))) {
+    x[[name]] <- plain_numbers(x[[name]], paste0(arg, "$", name), call)
   }
   for (name in needed[-4L]) {
     check_column(x, name, "whole numbers", are_whole_numbers, arg, call)

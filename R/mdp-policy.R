@@ -7,6 +7,7 @@
 #' @noRd
 policy_matrix <- function(policy, model, call) {
   possible <- possible_actions(model)
+  policy <- plain_numbers(policy, "policy", call)
   probabilities <- if (is.matrix(policy) && is.numeric(policy)) {
     check_policy_matrix(policy, possible, call)
   } else if (is.numeric(policy)) {

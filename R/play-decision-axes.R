@@ -94,6 +94,7 @@ held_at <- function(observed, axes, at, call = rlang::caller_env()) {
   if (is.null(at)) {
     return(held)
   }
+  at <- plain_numbers(at, call = call)
   if (!is.numeric(at) || anyNA(at) || is.null(names(at))) {
     abort_argument(at, "a numeric vector with names, or NULL", "at", call)
   }

@@ -95,6 +95,8 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   }
   check_policy(policy)
   check_mappable(policy)
+  xlim <- plain_numbers(xlim)
+  ylim <- plain_numbers(ylim)
   check_limits(xlim)
   check_limits(ylim)
   check_count(action)

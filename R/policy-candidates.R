@@ -26,6 +26,7 @@ policy_candidates <- function(policy, weights) {
     abort_no_weights(policy, "policy", rlang::current_env())
   }
   check_network(policy)
+  weights <- plain_numbers(weights)
   check_candidate_weights(weights, sum(lengths(policy$weights)))
   storage.mode(weights) <- "double"
   new_candidates(policy, weights)

@@ -56,6 +56,7 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
   check_dots_empty(...)
   check_network(object)
   count <- sum(lengths(object$weights))
+  value <- plain_numbers(value)
   if (!is.numeric(value) || length(value) != count) {
     abort_argument(value, paste("a vector of", count_of(count, "number")), "value",
                    rlang::current_env())

@@ -28,6 +28,8 @@
 #' tile_coding(tilings = 8, bins = 8)
 tile_coding <- function(tilings = 8, bins = 8, low = NULL, high = NULL) {
   check_count(tilings)
+  low <- plain_numbers(low)
+  high <- plain_numbers(high)
   if (!length(bins) || !are_whole(bins, 1, .Machine$integer.max)) {
     abort_argument(bins, "whole numbers of at least 1", "bins", rlang::current_env())
   }
@@ -81,6 +83,7 @@ basis_of <- function(features, space, call) {
 }
 
 check_features <- function(values, n, call) {
+  values <- plain_numbers(values, "features", call)
   if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) || nrow(values) != n ||
         !all(is.finite(values))) {
     gym_abort(

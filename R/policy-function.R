@@ -46,7 +46,7 @@ ask_about_one <- function(policy, one, vector_env) {
 #' an action of its space.
 #' @noRd
 batch_actions <- function(actions, n, vector_env) {
-  actions <- as_batch(vector_env$action_space, actions)
+  actions <- as_batch(vector_env$action_space, narrow_values(actions))
   count <- batch_length(vector_env$action_space, actions)
   if (is.na(count) || count != n) {
     abort_action_count(actions, count, n, vector_env)

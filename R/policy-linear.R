@@ -32,6 +32,7 @@ policy_linear <- function(bias = FALSE, normalize = FALSE, weights = NULL) {
   check_flag(bias)
   check_flag(normalize)
   sizes <- c(NA_integer_, NA_integer_)
+  weights <- plain_numbers(weights)
   if (!is.null(weights)) {
     if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights) || ncol(weights) <= bias) {
       abort_argument(weights, "a numeric matrix", "weights", rlang::current_env())

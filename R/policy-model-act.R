@@ -28,7 +28,7 @@ predict_model <- function(policy, newdata, type, call) {
 #' @noRd
 observed_columns <- function(policy, observation, call) {
   if (is.data.frame(observation)) {
-    return(list(columns = as.list(observation), one = FALSE))
+    return(list(columns = as.list(narrow_values(observation)), one = FALSE))
   }
   space <- policy$observation_space
   if (is.null(space)) {
@@ -85,7 +85,8 @@ model_predictions <- function(policy, columns, call) {
       )
     }
   )
-  if (is.data.frame(predicted) && ncol(predicted) == 1L) predicted[[1L]] else predicted
+  predicted <- if (is.data.frame(predicted) && ncol(predicted) == 1L) predicted[[1L]] else predicted
+  plain_numbers(predicted, "predict()", call)
 }
 
 model_newdata <- function(model, columns) {

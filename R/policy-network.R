@@ -88,6 +88,7 @@ policy_network <- function(sizes = c(4, 2, 1), activation = c("tanh", "logistic"
   check_flag(normalize)
   activation <- layer_activations(activation, sizes)
   policy <- new_network(sizes, activation, bias, normalize)
+  weights <- narrow_values(weights, function(x) plain_numbers(x, "weights"))
   if (!is.null(weights)) {
     check_weights_fit(weights, policy)
     policy$weights <- weights
@@ -130,6 +131,7 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
   if (is.logical(sizes) && all(is.na(sizes))) {
     sizes <- as.integer(sizes)
   }
+  sizes <- plain_numbers(sizes, call = call)
   if (!is.numeric(sizes) || length(sizes) < 2L) {
     abort_argument(sizes, "two or more whole numbers", "sizes", call)
   }
@@ -211,6 +213,7 @@ abort_observation <- function(policy, values, call) {
 }
 
 network_inputs <- function(space, values, call = rlang::caller_env()) {
+  values <- plain_numbers(values, "observation", call)
   if (!inherits(space, "gym_space_discrete")) {
     return(values)
   }

@@ -54,6 +54,7 @@ observations_from <- function(newdata, policy, call) {
   if (!is.data.frame(newdata)) {
     return(newdata)
   }
+  newdata <- narrow_values(newdata)
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
   names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
   if (any(names %in% names(newdata))) {

@@ -27,6 +27,7 @@
 #' policy <- policy_table(rbind(c(0, 1, 0), c(2, 0, 0)))
 #' act(policy, c(0, 1, 1))
 policy_table <- function(q, epsilon = 0, temperature = NULL) {
+  q <- plain_numbers(q)
   if (!is.matrix(q) || !is.numeric(q) || !length(q) || anyNA(q)) {
     abort_argument(q, "a numeric matrix without missing values", "q", rlang::current_env())
   }

@@ -250,6 +250,7 @@ act_batch.default <- function(policy, observation, n, vector_env) {
 #'   rather than a batch.
 #' @noRd
 observation_rows <- function(observation, space) {
+  observation <- narrow_values(observation, function(x) plain_numbers(x, "observation"))
   axes <- dim(observation)
   # How many dimensions an observation has: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)

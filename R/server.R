@@ -136,6 +136,7 @@ server_options <- function(options, call = rlang::caller_env()) {
 
 # Writes numbers without an exponent: 1e5 is 100000 on a command line.
 option_text <- function(values) {
+  values <- plain_numbers(values)
   if (is.numeric(values)) {
     values <- vapply(values, format, "", scientific = FALSE, digits = 15L, trim = TRUE)
   }

@@ -156,13 +156,14 @@ value_shape <- function(value, space) {
 # where they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds
 # refuse.
 wrong_number <- function(space, flat) {
+  flat <- double_from_integer64(flat)
   if (anyNA(flat)) {
     missing <- is.na(flat) & !is.nan(flat)
     if (any(missing)) {
       return(list(problem = "There is a missing value", at = which(missing)[[1L]]))
     }
   }
-  if (is.double(flat) && !inherits(flat, "integer64") && space$dtype %in% integer_dtypes) {
+  if (is.double(flat) && space$dtype %in% integer_dtypes) {
     broken <- !is.finite(flat) | flat != trunc(flat)
     if (any(broken)) {
       return(list(problem = "There is a number that is not whole", at = which(broken)[[1L]]))
@@ -203,7 +204,8 @@ write_value.gym_space_array <- function(space, value) {
 }
 
 number_text_json <- function(dtype, flat) {
-  if (is.integer(flat) || !(dtype %in% integer_dtypes)) json_number(flat) else whole_text(flat)
+  whole <- dtype %in% integer_dtypes && !is.integer(flat) || is_integer64(flat)
+  if (whole) whole_text(flat) else json_number(flat)
 }
 
 # Drawing ---------------------------------------------------------------------------

@@ -155,6 +155,9 @@ sample_batch <- function(space, n) {
 #'   them.
 #' @noRd
 number_rows <- function(batch) {
+  if (is_integer64(batch)) {
+    return(structure(number_rows(unclass(batch)), class = "integer64"))
+  }
   shape <- dim(batch)
   if (length(shape) == 2L) {
     batch

@@ -109,7 +109,7 @@ within_integer <- function(x) {
 #' @exportS3Method
 to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") {
   unsigned <- space$dtype == "uint64"
-  if (unsigned || inherits(value, "integer64") || !within_integer(value)) {
+  if (unsigned || is_integer64(value) || !within_integer(value)) {
     space$dtype <- if (unsigned) "uint64" else "int64"
     return(to_tensors.default(space, value, name, call, path))
   }

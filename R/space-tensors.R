@@ -106,6 +106,7 @@ to_tensors.default <- function(space, value, name, call, path = "") {
   type <- tensor_dtypes[[space$dtype]]
   flat <- row_major(value)
   check_dtype(space, flat, value, call, path)
+  if (!space$dtype %in% c("int64", "uint64")) flat <- double_from_integer64(flat)
   tensor <- list(dtype = type, shape = space$shape, bytes = tensor_types[[type]]$write(flat))
   stats::setNames(list(tensor), name)
 }

@@ -125,6 +125,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
   check_flag(resume)
   check_string(log, allow_null = TRUE)
   check_string(checkpoint, allow_null = TRUE)
+  seeds <- plain_numbers(seeds)
   if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
   settings$num_envs <- num_envs %||% learner_envs(agent, env)
   settings$num_workers <- num_workers

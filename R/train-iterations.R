@@ -106,6 +106,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- agent_to_ask(settings, state, vector_env)
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   policy <- agent_policy(agent)
+  asked <- plain_numbers(asked, "agent_ask()", call)
   check_asked(asked, policy, agent, call)
   needs <- check_needs(agent_needs(agent), call)
   candidates <- policy_candidates(policy, asked)

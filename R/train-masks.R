@@ -87,7 +87,7 @@ masked_sub_envs <- function(env, vector_env, name, note, call) {
 #' @return A logical matrix, `NULL` where the info has no such element.
 #' @noRd
 mask_in <- function(info, name, n, actions, call) {
-  mask <- info[[name]]
+  mask <- plain_numbers(info[[name]], "mask", call)
   if (is.null(mask)) {
     return(NULL)
   }

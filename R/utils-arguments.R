@@ -39,7 +39,7 @@ check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()
 }
 
 check_seeds <- function(seeds, call = rlang::caller_env()) {
-  if (!is.numeric(seeds) || !length(seeds)) {
+  if (!is.numeric(seeds) || is_integer64(seeds) || !length(seeds)) {
     abort_argument(seeds, "one or more whole numbers", "seeds", call)
   }
   for (i in seq_along(seeds)) {
@@ -137,7 +137,8 @@ check_suggested <- function(package, purpose, call = rlang::caller_env()) {
 
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
-    paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
+    c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
+      i = if (is_integer64(x)) "With bit64 attached, `as.numeric()` makes a number of R's own."),
     class = "gym_error_argument",
     argument = arg,
     value = x,
@@ -145,7 +146,9 @@ abort_argument <- function(x, must, arg, call) {
   )
 }
 
-is_number <- function(x) is.numeric(x) && length(x) == 1L && is.null(dim(x)) && !is.na(x)
+is_number <- function(x) {
+  is.numeric(x) && !is_integer64(x) && length(x) == 1L && is.null(dim(x)) && !is.na(x)
+}
 
 range_text <- function(min, max) {
   # The largest integer of R's is a limit of the type, not one to be mentioned.
@@ -163,7 +166,8 @@ range_text <- function(min, max) {
 }
 
 describe_argument <- function(x) {
-  if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(x))) {
+  plain <- if (is_integer64(x)) unclass(x) else x
+  if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))) {
     describe_value(x)
   } else if (is.array(x)) {
     paste0("an array of ", paste(dim(x), collapse = " x "))

@@ -5,7 +5,7 @@ shape_values <- function(values, shape) {
   if (length(shape) <= 1L) {
     return(values)
   }
-  wide <- inherits(values, "integer64")
+  wide <- is_integer64(values)
   values <- unclass(values)
   if (length(shape) == 2L) {
     # A third of what aperm() takes.
@@ -19,7 +19,7 @@ shape_values <- function(values, shape) {
 
 # The elements of an array with its last index running fastest, as on the wire.
 row_major <- function(x) {
-  if (!is.object(x) || !inherits(x, "integer64")) {
+  if (!is.object(x) || !is_integer64(x)) {
     return(if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x))
   }
   structure(row_major(unclass(x)), class = "integer64")

@@ -30,6 +30,10 @@ abort_space <- function(space, value, problem, call, path = "") {
 }
 
 describe_value <- function(value) {
+  if (is_integer64(value)) {
+    # deparse() shows its bits.
+    return(paste("the integer64", describe_value(double_from_integer64(value))))
+  }
   text <- paste(deparse(value, width.cutoff = 60L, nlines = 3L), collapse = " ")
   if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }

@@ -5,7 +5,8 @@
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
 are_whole <- function(x, min, max) {
-  is.numeric(x) && is.null(dim(x)) && !anyNA(x) && all(x >= min & x <= max & x == trunc(x))
+  is.numeric(x) && !is_integer64(x) && is.null(dim(x)) && !anyNA(x) &&
+    all(x >= min & x <= max & x == trunc(x))
 }
 
 # Returns whole numbers from their decimal digits.
@@ -58,16 +59,84 @@ abort_whole <- function(digits) {
 whole_text <- function(x) {
   if (is.character(x)) {
     x
-  } else if (inherits(x, "integer64")) {
-    requireNamespace("bit64")
+  } else if (is_integer64(x <- narrow_integer64(x))) {
     as.character(x)
   } else {
     sprintf("%.0f", x)
   }
 }
 
-as_double <- function(x) {
-  if (inherits(x, "integer64")) as.numeric(whole_text(x)) else as.double(x)
+# Beyond 2^53 the numbers of an integer64 are rounded.
+as_double <- function(x) as.double(double_from_integer64(x))
+
+# integer64 -------------------------------------------------------------------------
+
+# An integer64, such as a column that data.table or a database gives, keeps its whole numbers in the
+# bits of doubles. R's own functions take these for the doubles that they are not: 5 for 2.5e-323.
+# So a setting refuses it, by is_number() and are_whole(), and wherever else numbers come in
+# (actions, observations, rewards, seeds, weights, tables) plain_numbers() or narrow_integer64()
+# turns it into doubles.
+
+is_integer64 <- function(x) is.object(x) && inherits(x, "integer64")
+
+# The numbers as doubles, those beyond 2^53 rounded, NA for NA; anything else as it is. In plain R,
+# as bit64 may not be installed.
+double_from_integer64 <- function(x) {
+  if (!is_integer64(x)) {
+    return(x)
+  }
+  x <- unclass(x)
+  halves <- readBin(
+    writeBin(as.vector(x), raw(), endian = "little"), "integer", 2L * length(x), endian = "little"
+  )
+  lower <- halves[c(TRUE, FALSE)]
+  upper <- halves[c(FALSE, TRUE)]
+  numbers <- signed_half(upper) * 2^32 + unsigned_half(lower)
+  numbers[is.na(upper) & lower %in% 0L] <- NA
+  # Names and dimensions stay.
+  x[] <- numbers
+  x
+}
+
+# The same where no number is rounded by it; else the integer64.
+narrow_integer64 <- function(x) {
+  if (!is_integer64(x)) {
+    return(x)
+  }
+  numbers <- double_from_integer64(x)
+  # 2^53 itself may have been rounded to it.
+  if (all(abs(numbers) < 2^53, na.rm = TRUE)) {
+    return(numbers)
+  }
+  if (!requireNamespace("bit64", quietly = TRUE)) {
+    abort_without_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
+  }
+  x
+}
+
+# The same for all numbers of a value that may be a list, or a data frame.
+narrow_values <- function(x, narrow = narrow_integer64) {
+  if (is.list(x) && (!is.object(x) || is.data.frame(x))) {
+    x[] <- lapply(x, narrow_values, narrow)
+    x
+  } else {
+    narrow(x)
+  }
+}
+
+# Numbers that R can calculate with: an integer64 as doubles, or an error; anything else as it is.
+plain_numbers <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  numbers <- narrow_integer64(x)
+  if (is_integer64(numbers)) {
+    largest <- numbers[which.max(abs(double_from_integer64(numbers)))]
+    gym_abort(
+      c(paste0("`", arg, "` has the integer64 ", whole_text(largest),
+               ", which is beyond 2^53, where R's numbers have gaps."),
+        i = "`as.numeric()` rounds it to the nearest number that R has."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+  numbers
 }
 
 # As two halves of 32 bits ---------------------------------------------------------
@@ -131,7 +200,7 @@ digits_of_halves <- function(upper, lower, signed) {
 }
 
 bytes_of_whole <- function(x) {
-  if (inherits(x, "integer64")) {
+  if (is_integer64(x)) {
     return(writeBin(as.vector(unclass(x)), raw(), size = 8L, endian = "little"))
   }
   upper <- floor(x / 2^32)
