@@ -46,7 +46,7 @@ find_preset <- function(agent, env, kwargs) {
   presets <- presets[presets$agent == agent, ]
   for (row in seq_len(nrow(presets))) {
     preset <- as.list(presets[row, ])
-    own <- if (nzchar(preset$kwargs)) jsonlite::fromJSON(preset$kwargs, FALSE) else list()
+    own <- if (nzchar(preset$kwargs)) from_json(preset$kwargs) else list()
     if (identical(sorted_by_name(own), sorted_by_name(kwargs))) {
       return(Filter(function(value) !is.na(value) && !identical(value, ""), preset))
     }

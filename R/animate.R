@@ -128,7 +128,7 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
   check_count(width, max = 65535, allow_null = TRUE, call = call)
   check_count(every, allow_null = TRUE, call = call)
   if (!is.null(file)) {
-    if (!rlang::is_string(file) || !grepl("[.]gif$", file, ignore.case = TRUE)) {
+    if (!rlang::is_string(file) || !endsWith(lower_case(file), ".gif")) {
       abort_argument(file, "the name of a file that ends in .gif, or NULL", "file", call)
     }
     if (!dir.exists(dirname(file))) {

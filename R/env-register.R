@@ -284,7 +284,7 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
 registered_rows <- function(search = NULL) {
   ids <- as.character(names(the_session$environments))
   if (!is.null(search)) {
-    ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
+    ids <- ids[grepl(lower_case(search), lower_case(ids), fixed = TRUE)]
   }
   specs <- lapply(ids, registered_spec)
   data.frame(

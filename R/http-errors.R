@@ -54,7 +54,7 @@ sentence <- function(text) {
     return(NULL)
   }
   if (!grepl("^[a-z_]+\\(", text)) {
-    text <- paste0(toupper(substr(text, 1L, 1L)), substring(text, 2L))
+    text <- paste0(chartr("a-z", "A-Z", substr(text, 1L, 1L)), substring(text, 2L))
   }
   if (grepl("[.?!\"]$", text)) text else paste0(text, ".")
 }

@@ -7,7 +7,7 @@ json_number <- function(x) {
   } else if (is.logical(x)) {
     text <- ifelse(x, "true", "false")
   } else {
-    text <- sprintf("%.17g", x)
+    text <- with_decimal_point(sprintf("%.17g", x))
     # "-0" is an integer to most readers, and has no sign.
     text[text == "-0"] <- "-0.0"
   }
@@ -110,7 +110,7 @@ from_json <- function(text) {
   if (grepl("\\u0000", text, fixed = TRUE, useBytes = TRUE)) {
     refuse_nul(text)
   }
-  jsonlite::parse_json(text, bigint_as_char = TRUE)
+  with_decimal_point(jsonlite::parse_json(text, bigint_as_char = TRUE))
 }
 
 # Refuses the escaped character NUL, but not an escaped backslash before "u0000".

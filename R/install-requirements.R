@@ -39,9 +39,9 @@ lock_megabytes <- function(extras) {
 # The name of this system in lock files and bundles.
 system_name <- function() {
   info <- Sys.info()
-  machine <- tolower(info[["machine"]])
+  machine <- lower_case(info[["machine"]])
   machine <- switch(machine, amd64 = , "x86-64" = "x86_64", machine)
-  paste0(tolower(info[["sysname"]]), "-", machine)
+  paste0(lower_case(info[["sysname"]]), "-", machine)
 }
 
 check_extras <- function(extras, call = rlang::caller_env()) {

@@ -177,7 +177,7 @@ inform_of_precedence <- function(python) {
 #' @return The path of the environment's Python, `NULL` when nobody agreed.
 #' @noRd
 prompt_for_python <- function() {
-  if (tolower(Sys.getenv("GYM_INSTALL")) %in% c("1", "true", "yes")) {
+  if (lower_case(Sys.getenv("GYM_INSTALL")) %in% c("1", "true", "yes")) {
     return(keep_random_state(gym_server_install(ask = FALSE)))
   }
   if (!rlang::is_interactive() || isTRUE(the_session$install_declined)) {

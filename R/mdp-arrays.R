@@ -30,7 +30,7 @@ model_arrays <- function(model) {
   cells <- (states + 1)^2 * actions
   if (cells > .Machine$integer.max) {
     gym_abort(
-      paste0("An array of ", format(cells, big.mark = ","), " numbers is too large."),
+      paste0("An array of ", whole_number_text(cells), " numbers is too large."),
       class = "gym_error_argument", argument = "model", value = model
     )
   }

@@ -77,8 +77,8 @@ spanned_space <- function(numbers, what, call = rlang::caller_env()) {
   if (count > most_values) {
     gym_abort(
       c(paste0("The ", what, " are numbered from ", ends[[1L]], " to ", ends[[2L]],
-               ", which makes ", format(count, big.mark = ",", scientific = FALSE),
-               " of them; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+               ", which makes ", whole_number_text(count),
+               " of them; at most ", whole_number_text(most_values),
                " are possible."),
         i = "Number them without gaps."),
       class = "gym_error_argument", argument = "transitions", call = call

@@ -129,8 +129,8 @@ tiles_of <- function(features, space, call) {
   per_tiling <- weights[[numbers + 1L]]
   if (per_tiling * tilings > most_values) {
     gym_abort(
-      c(paste0("The tilings would have ", format(per_tiling * tilings, big.mark = ","),
-               " tiles; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+      c(paste0("The tilings would have ", whole_number_text(per_tiling * tilings),
+               " tiles; at most ", whole_number_text(most_values),
                " are possible."),
         i = "Take fewer `bins`, or features of your own, of fewer numbers."),
       class = "gym_error_argument", argument = "features", value = features, call = call

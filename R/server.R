@@ -138,7 +138,9 @@ server_options <- function(options, call = rlang::caller_env()) {
 option_text <- function(values) {
   values <- plain_numbers(values)
   if (is.numeric(values)) {
-    values <- vapply(values, format, "", scientific = FALSE, digits = 15L, trim = TRUE)
+    values <- with_decimal_point(
+      vapply(values, format, "", scientific = FALSE, digits = 15L, trim = TRUE)
+    )
   }
   as.character(values)
 }

@@ -144,7 +144,7 @@ space_dict <- function(...) {
 make_space <- function(kind, ..., is_array = FALSE) {
   structure(
     list(name = kind, ...),
-    class = c(paste0("gym_space_", tolower(kind)), if (is_array) "gym_space_array", "gym_space")
+    class = c(paste0("gym_space_", lower_case(kind)), if (is_array) "gym_space_array", "gym_space")
   )
 }
 

@@ -80,8 +80,8 @@ table_index <- function(space, what, call) {
   if (index$count > most_values) {
     gym_abort(
       paste0("A table for ", format(space), " would have ",
-             format(index$count, big.mark = ",", scientific = FALSE),
-             " rows; at most ", format(most_values, big.mark = ",", scientific = FALSE),
+             whole_number_text(index$count),
+             " rows; at most ", whole_number_text(most_values),
              " are possible."),
       class = "gym_error_argument", value = space, call = call
     )

@@ -10,7 +10,7 @@ new_space <- function(description) {
   }
   space <- structure(
     description,
-    class = c(paste0("gym_space_", tolower(description$name)), "gym_space")
+    class = c(paste0("gym_space_", lower_case(description$name)), "gym_space")
   )
   init_space(space)
 }

@@ -83,11 +83,10 @@ write_config <- function(file, settings) {
     unclass(settings)[numbers],
     list(provenance = plain_provenance(settings$provenance))
   )
-  writeLines(
-    jsonlite::toJSON(config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA,
-                     force = TRUE),
-    file
-  )
+  json <- with_decimal_point(jsonlite::toJSON(
+    config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA, force = TRUE
+  ))
+  writeLines(json, file)
 }
 
 # In JSON an empty list would be an array.
@@ -129,10 +128,10 @@ append_row <- function(table, row) {
   old <- options(scipen = 15)
   on.exit(options(old))
   withCallingHandlers(
-    utils::write.table(
+    with_decimal_point(utils::write.table(
       row, table, append = !first, sep = ",", na = "", row.names = FALSE, col.names = first,
       quote = FALSE
-    ),
+    )),
     # The warning says more than the error that follows.
     warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE)
   )

@@ -2,14 +2,27 @@
 
 environment_label <- function(env) env$spec$id %||% "the environment"
 
-count_of <- function(n, noun) {
-  paste0(format(n, big.mark = ",", scientific = FALSE), " ", noun, if (n != 1) "s")
-}
+count_of <- function(n, noun) paste0(whole_number_text(n), " ", noun, if (n != 1) "s")
 
-number_text <- function(x) format(x, digits = 4L, big.mark = ",")
+number_text <- function(x) marked_text(x, digits = 4L)
+
+whole_number_text <- function(n) marked_text(n, scientific = FALSE)
+
+# Thousands are marked by a comma, but not where that is the decimal mark, which options(OutDec = )
+# and a locale change.
+marked_text <- function(x, ...) {
+  if (grepl(",", format(0.5), fixed = TRUE)) {
+    format(x, ..., big.mark = ".", decimal.mark = ",")
+  } else {
+    format(x, ..., big.mark = ",")
+  }
+}
 
 # Each by itself: together they would all get as many decimals as the longest needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
+
+# In a Turkish locale tolower("I") has no dot, and toupper("i") has one.
+lower_case <- function(x) chartr("A-Z", "a-z", x)
 
 percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
 
@@ -25,7 +38,7 @@ seconds_text <- function(seconds) {
 
 # The one of `choices` that `name` seems to be a misspelling of; character(0) for none.
 nearest_name <- function(name, choices) {
-  plain <- function(x) gsub("[._]", "", tolower(x))
+  plain <- function(x) gsub("[._]", "", lower_case(x))
   ordered <- function(x) {
     vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
   }

@@ -13,3 +13,20 @@ test_that("what is counted has its plural, and long times are minutes", {
   expect_identical(seconds_text(3), "3.0 s")
   expect_identical(seconds_text(600), "10 min")
 })
+
+test_that("thousands are not marked by the session's decimal mark", {
+  withr::local_options(OutDec = ",", warn = 2)
+  expect_identical(number_text(12345.678), "12.346")
+  expect_identical(number_text(0.125), "0,125")
+  expect_identical(count_of(1e6, "step"), "1.000.000 steps")
+  expect_output(print(schedule_linear(1, 0.5, 10000)), "to 0,5 in 10.000 steps", fixed = TRUE)
+})
+
+test_that("in a Turkish locale words of English keep their dots", {
+  local_locale("LC_CTYPE", "tr_TR", "ISO-8859-9")
+  expect_false(identical(tolower("I"), "i"))
+  expect_identical(lower_case("INVERTED Pendulum"), "inverted pendulum")
+  expect_identical(sentence("instance lost"), "Instance lost.")
+  expect_identical(lower_first("It is"), "it is")
+  expect_identical(nearest_name("INSIDE", "inside"), "inside")
+})

@@ -1,0 +1,24 @@
+#' Set a locale for the rest of a test
+#'
+#' A machine may lack it: then it is made, and otherwise the test is skipped.
+#' @param language Such as "de_DE".
+#' @param charset With which it is made, in much less time than with UTF-8.
+#' @return What the locale is called, for `Sys.setlocale()` in another session.
+#' @noRd
+local_locale <- function(category, language, charset, frame = parent.frame()) {
+  before <- Sys.getlocale(category)
+  withr::defer(suppressWarnings(Sys.setlocale(category, before)), envir = frame)
+  set <- function(name) suppressWarnings(Sys.setlocale(category, name))
+  found <- set(paste0(language, ".UTF-8"))
+  if (!nzchar(found)) {
+    skip_if(!nzchar(Sys.which("localedef")), paste("there is no locale", language, "here"))
+    folder <- withr::local_tempdir(.local_envir = frame)
+    name <- paste0(language, ".", charset)
+    processx::run("localedef", c("-c", "-i", language, "-f", charset, file.path(folder, name)),
+                  error_on_status = FALSE)
+    withr::local_envvar(LOCPATH = folder, .local_envir = frame)
+    found <- set(name)
+    skip_if(!nzchar(found), paste("no locale", language, "could be made here"))
+  }
+  found
+}
