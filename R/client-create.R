@@ -30,8 +30,8 @@
 #'   10 seconds of it.
 #' @param config Further settings for the connection, made with httr:
 #'   [httr::authenticate()], [httr::add_headers()], [httr::use_proxy()] or
-#'   several of them joined by [c()]. What [httr::set_config()] has set by then for the
-#'   whole session holds, too.
+#'   several of them joined by [c()]. What [httr::set_config()] has set for the whole session
+#'   at the time of a call holds, too, except for a proxy where the server is on this machine.
 #' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
 #'   default is what the environment variable `GYM_SERVER_TOKEN` holds, so that no script has
 #'   to. It is sent with each call, to this server only, and nothing that is printed and no
@@ -123,7 +123,10 @@ query_text <- function(data) {
   if (!length(data)) {
     return("")
   }
-  values <- vapply(data, function(value) curl::curl_escape(enc2utf8(as.character(value))), "")
+  # R writes the numbers of as.character() only when they are looked at.
+  values <- with_decimal_point(
+    vapply(data, function(value) curl::curl_escape(enc2utf8(as.character(value))), "")
+  )
   paste0("?", paste0(names(data), "=", values, collapse = "&"))
 }
 

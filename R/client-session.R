@@ -40,7 +40,7 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  names <- list(url, Sys.getenv(token_variable), getOption("httr_config"))
+  names <- list(url, Sys.getenv(token_variable))
   if (!identical(the_session$named_by, names)) {
     the_session$named_client <- new_client(url, token = variable_token(call))
     the_session$named_by <- names

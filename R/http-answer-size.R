@@ -24,7 +24,7 @@ small_answer <- 2^16
 #' @param state The client's. Its `too_large` says afterwards whether the request was ended.
 #' @noRd
 limit_answer_size <- function(handle, state) {
-  curl::handle_setopt(
+  set_curl(
     handle,
     accept_encoding = NULL,
     noprogress = FALSE,

@@ -5,8 +5,7 @@ new_client <- function(remote_base, timeout = 60, config = httr::config(), token
     list(
       remote_base = sub("/+$", "", remote_base),
       timeout = timeout,
-      # As for httr's own verbs.
-      config = c(getOption("httr_config", httr::config()), config),
+      config = config,
       token = token,
       state = new.env(parent = emptyenv())
     ),
@@ -27,6 +26,17 @@ check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   if (!inherits(x, "GymClient")) {
     abort_argument(x, "a client, as create_GymClient() or gym_client() makes it", arg, call)
   }
+}
+
+# The settings of a client's connection: its own, and before them those that httr::set_config() has
+# made for the session, as for httr's own verbs. A proxy of the session's would look for a server of
+# this machine on its own.
+client_config <- function(client) {
+  session <- getOption("httr_config", httr::config())
+  if (is_loopback(client$remote_base)) {
+    session$options <- session$options[!grepl("^proxy", names(session$options))]
+  }
+  c(session, client$config)
 }
 
 # What a client holds besides its address: its connection to the server and what it knows of the

@@ -11,6 +11,7 @@ new_connection <- function(client, keys = keys_of_process(client),
   connection$body <- raw()
   connection$sent <- 0L
   connection$handles <- new.env(parent = emptyenv())
+  connection$session_config <- getOption("httr_config")
   connection
 }
 
@@ -37,7 +38,7 @@ fetch_in_own_pool <- function() {
     outcome <- NULL
     on.exit(suspendInterrupts(curl::multi_cancel(handle)))
     suspendInterrupts({
-      curl::handle_setopt(handle, url = url)
+      set_curl(handle, url = url)
       curl::multi_add(
         handle,
         done = function(response) outcome <<- response,
@@ -107,8 +108,13 @@ handle_kinds <- list(
   send_tensors = list(post = TRUE, sends = tensors_type, accepts = accepted_tensors)
 )
 
-# A connection's handle of one kind: curl's handle, and the length of body that is set on it.
+# A connection's handle of one kind: curl's handle, and the length of body that is set on it. New
+# ones are made when httr::set_config() or httr::reset_config() has changed what the session has.
 handle_of_kind <- function(client, connection, kind) {
+  if (!identical(connection$session_config, getOption("httr_config"))) {
+    connection$session_config <- getOption("httr_config")
+    connection$handles <- new.env(parent = emptyenv())
+  }
   connection$handles[[kind]] %||%
     (connection$handles[[kind]] <- new_handle_of_kind(client, connection, kind))
 }
@@ -121,7 +127,7 @@ new_handle_of_kind <- function(client, connection, kind) {
   handle$body_size <- -1
   handle$sends <- kind$sends
   if (kind$post) {
-    curl::handle_setopt(handle$curl, post = TRUE, readfunction = function(nbytes, ...) {
+    set_curl(handle$curl, post = TRUE, readfunction = function(nbytes, ...) {
       read_body(connection, nbytes)
     })
   }
@@ -155,8 +161,9 @@ read_body <- function(connection, nbytes) {
 }
 
 new_handle <- function(client, sends, accepts) {
+  config <- client_config(client)
   handle <- httr::handle(client$remote_base)$handle
-  curl::handle_setopt(
+  set_curl(
     handle,
     connecttimeout_ms = min(10, client$timeout) * 1000,
     timeout_ms = client$timeout * 1000,
@@ -164,11 +171,11 @@ new_handle <- function(client, sends, accepts) {
     # Thousands of sub-environments come in few pieces.
     buffersize = 2^18
   )
-  if (is_loopback(client$remote_base) && is.null(client$config$options$proxy)) {
+  if (is_loopback(client$remote_base) && is.null(config$options$proxy)) {
     # A proxy that the system names would look for the server on its own machine.
-    curl::handle_setopt(handle, noproxy = "*")
+    set_curl(handle, noproxy = "*")
   }
-  curl::handle_setopt(handle, .list = client$config$options)
+  set_curl(handle, .list = config$options)
   limit_answer_size(handle, client$state)
   # An empty Expect keeps curl from asking for permission before it sends a body.
   headers <- c(
@@ -178,7 +185,7 @@ new_handle <- function(client, sends, accepts) {
   if (!is.null(client$token)) {
     headers[["Authorization"]] <- paste("Bearer", client$token())
   }
-  custom <- client$config$headers
+  custom <- config$headers
   curl::handle_setheaders(
     handle,
     .list = as.list(c(headers[setdiff(names(headers), names(custom))], custom))
@@ -186,7 +193,23 @@ new_handle <- function(client, sends, accepts) {
   if (Sys.getpid() != the_session$pid) {
     # curl's open connections belong to the process that was forked: on one of
     # them a child could read an answer meant for its parent or a sibling.
-    curl::handle_setopt(handle, fresh_connect = TRUE, forbid_reuse = TRUE)
+    set_curl(handle, fresh_connect = TRUE, forbid_reuse = TRUE)
   }
   handle
+}
+
+#' Set options of a handle
+#'
+#' As [curl::handle_setopt()], which in a Turkish locale does not find most of them: it makes the
+#' names of all by [tolower()], and there the small letter of "I" has no dot. So its own are passed.
+#' @noRd
+set_curl <- function(handle, ..., .list = list()) {
+  options <- c(list(...), .list)
+  if (is.null(the_session$curl_names)) {
+    known <- names(curl::curl_options())
+    the_session$curl_names <- stats::setNames(known, gsub("\u0131", "i", known, fixed = TRUE))
+  }
+  known <- the_session$curl_names[names(options)]
+  names(options) <- ifelse(is.na(known), names(options), known)
+  curl::handle_setopt(handle, .list = options)
 }

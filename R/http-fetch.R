@@ -32,8 +32,8 @@ fetch <- function(client, connection, handle, route, key, repeatable, call, rece
     }
     if (!refused) Sys.sleep(0.1 * attempt)
     # All attempts together may take as long as one request.
-    curl::handle_setopt(handle$curl, timeout_ms = left * 1000)
-    on.exit(curl::handle_setopt(handle$curl, timeout_ms = timeout_of(client) * 1000))
+    set_curl(handle$curl, timeout_ms = left * 1000)
+    on.exit(set_curl(handle$curl, timeout_ms = timeout_of(client) * 1000))
     attempt <- attempt + 1L
   }
 }
@@ -65,7 +65,7 @@ prompted_server_starts <- function(client, reached, call) {
 
 # httr's timeout() takes precedence over the client's own.
 timeout_of <- function(client) {
-  configured <- client$config$options$timeout_ms
+  configured <- client_config(client)$options$timeout_ms
   if (is.null(configured)) client$timeout else configured / 1000
 }
 

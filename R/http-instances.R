@@ -171,7 +171,7 @@ close_together <- function(places, seconds) {
 
 closing_handle <- function(client, route, body, seconds) {
   handle <- new_handle(client, json_type, json_type)
-  curl::handle_setopt(
+  set_curl(
     handle,
     url = paste0(client$remote_base, route), post = TRUE,
     postfieldsize = length(body), postfields = body,

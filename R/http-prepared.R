@@ -42,7 +42,7 @@ call_prepared <- function(client, prepared, content, call) {
   connection$busy <- TRUE
   on.exit(connection$busy <- FALSE)
   kind <- prepared$kind
-  handle <- connection$handles[[kind]] %||% handle_of_kind(client, connection, kind)
+  handle <- handle_of_kind(client, connection, kind)
   keys <- connection$keys
   number <- keys$number + 1
   keys$number <- number

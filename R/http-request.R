@@ -69,7 +69,7 @@ load_body <- function(connection, handle, bytes) {
 
 set_body_size <- function(handle, size) {
   suspendInterrupts({
-    curl::handle_setopt(handle$curl, postfieldsize_large = size)
+    set_curl(handle$curl, postfieldsize_large = size)
     handle$body_size <- size
   })
 }

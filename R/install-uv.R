@@ -131,8 +131,9 @@ most_bytes_of_uv <- 100e6
 download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
   received <- 0
-  handle <- curl::new_handle(
-    failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
+  handle <- curl::new_handle()
+  set_curl(
+    handle, failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
     # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
     low_speed_limit = 100, low_speed_time = 60,
     noprogress = FALSE, progressfunction = function(down, up) {
@@ -143,7 +144,7 @@ download_uv <- function(url, archive, call) {
   )
   certificates <- Sys.getenv("SSL_CERT_FILE")
   if (nzchar(certificates)) {
-    curl::handle_setopt(handle, cainfo = certificates)
+    set_curl(handle, cainfo = certificates)
   }
   tryCatch(
     # Unlike curl_download() it does not replace the handle's progress function.

@@ -52,7 +52,7 @@ finding <- function(topic, what, finding, state = "ok", fix = NA_character_) {
 # Who calls gym_sitrep() has a problem already: an error in finding something out becomes a finding.
 attempt_rows <- function(topic, what, rows) {
   tryCatch(rows, error = function(cnd) {
-    finding(topic, what, paste("could not be found out:", conditionMessage(cnd)), "note")
+    finding(topic, what, paste("could not be found out:", conditionMessage(cnd)), "wrong")
   })
 }
 

@@ -446,16 +446,38 @@ test_that("calls leave R's generator alone", {
 })
 
 test_that("httr's set_config() holds for clients, too, and their own settings take precedence", {
+  made_before <- create_GymClient("http://a")
   withr::local_options(httr_config = httr::config(cainfo = "group.pem", proxy = "a.example.org"))
-  expect_identical(create_GymClient("http://a")$config$options$cainfo, "group.pem")
+  expect_identical(client_config(made_before)$options$cainfo, "group.pem")
   own <- create_GymClient("http://a", config = httr::config(cainfo = "own.pem"))
-  expect_identical(own$config$options$cainfo, "own.pem")
-  expect_identical(own$config$options$proxy, "a.example.org")
-  expect_s3_class(own$config, "request")
+  expect_identical(client_config(own)$options$cainfo, "own.pem")
+  expect_identical(client_config(own)$options$proxy, "a.example.org")
+  expect_s3_class(client_config(own), "request")
   withr::local_envvar(GYM_SERVER_URL = "http://a")
-  expect_identical(gym_client()$config$options$cainfo, "group.pem")
+  expect_identical(client_config(gym_client())$options$cainfo, "group.pem")
   options(httr_config = NULL)
-  expect_null(gym_client()$config$options$cainfo)
+  expect_null(client_config(gym_client())$options$cainfo)
+})
+
+test_that("a connection follows httr's set_config() and reset_config()", {
+  client <- create_GymClient(test_client()$remote_base)
+  expect_type(env_list_all(client), "list")
+  withr::local_options(httr_config = httr::add_headers(Origin = "https://evil.example"))
+  expect_error(env_list_all(client), class = "gym_error_http_403")
+  options(httr_config = NULL)
+  expect_type(env_list_all(client), "list")
+})
+
+test_that("a server of this machine is not looked for by the session's proxy", {
+  address <- test_client()$remote_base
+  # Nothing listens at port 1.
+  no_proxy <- httr::use_proxy("127.0.0.1", 1)
+  withr::local_options(httr_config = no_proxy)
+  client <- create_GymClient(address)
+  expect_type(env_list_all(client), "list")
+  expect_identical(client_config(create_GymClient("http://a"))$options$proxyport, 1)
+  through <- create_GymClient(address, config = no_proxy)
+  expect_error(env_list_all(through), class = "gym_error_connection")
 })
 
 test_that("a hint that ends with a command can be copied whole", {

@@ -172,3 +172,11 @@ test_that("the real report asks nothing, changes nothing and takes no server", {
   expect_identical(the_session$servers, servers)
   expect_identical(list.files(cache, recursive = TRUE, include.dirs = TRUE), character())
 })
+
+test_that("what could not be found out is wrong", {
+  report()
+  local_functions(sitrep_own_servers = function() stop("Unknown option: timeout_ms"))
+  seen <- sitrep()
+  expect_match(seen$text, "could not be found out: Unknown option", fixed = TRUE)
+  expect_no_match(seen$text, "Nothing is wrong", fixed = TRUE)
+})
