@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -64,6 +66,9 @@ _MOST_WRAPPERS = 32
 # Wrappers that draw when they are made and in each step.
 _DRAWING = ("AddRenderObservation",)
 
+# Wrappers that keep observations of earlier steps.
+_KEEPING = ("DelayObservation", "FrameStackObservation")
+
 # Wrappers that leave observations, actions and rewards as they are. The first two are Gymnasium's
 # own additions.
 _UNCHANGING = (
@@ -75,6 +80,13 @@ _UNCHANGING = (
 
 # Environments that draw their own observation, a picture, in each step.
 _DRAWING_ENVIRONMENTS = ("gymnasium.envs.box2d.car_racing",)
+
+
+class _CopiedObservations(gymnasium.ObservationWrapper):
+    """Keeps an environment from changing in place what it has observed before."""
+
+    def observation(self, observation: Any) -> Any:
+        return copy.deepcopy(observation)
 
 
 def allowed() -> list[str]:
@@ -180,6 +192,8 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None
     if memory is not None:
         estimate = wrapper_bytes(wrapper.name, parse_nonfinite(wrapper.kwargs), env)
         memory.reserve(estimate.kept, wrapper.name, later=estimate.answer)
+    if wrapper.name in _KEEPING:
+        env = _CopiedObservations(env)
     try:
         arguments = {name: _argument(env, name, value) for name, value in wrapper.kwargs.items()}
         wrapped: gymnasium.Env = kind(env, **arguments)

@@ -11,7 +11,7 @@ _COLOUR_TYPES = {1: 0, 3: 2, 4: 6}
 
 
 def picture(frame: object) -> np.ndarray:
-    """Return what an environment drew as a uint8 array of shape (height, width, channels).
+    """Copy what an environment drew as a uint8 array of shape (height, width, channels).
 
     Args:
         frame: uint8 array of shape (height, width), (height, width, 1), (height, width, 3) for
@@ -26,7 +26,8 @@ def picture(frame: object) -> np.ndarray:
         frame = frame[:, :, np.newaxis]
     if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] not in _COLOUR_TYPES:
         raise ValueError(f"no picture: {frame.dtype} of shape {frame.shape}")
-    return frame
+    # It may be drawn over before this one is sent.
+    return frame.copy()
 
 
 def png(frame: np.ndarray) -> bytes:

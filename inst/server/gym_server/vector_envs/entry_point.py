@@ -67,7 +67,9 @@ class EntryPointEnv:
             self.ended = np.asarray(terminated, dtype=bool) | np.asarray(truncated, dtype=bool)
         if not with_infos:
             info = {name: info[name] for name in ("final_obs", "_final_obs") if name in info}
-        return observation, reward, terminated, truncated, info
+        # An environment may change its arrays in the next step, before these are sent.
+        results = [np.array(result) for result in (reward, terminated, truncated)]
+        return observation, *results, info
 
     def draw(self, sub_env: int) -> object:
         """Draw all sub-environments, and return one of the frames."""

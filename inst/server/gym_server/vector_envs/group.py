@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -180,7 +181,9 @@ class Group:
                         elif self._mode is AutoresetMode.NEXT_STEP:
                             ended[index] = True
                         else:
-                            final[row], final_info = last[index], info
+                            # The reset may change in place what the step returned.
+                            final[row] = copy.deepcopy(last[index])
+                            final_info = _copied(info) if with_infos else None
                             last[index], info = self._begin_next(index)
                 if with_infos:
                     infos.append(Info(info, final_info))
@@ -237,6 +240,22 @@ class Group:
         if isinstance(failure, GymServerError):
             return failure
         return environment_error(failure, f"Sub-environment {self._numbers[index]}")
+
+
+# Deeper than any honest info; one that holds itself is not followed further.
+_DEEPEST = 128
+
+
+def _copied(value: Any, depth: int = 0) -> Any:
+    """Copy the arrays, dicts and lists of an info; what else it holds may have no copy."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if depth < _DEEPEST:
+        if isinstance(value, dict):
+            return {key: _copied(item, depth + 1) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [_copied(item, depth + 1) for item in value]
+    return value
 
 
 def stack_observations(space: Space, observations: list) -> Any:

@@ -139,6 +139,20 @@ def test_the_first_wrapper_is_the_innermost(client, create):
     assert (flat["shape"], stacked["shape"]) == ([12], [3, 4])
 
 
+@pytest.mark.parametrize(
+    ("wrapper", "wanted"),
+    [
+        (wrapped("DelayObservation", delay=1), [[0], [1]]),
+        (wrapped("FrameStackObservation", stack_size=2), [[[0], [1]], [[1], [2]]]),
+    ],
+)
+def test_observations_of_earlier_steps_are_not_changed_in_place(client, create, wrapper, wanted):
+    url = create("faulty_envs:KeepsItsArrays-v0", wrappers=[wrapper])
+    client.post(f"{url}/reset/")
+    answers = [client.post(f"{url}/step/", json={"action": 0}).json for _ in range(2)]
+    assert [answer["observation"] for answer in answers] == wanted
+
+
 def test_a_time_limit_truncates_and_is_told(client, create):
     url = create(wrappers=[wrapped("TimeLimit", max_episode_steps=2)])
     assert client.get(url).json["max_episode_steps"] == 2

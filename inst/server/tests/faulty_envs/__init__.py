@@ -6,7 +6,7 @@ For tests: ``--allow-module faulty_envs`` lets a server make them, as in
 
 import gymnasium
 
-from faulty_envs.counting import Counting
+from faulty_envs.counting import Counting, KeepsItsArrays
 from faulty_envs.drawing import Drawing, OldRenderModes
 from faulty_envs.hanging import (
     Gated,
@@ -56,6 +56,7 @@ for _kind in (
     HangsWhenClosedElsewhere,
     HangsWhere,
     Insists,
+    KeepsItsArrays,
     KillsItself,
     Letters,
     LongDouble,

@@ -1,4 +1,5 @@
-"""The environment that most of the others derive from; it behaves."""
+"""The environment that most of the others derive from, which behaves, and one that changes what
+it has returned."""
 
 import time
 
@@ -30,3 +31,35 @@ class Counting(gymnasium.Env):
 
     def observe(self):
         return np.array([self.steps], dtype=np.int64)
+
+
+class KeepsItsArrays(Counting):
+    """Returns and draws the same objects all the time, and changes them in place.
+
+    It observes how many steps the episode has taken.
+    """
+
+    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012
+
+    def __init__(self, length=3, render_mode=None):
+        super().__init__(length=length)
+        self.render_mode = render_mode
+        self.observation = np.zeros(1, np.int64)
+        self.info = {"steps": self.observation, "nested": {"list": [0]}}
+        self.frame = np.zeros((1, 1, 3), np.uint8)
+
+    def reset(self, *, seed=None, options=None):
+        self.steps = 0
+        observation, _ = super().reset(seed=seed, options=options)
+        return observation, self.info
+
+    def step(self, action):
+        *outcome, _ = super().step(action)
+        return *outcome, self.info
+
+    def observe(self):
+        self.observation[:] = self.frame[:] = self.info["nested"]["list"][0] = self.steps
+        return self.observation
+
+    def render(self):
+        return self.frame

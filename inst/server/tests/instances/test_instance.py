@@ -1,8 +1,15 @@
+import contextlib
 import threading
 
+import faulty_envs
 import gymnasium
 import numpy as np
 import pytest
+
+from gym_server.envs.config import EnvConfig
+from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.instances.factory import make_instance
+from gym_server.rendering.render_thread import RenderThread
 
 
 def play(client, url, seed, steps):
@@ -252,8 +259,6 @@ def test_being_asked_about_does_not_wait_for_a_step(client, faulty, eventually, 
 
 
 def test_drawing_and_closing_happen_on_one_thread(client, create, faulty):
-    import faulty_envs
-
     faulty_envs.Drawing.threads.clear()
     urls = [faulty("Drawing") for _ in range(2)]
     for url in urls:
@@ -288,6 +293,17 @@ def test_a_frame_shows_the_current_state(client, faulty):
     before = client.get(f"{url}/render").data
     client.post(f"{url}/step/", json={"action": 0})
     assert client.get(f"{url}/render").data != before
+
+
+def test_a_frame_that_is_not_sent_yet_stays_as_it_is():
+    # Others may step an environment while a frame of it becomes a file.
+    config = EnvConfig("KeepsItsArrays-v0")
+    how = ((), 1, RenderThread(), contextlib.ExitStack(), MemoryReservation())
+    instance = make_instance(config, *how)
+    instance.reset(None, None)
+    frame = instance.render()
+    instance.step(0)
+    assert (frame == 0).all()
 
 
 def test_an_environment_that_draws_nothing_cannot_render(client, faulty):

@@ -1,3 +1,4 @@
+import faulty_envs  # noqa: F401 - it registers what is made here
 import gymnasium
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -9,11 +10,14 @@ from gym_server.vector_envs.group import Group
 from gym_server.vector_envs.sub_env import SubEnv
 
 
+def group_of(env_id, numbers, mode):
+    sub_env = SubEnv(gymnasium.spec(env_id), None, {}, (), RenderThread(), MemoryReservation())
+    return Group(sub_env, numbers, mode)
+
+
 @pytest.fixture
 def group():
-    spec = gymnasium.spec("CartPole-v1")
-    sub_env = SubEnv(spec, None, {}, (), RenderThread(), MemoryReservation())
-    group = Group(sub_env, [4, 5, 6], AutoresetMode.NEXT_STEP)
+    group = group_of("CartPole-v1", [4, 5, 6], AutoresetMode.NEXT_STEP)
     group.reset([0, 1, 2], [1, 2, 3], [None] * 3, None)
     yield group
     group.close()
@@ -37,3 +41,22 @@ def test_actions_that_do_not_come_are_no_failure_of_a_sub_environment(group, act
 def test_a_failure_names_the_sub_environment_whose_action_it_was(group):
     with pytest.raises(GymServerError, match="Sub-environment 5 raised"):
         group.step(None, [0, 7, 0], True)
+
+
+def test_what_an_episode_ended_with_stays_when_the_next_one_changes_it_in_place():
+    group = group_of("KeepsItsArrays-v0", [0, 1], AutoresetMode.SAME_STEP)
+    group.reset([0, 1], [1, 2], [None] * 2, None)
+    for _ in range(3):
+        outcome = group.step(None, [0, 0], True)
+    assert outcome.observation.tolist() == [[0], [0]]
+    assert outcome.final == {0: [3], 1: [3]}
+    assert [one.final for one in outcome.infos] == [{"steps": 3, "nested": {"list": [3]}}] * 2
+
+
+def test_an_info_that_holds_itself_ends_an_episode():
+    group = group_of("KeepsItsArrays-v0", [0], AutoresetMode.SAME_STEP)
+    _, [info] = group.reset([0], [1], [None], None)
+    info.info["itself"] = info.info
+    for _ in range(3):
+        outcome = group.step(None, [0], True)
+    assert outcome.infos[0].final["itself"]["steps"] == [3]
