@@ -216,6 +216,11 @@ class Instance:
         """Answer a client's "contains"; a value has an entry for each sub-environment."""
         return self._backend.observation_contains(claim)
 
+    @property
+    def steps(self) -> int:
+        """How many steps were taken, all sub-environments together."""
+        return self._backend.steps
+
     def list_entry(self) -> dict:
         """Return what the list of instances shows of it."""
         now = time.monotonic()
@@ -226,7 +231,7 @@ class Instance:
             "num_envs": self._config.num_envs,
             "age_seconds": now - self._created,
             "idle_seconds": now - self.lock.used,
-            "steps": self._backend.steps,
+            "steps": self.steps,
             "watched": self.viewer.is_watched,
         }
 

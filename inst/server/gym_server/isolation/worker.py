@@ -36,7 +36,7 @@ from gym_server.processes.messages import read_call, refusal_message, value_mess
 from gym_server.processes.pipe import Pipe
 from gym_server.processes.set_up import set_up_process
 from gym_server.protocol import answers
-from gym_server.protocol.answers import AnswerForm
+from gym_server.protocol.answers import AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
 
 log = logging.getLogger(__name__)
@@ -120,7 +120,7 @@ def _serve(pipe: Pipe, methods: _Methods) -> None:
 def _answer(pipe: Pipe, number: int, call: Callable, *args: object) -> None:
     try:
         result = call(*args)
-        if isinstance(result, answers.Answer):
+        if isinstance(result, Ready):
             message = messages.answer_message(number, result)
         elif isinstance(result, _Look):
             message = value_message(number, result.facts, result.frame)
@@ -177,12 +177,13 @@ class _Methods:
 
     # Moves and looks ------------------------------------------------------------------------
 
-    def reset(self, seed: Seed, options: dict | None, form: tuple, mask: Any) -> answers.Answer:
-        start = self._instance.reset(seed, options, AnswerForm(*form), mask)
-        return answers.answer(start, None)
+    def reset(self, seed: Seed, options: dict | None, form: tuple, mask: Any) -> Ready:
+        return _ready(self._instance.reset(seed, options, AnswerForm(*form), mask))
 
-    def step(self, action: object, form: tuple, mask: Any) -> answers.Answer:
-        return answers.answer(self._instance.step(action, AnswerForm(*form), mask), None)
+    def step(self, action: object, form: tuple, mask: Any) -> Ready:
+        before = self._instance.steps
+        outcome = self._instance.step(action, AnswerForm(*form), mask)
+        return _ready(outcome, self._instance.steps - before)
 
     def sample_action(self) -> object:
         return self._instance.sample_action()
@@ -193,8 +194,8 @@ class _Methods:
     def look(self, sub_env: int) -> _Look:
         return _Look(*self._instance.look(sub_env))
 
-    def transition_model(self) -> answers.Answer:
-        return answers.answer(self._instance.transition_model(), None)
+    def transition_model(self) -> Ready:
+        return _ready(self._instance.transition_model())
 
     def start_monitor(self, instance_id: str, path: Path, *args: Any) -> None:
         self._instance.instance_id = instance_id
@@ -230,6 +231,11 @@ def _end(why: GymServerError) -> None:
     """End with a process of sub-environments that has ended."""
     log.warning("%s", why.message)
     os._exit(1)
+
+
+def _ready(result: dict | Ready, steps: int = 0) -> Ready:
+    answer = answers.answer(result, None)
+    return Ready(answer.body, answer.content_type, steps)
 
 
 class _Resolved:

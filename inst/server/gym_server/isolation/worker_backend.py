@@ -54,7 +54,6 @@ class WorkerBackend:
         self.fps: object = None
         self.moves = Moves()
         self.steps = 0
-        self._num_envs = config.num_envs
         self._about: dict = {}
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         hint = (
@@ -104,7 +103,7 @@ class WorkerBackend:
         if isinstance(action, Parts):
             action = _sendable(action)
         answer = self._move("step", action, tuple(form), mask)
-        self.steps += (self._num_envs or 1) if mask is None else int(mask.sum())
+        self.steps += answer.steps
         return answer
 
     # The form goes as a plain tuple: to pickle and to read a class takes 8 us longer.

@@ -21,10 +21,11 @@ import numpy as np
 
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import MalformedMessageError, Pipe
-from gym_server.protocol.answers import JSON, Answer, Ready, dumps
+from gym_server.protocol.answers import JSON, Ready, dumps
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
-# The number of the call, the kind of the result, and the length of its text.
+# The number of the call, the kind of the result, and the length of its text; of an answer, which
+# has none, how many steps were taken for it.
 _HEAD = struct.Struct("<QBI")
 
 _REFUSAL, _VALUE, _JSON, _TENSORS, _OBJECT, _COLUMN_TENSORS = range(6)
@@ -51,9 +52,9 @@ def read_call(raw: bytes) -> tuple[int, str, tuple]:
     return number, method, args
 
 
-def answer_message(number: int, answer: Answer) -> bytes:
+def answer_message(number: int, answer: Ready) -> bytes:
     """Return the message that carries an answer that is ready."""
-    return _HEAD.pack(number, _KINDS[answer.content_type], 0) + answer.body
+    return _HEAD.pack(number, _KINDS[answer.content_type], answer.steps) + answer.body
 
 
 def value_message(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
@@ -113,7 +114,7 @@ class CallPipe:
             timeout: how many seconds to wait; None for as long as it takes.
 
         Returns:
-            ``Ready`` for a method that returns an ``Answer``, else ``Result``.
+            ``Ready`` for a method that returns one, else ``Result``.
 
         Raises:
             GymServerError: what the process refused with; ``malformed_json``.
@@ -216,7 +217,7 @@ def _read_result(raw: bytes, trusted: bool) -> Ready | Result:
     if kind == _OBJECT and trusted:
         return Result(pickle.loads(memoryview(raw)[_HEAD.size :]), None)
     if kind in _CONTENT_TYPES:
-        return Ready(raw[_HEAD.size :], _CONTENT_TYPES[kind])
+        return Ready(raw[_HEAD.size :], _CONTENT_TYPES[kind], length)
     end = _HEAD.size + length
     if end > len(raw):
         raise MalformedMessageError("a text that is cut off")

@@ -102,10 +102,17 @@ class Content(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """A body from the process of an environment, to which only the request is to be added."""
+    """A body from the process of an environment, to which only the request is to be added.
+
+    Attributes:
+        body: the body.
+        content_type: its type.
+        steps: how many steps were taken for it, all sub-environments together.
+    """
 
     body: bytes
     content_type: str
+    steps: int = 0
 
 
 def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Content:

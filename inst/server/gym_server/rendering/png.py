@@ -27,7 +27,8 @@ def picture(frame: object) -> np.ndarray:
     if frame.dtype != np.uint8 or frame.ndim != 3 or frame.shape[2] not in _COLOUR_TYPES:
         raise ValueError(f"no picture: {frame.dtype} of shape {frame.shape}")
     # It may be drawn over before this one is sent.
-    return frame.copy()
+    copied: np.ndarray = frame.copy()
+    return copied
 
 
 def png(frame: np.ndarray) -> bytes:

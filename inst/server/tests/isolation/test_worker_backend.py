@@ -112,6 +112,15 @@ def test_an_isolated_environment_answers_as_any_other_does(servers, env_id, acti
         assert status == 200 and b'"request' in content
 
 
+def test_sub_environments_that_rest_take_no_steps(isolated):
+    how = {"num_envs": 2, "autoreset_mode": "SameStep", "kwargs": {"length": 2}}
+    url = isolated.create("faulty_envs:Counting-v0", **how)
+    isolated.post(f"{url}/reset/", {"seed": [[1], [1, 2]]})
+    for _ in range(6):
+        isolated.post(f"{url}/step/", {"action": [0, 0]})
+    assert isolated.get(url)[1]["steps"] == 2 + 4
+
+
 @pytest.mark.parametrize("depth", [100, 900])
 def test_no_depth_of_an_action_is_a_fault_of_the_servers(isolated, depth):
     url = isolated.create("CartPole-v1")

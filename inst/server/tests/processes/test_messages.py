@@ -16,7 +16,7 @@ from gym_server.processes.messages import (
     value_message,
 )
 from gym_server.processes.pipe import ConnectionPipe, MalformedMessageError, Pipe
-from gym_server.protocol.answers import JSON, Answer
+from gym_server.protocol.answers import JSON, Ready
 from gym_server.protocol.safetensors import TENSORS
 
 
@@ -35,10 +35,10 @@ def ends(request, monkeypatch):
 def test_calls_and_results_arrive_as_they_were(ends):
     pipe, other = ends
     frame = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    long = Answer(200, b"x" * 300_000, TENSORS)
+    answers = [Ready(b'{"a":1}', JSON), Ready(b"x" * 300_000, TENSORS, 7)]
     for message in (
-        answer_message(1, Answer(200, b'{"a":1}')),
-        answer_message(2, long),
+        answer_message(1, answers[0]),
+        answer_message(2, answers[1]),
         value_message(3, {"a": [1, "ä", None]}),
         value_message(4, None, frame),
     ):
@@ -49,7 +49,7 @@ def test_calls_and_results_arrive_as_they_were(ends):
         number, method, args = pickle.loads(other.receive())
         assert (method, args) == ("step", ([1], {"b": 2}))
         if number < 3:
-            assert answer == ((b'{"a":1}', JSON), (long.body, TENSORS))[number - 1]
+            assert answer == answers[number - 1]
     assert (answer.frame == frame).all()
 
 
