@@ -78,7 +78,7 @@ policy_probabilities.default <- function(policy, model, call) {
   )
   # Twice, from different streams, to see whether it draws.
   ask <- function(seed) {
-    as.integer(with_generator(new_generator(seed), act_batch(policy, asked, length(asked), here)))
+    as.vector(with_generator(new_generator(seed), act_batch(policy, asked, length(asked), here)))
   }
   actions <- rep(as.integer(model$action_space$start), length(states))
   actions[possible] <- ask(1)

@@ -71,7 +71,9 @@ print.gym_features <- function(x, ...) {
 basis_of <- function(features, space, call) {
   if (is.null(features)) {
     index <- table_index(space, "observations", call)
-    of <- function(observation, n) matrix(index$index(observation, n), n, 1L)
+    of <- function(observation, n) {
+      matrix(rows_of_table(index, space, observation, n, call), n, 1L)
+    }
     return(list(count = index$count, each = 1L, of = of, features = NULL))
   }
   if (is.function(features)) {
@@ -142,6 +144,10 @@ tiles_of <- function(features, space, call) {
   displaced <- t(outer(seq_len(tilings) - 1, 2 * seq_len(numbers) - 1) %% tilings / tilings)
   first <- per_tiling * (seq_len(tilings) - 1) + 1
   of <- function(observation, n) {
+    if (length(observation) != n * numbers) {
+      must <- paste0("of ", count_of(numbers, "number"), " each, as in ", format(space))
+      abort_argument(observation, must, "observation", call)
+    }
     # In tiles from the lower bound, within the range; a column for each observation.
     place <- (t(matrix(observation, n)) - low) / width
     place <- pmin(pmax(place, 0), last)
@@ -188,8 +194,8 @@ act_batch.gym_policy_features <- function(policy, observation, n, vector_env) {
 
 #' @export
 act.gym_policy_features <- function(policy, observation, ...) {
-  rows <- observation_rows(observation, policy$observation_space)
-  act_batch(policy, rows$values, nrow(rows$values), NULL)
+  observed <- observed_batch(observation, policy$observation_space)
+  act_batch(policy, observed$batch, observed$n, NULL)
 }
 
 #' @export

@@ -39,13 +39,12 @@ predict_values <- function(policy, newdata, type) {
   if (type == "action") {
     return(act(policy, newdata))
   }
-  rows <- observation_rows(newdata, policy$observation_space %||% space_discrete(nrow(policy$q)))
-  n <- nrow(rows$values)
   if (inherits(policy, "gym_policy_table")) {
-    table_rows(policy, if (ncol(rows$values) > 1L) rows$values else rows$values[, 1L], n)
-  } else {
-    linear_values(policy$basis, policy$weights, policy$basis$of(rows$values, n))
+    observed <- observed_batch(newdata, states_of(policy))
+    return(table_rows(policy, observed$batch, observed$n))
   }
+  observed <- observed_batch(newdata, policy$observation_space)
+  linear_values(policy$basis, policy$weights, policy$basis$of(observed$batch, observed$n))
 }
 
 # The observations in a data frame: the columns with their names, or all columns where it has none

@@ -58,18 +58,19 @@ act.gym_policy_random <- function(policy, observation, ...) {
       value = policy
     )
   }
-  # An observation matters only in that each one needs an action. How many there are is known only
-  # where they are numbers; observations that are lists, of an environment with several parts, are
-  # given one at a time.
-  seen_in <- policy$observation_space
-  observed <- if (!is.list(observation) && (is.null(seen_in) || is_stackable(seen_in))) {
-    observation_rows(observation, seen_in)
+  n <- count_observed(observation, policy$observation_space)
+  if (is.null(n)) space_sample(space) else sample_batch(space, n)
+}
+
+# An observation matters to it only in that each one needs an action. How many there are is known
+# only where they are numbers or the rows of a data frame; observations that are lists, of an
+# environment with several parts, are given one at a time. `NULL` stands for a single one.
+count_observed <- function(observation, space) {
+  if (!is.null(space) && !is_stackable(space) || is.list(observation)) {
+    return(if (is.data.frame(observation)) nrow(observation))
   }
-  if (is.null(observed) || observed$one) {
-    space_sample(space)
-  } else {
-    sample_batch(space, nrow(observed$values))
-  }
+  rows <- observation_rows(observation, space)
+  if (!rows$one) nrow(rows$values)
 }
 
 #' @exportS3Method

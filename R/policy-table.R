@@ -44,15 +44,12 @@ policy_table <- function(q, epsilon = 0, temperature = NULL) {
 
 #' @export
 act.gym_policy_table <- function(policy, observation, ...) {
-  space <- policy$observation_space %||% space_discrete(nrow(policy$q))
-  if (!is_stackable(space)) {
-    batch <- batch_of(space, list(observation))
-    return(act_batch(policy, batch, 1L, NULL))
-  }
-  rows <- observation_rows(observation, space)
-  values <- if (length(space$shape)) rows$values else rows$values[, 1L]
-  act_batch(policy, values, nrow(rows$values), NULL)
+  observed <- observed_batch(observation, states_of(policy))
+  act_batch(policy, observed$batch, observed$n, NULL)
 }
+
+# What a table has rows for.
+states_of <- function(policy) policy$observation_space %||% space_discrete(nrow(policy$q))
 
 #' @exportS3Method
 act_batch.gym_policy_table <- function(policy, observation, n, vector_env) {
@@ -63,16 +60,8 @@ act_batch.gym_policy_table <- function(policy, observation, n, vector_env) {
 
 # The rows of the table for some observations.
 table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
-  index <- space_index(policy$observation_space %||% space_discrete(nrow(policy$q)))
-  number <- index$index(observation, n)
-  beyond <- is.na(number) | number < 1L | number > nrow(policy$q)
-  if (any(beyond)) {
-    gym_abort(
-      paste0("The policy's table has no row for the observation ",
-             describe_value(observation[beyond][[1L]]), "."),
-      class = "gym_error_argument", argument = "observation", value = observation, call = call
-    )
-  }
+  space <- states_of(policy)
+  number <- rows_of_table(space_index(space), space, observation, n, call)
   rows <- policy$q[number, , drop = FALSE]
   if (any(rows[, 1L] == -Inf) && any(row_max(rows) == -Inf)) {
     gym_abort(

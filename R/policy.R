@@ -34,8 +34,8 @@
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
 #' @param observation What is observed. For the usual environments a numeric
-#'   vector is one observation, and a numeric matrix has one observation in each
-#'   row. Where observations are arrays themselves, many of them have one
+#'   vector is one observation, and a numeric matrix, or a data frame, has one observation in
+#'   each row. Where observations are arrays themselves, many of them have one
 #'   dimension more, the first; where they are single whole numbers, many of them
 #'   are an integer vector. A function knows of no space: to it a vector is always
 #'   passed as a matrix of one row.
@@ -77,6 +77,9 @@ act.default <- function(policy, observation, ...) {
 
 #' @export
 act.function <- function(policy, observation, ...) {
+  if (is.data.frame(observation)) {
+    observation <- as.matrix(observation)
+  }
   if (!is.atomic(observation) || !is.null(dim(observation))) {
     return(policy(observation))
   }
@@ -249,11 +252,12 @@ act_batch.default <- function(policy, observation, n, vector_env) {
 #'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation
 #'   rather than a batch.
 #' @noRd
-observation_rows <- function(observation, space) {
-  observation <- narrow_values(observation, function(x) plain_numbers(x, "observation"))
-  axes <- dim(observation)
+observation_rows <- function(observation, space, call = rlang::caller_env()) {
+  observation <- narrow_values(observation, function(x) plain_numbers(x, "observation", call))
   # How many dimensions an observation has: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
+  check_rows(observation, rank, space, call)
+  axes <- dim(observation)
   if (is.null(axes) && rank == 1L) {
     return(list(values = matrix(observation, nrow = 1L), one = TRUE))
   }
@@ -267,5 +271,34 @@ observation_rows <- function(observation, space) {
     list(values = matrix(observation, ncol = 1L), one = FALSE)
   } else {
     list(values = t(matrix(row_major(observation), ncol = axes[[1L]])), one = FALSE)
+  }
+}
+
+check_rows <- function(observation, rank, space, call) {
+  if (is.null(observation)) {
+    abort_argument(observation, "an observation", "observation", call)
+  }
+  if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
+    must <- paste("one value of", format(space), "in each row instead of several")
+    abort_argument(observation, must, "observation", call)
+  }
+}
+
+#' Put one or many observations into a batch
+#'
+#' @param space The observation space. Where it has parts there is one observation, or a data frame
+#'   with a column for each part.
+#' @return A list: `batch`, whose arrays are rows of numbers as [observation_rows()] has them, and
+#'   `n`, how many observations there are.
+#' @noRd
+observed_batch <- function(observation, space, call = rlang::caller_env()) {
+  if (is_stackable(space)) {
+    rows <- observation_rows(observation, space, call)$values
+    list(batch = if (length(space$shape)) rows else rows[, 1L], n = nrow(rows))
+  } else if (is.data.frame(observation)) {
+    list(batch = in_order(space, as.list(observation)), n = nrow(observation))
+  } else {
+    check_value(space, observation, "", call)
+    list(batch = batch_of(space, list(in_order(space, observation))), n = 1L)
   }
 }

@@ -4,7 +4,8 @@
 #' How many values a space has, and where each stands
 #'
 #' @return A list: `count`, a number, and `index`, a function of a batch of values and how many they
-#'   are that returns their numbers, from 1. `NULL` where the values cannot be counted.
+#'   are that returns their numbers, from 1, and `NA` for what is no value of the space. `NULL`
+#'   where the values cannot be counted.
 #' @noRd
 space_index <- function(space) UseMethod("space_index")
 
@@ -14,7 +15,18 @@ space_index.default <- function(space) NULL
 #' @exportS3Method
 space_index.gym_space_discrete <- function(space) {
   start <- space$start
-  list(count = as.double(space$n), index = function(batch, n) as.integer(batch - start + 1))
+  count <- as.double(space$n)
+  list(count = count, index = function(batch, n) as.integer(beyond_start(batch, start, count)) + 1L)
+}
+
+# How far whole numbers are beyond the first of `n`; NA for what is none of these.
+beyond_start <- function(x, start, n) {
+  if (!is.numeric(x) && !is.logical(x)) {
+    return(rep(NA, length(x)))
+  }
+  beyond <- x - start
+  beyond[is.na(beyond) | beyond < 0 | beyond >= n | beyond != trunc(beyond)] <- NA
+  beyond
 }
 
 #' @exportS3Method
@@ -33,10 +45,14 @@ digits_index <- function(nvec, start, rank) {
   list(
     count = prod(nvec),
     index = function(batch, n) {
+      if (length(batch) != n * length(nvec)) {
+        return(rep(NA_integer_, n))
+      }
       # Row by row, as `nvec` is.
       if (rank > 1L) batch <- aperm(batch, c(1L, rev(seq_len(rank)) + 1L))
-      digits <- matrix(batch, n) - rep(start, each = if (length(start) > 1L) n else 1L)
-      as.integer(drop(digits %*% weights) + 1)
+      first <- rep(start, each = if (length(start) > 1L) n else 1L)
+      digits <- beyond_start(as.vector(batch), first, rep(nvec, each = n))
+      as.integer(matrix(digits, n) %*% weights + 1)
     }
   )
 }
@@ -57,10 +73,31 @@ parts_index <- function(space) {
   list(
     count = prod(counts),
     index = function(batch, n) {
+      if (!is.list(batch) || length(batch) != length(parts)) {
+        return(rep(NA_integer_, n))
+      }
       each <- Map(function(part, values) part$index(values, n) - 1, parts, batch)
       as.integer(Reduce(`+`, Map(`*`, each, weights)) + 1)
     }
   )
+}
+
+#' The rows of a table that belong to observations
+#' @param index The index of their space.
+#' @param n How many observations there are.
+#' @return Their numbers, from 1; what is no value of the space is refused.
+#' @noRd
+rows_of_table <- function(index, space, observation, n, call) {
+  row <- index$index(observation, n)
+  if (anyNA(row)) {
+    wrong <- batch_value(space, observation, which(is.na(row))[[1L]])
+    gym_abort(
+      c(paste0("The table has no row for the observation ", describe_value(wrong), "."),
+        i = paste0("It has one for each value of ", format(space), ".")),
+      class = "gym_error_argument", argument = "observation", value = observation, call = call
+    )
+  }
+  row
 }
 
 # The numbers of a Discrete's values, in order.

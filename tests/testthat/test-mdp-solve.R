@@ -130,6 +130,9 @@ test_that("a policy is evaluated exactly, several together", {
   explores <- evaluate_policy(walk_model(), policy_table(q, epsilon = 1))
   expect_equal(explores$mean_return, 1 / 3)
   expect_error(evaluate_policy(walk_model(), list()), class = "gym_error_argument")
+  half <- function(observation) observation / 2
+  expect_error(evaluate_policy(walk_model(), half), "number of an action for each",
+               class = "gym_error_argument")
 })
 
 # The best values, the same by both methods and by the policy itself.

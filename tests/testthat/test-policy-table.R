@@ -58,3 +58,52 @@ test_that("tables that do not fit are refused", {
   box <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
   refused(rollout(box, policy_table(diag(2))), "observations that can be counted")
 })
+
+test_that("what is no state of the table is refused in words, wherever it stands", {
+  refused <- function(policy, observation, named) {
+    for (ask in list(act, function(...) predict(..., type = "output"))) {
+      cnd <- expect_error(ask(policy, observation), class = "gym_error_argument")
+      expect_match(conditionMessage(cnd), paste("no row for the observation", named), fixed = TRUE)
+    }
+  }
+  states <- policy_table(diag(4))
+  refused(states, 1.5, "1.5")
+  refused(states, c(1, -0.5), "-0.5")
+  refused(states, c(0, NA), "NA")
+  refused(states, "1", "\"1\"")
+  expect_error(act(states, NULL), "an observation, not NULL", class = "gym_error_argument")
+  cnd <- expect_error(act(states, 1.5))
+  expect_match(conditionMessage(cnd), "one for each value of <Discrete 4>", fixed = TRUE)
+  expect_error(act(states, cbind(0:1, 0:1)), "several", class = "gym_error_argument")
+
+  pairs <- list(observation_space = space_multi_discrete(c(2, 2)),
+                action_space = space_discrete(4), spec = list(id = "Pairs"))
+  numbers <- policy_bind(states, pairs)
+  refused(numbers, c(1, 0.5), "c(1, 0.5)")
+  refused(numbers, rbind(c(0, 1), c(0, 2)), "c(0, 2)")
+  refused(numbers, c(0, 1, 1), "c(0, 1, 1)")
+  for (space in list(space_tuple(space_discrete(2), space_discrete(2)),
+                     space_dict(a = space_discrete(2), b = space_discrete(2)))) {
+    pairs$observation_space <- space
+    parts <- policy_bind(states, pairs)
+    keys <- names(space$spaces)
+    refused(parts, stats::setNames(list(0, 2), keys), "list(")
+    refused(parts, stats::setNames(data.frame(c(0, 0.5), c(1, 1)), keys %||% 1:2), "list(")
+    for (bad in list(stats::setNames(list(1, 0.5), keys), 3)) {
+      expect_error(act(parts, bad), class = "gym_error_space")
+    }
+    expect_identical(act(parts, stats::setNames(data.frame(0:1, 1:0), keys %||% 1:2)), 1:2)
+  }
+})
+
+test_that("a learner is not taught by an observation that is no state", {
+  half <- list(
+    observation_space = space_discrete(3), action_space = space_discrete(2),
+    spec = list(id = "Half"), reset = function(seed = NULL) 1,
+    step = function(action) {
+      list(observation = 1.5, reward = 1, terminated = FALSE, truncated = TRUE)
+    }
+  )
+  cnd <- expect_error(learn_q(half, iterations = 2, seed = 1), class = "gym_error_argument")
+  expect_match(conditionMessage(cnd$parent), "no row for the observation 1.5", fixed = TRUE)
+})

@@ -44,3 +44,41 @@ test_that("a function sees the names of a single observation, too", {
   expect_identical(act(follow, c(position = 1, angle = 2)), 1L)
   expect_identical(seen, cbind(position = 1, angle = 2))
 })
+
+test_that("a data frame of observations is as good as the matrix of them, to every policy", {
+  seeing <- function(space, actions = 2L) {
+    fake_environment(observation_space = space, action_space = discrete_space(actions))
+  }
+  box <- seeing(box_space(c(-1, -1), c(1, 1)))
+  basis <- basis_of(tile_coding(2, 2), box$observation_space, NULL)
+  policies <- list(
+    policy_random(discrete_space(2L)), policy_bind(policy_random(), box),
+    policy_network(c(2, 3, 2)), policy_bind(policy_linear(), box),
+    new_feature_policy(basis, matrix(runif(2 * basis$count), ncol = 2), box),
+    function(observation) as.integer(observation[, "b"] > 0),
+    policy_bind(policy_table(diag(4)), seeing(space_multi_discrete(c(2, 2)), 4L))
+  )
+  for (policy in policies) {
+    rows <- cbind(a = c(0, 1, 1), b = c(1, 0, 1))
+    answer <- function(observation) {
+      set.seed(1)
+      act(policy, observation)
+    }
+    expect_length(answer(rows), 3L)
+    expect_identical(answer(as.data.frame(rows)), answer(rows))
+    expect_identical(answer(as.data.frame(rows)[2, ]), answer(rows[2, , drop = FALSE]))
+  }
+  table <- policy_table(diag(4))
+  expect_identical(act(table, data.frame(state = 3:1)), 3:1)
+  # Of observations with parts, each column is a part.
+  parts <- policy_bind(policy_random(), seeing(space_tuple(space_discrete(2), space_discrete(3))))
+  expect_length(act(parts, data.frame(0:1, c(0, 0))), 2L)
+  expect_length(act(parts, list(0, 0)), 1L)
+})
+
+test_that("observations of another length than the environment's have no features", {
+  env <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
+  basis <- basis_of(tile_coding(2, 2), env$observation_space, NULL)
+  policy <- new_feature_policy(basis, matrix(0, basis$count, 2), env)
+  expect_error(act(policy, c(0, 0, 0, 0)), "2 numbers", class = "gym_error_argument")
+})
