@@ -165,7 +165,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     open_checkpoint(checkpoint, search_arguments(env, settings), resume)
   }
   if (isTRUE(file$saved$finished)) {
-    client <- if (is_playable(env)) env$client else if (!is_registered(env)) client
+    client <- if (is_made_by_server(env)) client else if (is_playable(env)) env$client
     return(finished_search(file$saved, settings, client, file$path))
   }
   settings$seed <- file$saved$seed %||% seed %||% draw_seed()

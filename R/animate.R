@@ -78,10 +78,10 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
   check_animation(file, fps, width, every)
-  played <- rlang::exec(
-    rollout, x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client,
-    frames = TRUE, !!!x$kwargs
-  )
+  played <- rlang::inject(rollout(
+    x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
+    !!!x$kwargs
+  ))
   new_animation(episode_frames(played), file, fps, width, every)
 }
 

@@ -18,7 +18,7 @@ environment_recipe <- function(env, vector_env, arguments) {
   if (!is.null(vector_env$frame)) {
     return("frames are kept")
   }
-  own <- setdiff(names(arguments), c("num_envs", "num_workers", "frames", "client"))
+  own <- setdiff(names(arguments), c("num_envs", "num_workers", "frames"))
   recipe <- list(env = env, arguments = arguments[own], num_workers = arguments$num_workers)
   if (is_registered(env)) {
     id <- if (is.character(env)) env else env$env_id

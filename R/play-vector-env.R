@@ -7,14 +7,18 @@
 #' @param use A function of the vector environment.
 #' @param max_steps As given by the user, who is told when the environment's own limit is smaller.
 #' @param ... Further arguments of [as_vector_env()].
+#' @param client As given by the user. Its default starts a server, so it is only passed on: a
+#'   method for an environment that needs no server never evaluates it.
 #' @param seed What a random map is drawn from, see [with_random_map()].
 #' @noRd
-with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., seed = NULL,
-                            call = rlang::caller_env()) {
+with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = gym_client(),
+                            seed = NULL, call = rlang::caller_env()) {
   # Errors from making the environment name the user's call, too.
   rlang::local_error_call(call)
   arguments <- with_random_map(env, list(...), seed)
-  vector_env <- rlang::exec(as_vector_env, env, !!!arguments, max_envs = episodes)
+  vector_env <- rlang::inject(
+    as_vector_env(env, !!!arguments, client = client, max_envs = episodes)
+  )
   finished <- FALSE
   on.exit(vector_env$close(wait = finished))
   vector_env$call <- call

@@ -153,11 +153,12 @@ least_sub_envs <- 100
 # However few episodes an evaluation has, candidates are played side by side.
 with_training_env <- function(settings, use, max_steps, client, call) {
   episodes <- iteration_candidates(settings$agent) * settings$episodes
-  rlang::exec(
-    with_vector_env, settings$env, max(settings$eval_episodes, episodes, least_sub_envs), use,
-    max_steps, !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
+  # Unlike exec(), inject() leaves `client` unevaluated.
+  rlang::inject(with_vector_env(
+    settings$env, max(settings$eval_episodes, episodes, least_sub_envs), use, max_steps,
+    !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
     client = client, call = call
-  )
+  ))
 }
 
 # How many candidates an agent asks for in an iteration, where it is one of ours; else 0.

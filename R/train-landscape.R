@@ -78,7 +78,7 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   directions <- with_generator(streams$agent, draw_directions(search$policy$weights))
   plane <- new_plane(search$policy, directions, size, span)
   env <- search$env %||% search$env_id
-  if (!is_playable(env) && !is_registered(env)) {
+  if (is_made_by_server(env)) {
     env <- make_seeded_sub_envs(env, as.numeric(size)^2 * episodes, client)
     on.exit(close_or_warn(env))
   }
