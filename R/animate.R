@@ -56,7 +56,7 @@ animate.default <- function(x, file = NULL, fps = NULL, ...) {
 animate.gym_rollout <- function(x, file = NULL, fps = NULL, ..., episode = 1, width = NULL,
                                 every = NULL, candidate = 1) {
   check_dots_empty(...)
-  check_animation(file, fps, width, every)
+  file <- check_animation(file, fps, width, every)
   new_animation(episode_frames(x, episode, candidate), file, fps, width, every)
 }
 
@@ -77,7 +77,7 @@ animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, wid
 animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
-  check_animation(file, fps, width, every)
+  file <- check_animation(file, fps, width, every)
   played <- rlang::inject(rollout(
     x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
     !!!x$kwargs
@@ -90,7 +90,7 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
 animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL, max_steps = NULL,
                                width = NULL, every = NULL, client = gym_client()) {
   check_dots_empty(...)
-  check_animation(file, fps, width, every)
+  file <- check_animation(file, fps, width, every)
   played <- rollout(
     env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE
   )
@@ -122,7 +122,8 @@ register_animate <- function(home) {
   registerS3method("animate", "gym_policy", animate.gym_policy, envir = home)
 }
 
-# Everything that can be wrong is checked before an episode is played.
+# Everything that can be wrong is checked before an episode is played. Returns the file's absolute
+# path.
 check_animation <- function(file, fps, width, every, call = rlang::caller_env()) {
   check_number(fps, min = 0.1, allow_null = TRUE, call = call)
   check_count(width, max = 65535, allow_null = TRUE, call = call)
@@ -136,6 +137,7 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
     }
   }
   check_suggested("magick", "write an animation", call)
+  if (!is.null(file)) absolute_path(file)
 }
 
 #' Take the frames of an episode out of a rollout

@@ -10,16 +10,6 @@ install_root <- function() cache_of("gym")
 
 cache_of <- function(package) absolute_path(tools::R_user_dir(package, "cache"))
 
-# Tools are run in another working directory and do not expand "~". normalizePath() would return
-# another path after the folder was made, if a folder above it is a link.
-absolute_path <- function(path) {
-  path <- path.expand(path)
-  if (is_windows()) {
-    path <- chartr("\\", "/", path)
-  }
-  if (grepl("^(/|[A-Za-z]:/)", path)) path else file.path(getwd(), path)
-}
-
 install_folders <- function() {
   folders <- list.files(install_root(), "^[0-9a-f]{12}-[0-9]+$", full.names = TRUE)
   folders[order(folder_number(folders), decreasing = TRUE)]

@@ -17,7 +17,9 @@ find_uv <- function(call = rlang::caller_env(), within = NULL) {
     timeout <- if (is.null(within)) 30 else within / max(1L, length(candidates))
     return(Find(function(uv) uv_works(uv, timeout), candidates))
   }
-  if (!uv_works(path.expand(named), within %||% 30)) {
+  uv <- path.expand(named)
+  if (file.exists(uv)) uv <- absolute_path(uv)
+  if (!uv_works(uv, within %||% 30)) {
     abort_install(
       c(
         paste0("The variable GYM_UV names ", named, ", which is no uv that can be used."),
@@ -27,7 +29,7 @@ find_uv <- function(call = rlang::caller_env(), within = NULL) {
       call = call
     )
   }
-  path.expand(named)
+  uv
 }
 
 uv_candidates <- function() {
@@ -35,7 +37,7 @@ uv_candidates <- function() {
   home <- if (is_windows()) Sys.getenv("USERPROFILE") else path.expand("~")
   places <- c(
     # For reticulate "managed" stands for its own uv.
-    if (reticulate != "managed") path.expand(reticulate),
+    if (nzchar(reticulate) && reticulate != "managed") absolute_path(reticulate),
     unname(Sys.which("uv")),
     file.path(home, ".local", "bin", uv_name()),
     file.path(cache_of("reticulate"), "uv", "bin", uv_name()),

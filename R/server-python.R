@@ -93,5 +93,3 @@ lacks_developer_tools <- function() {
   Sys.info()[["sysname"]] == "Darwin" &&
     !identical(run_quietly("/usr/bin/xcode-select", "-p", timeout = 5)$status, 0L)
 }
-
-is_windows <- function() .Platform$OS.type == "windows"

@@ -132,6 +132,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
   in_env <- function(use, max_steps = NULL) {
     with_training_env(settings, use, max_steps, client, call)
   }
+  log <- if (!is.null(log)) absolute_path(log)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
   if (is.null(seeds)) {
     file <- training_file(settings, files, call)

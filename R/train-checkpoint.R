@@ -12,8 +12,8 @@
 #' @noRd
 open_checkpoint <- function(path, arguments, resume, what = "search",
                             call = rlang::caller_env()) {
-  # The working directory may have changed when the next batch has ended.
-  path <- normalizePath(path, mustWork = FALSE)
+  # The file that a link leads to is replaced, not the link.
+  path <- normalizePath(absolute_path(path), mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
     problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
     abort_checkpoint(path, problem, call = call)

@@ -31,7 +31,6 @@ training_log <- function(folder, settings, iteration, call) {
   if (is.null(folder)) {
     return(function(state) NULL)
   }
-  folder <- normalizePath(folder, mustWork = FALSE)
   table <- file.path(folder, "progress.csv")
   tryCatch(
     {

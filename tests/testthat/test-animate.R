@@ -16,6 +16,26 @@ test_that("the file has a picture for each frame, at the environment's own pace"
   expect_identical(drawn(read[11]), drawn(frame))
 })
 
+test_that("a relative file lies in the folder at the start, and is found from any other", {
+  skip_if_not_installed("magick")
+  other <- withr::local_tempdir()
+  withr::local_dir(withr::local_tempdir())
+  file <- file.path(getwd(), "here.gif")
+  env <- gym_env(
+    reset = function(self) 0,
+    step = function(self, action) list(observation = 0, reward = 0, terminated = TRUE),
+    render = function(self) array(255L, c(8, 8, 3)),
+    observation_space = space_discrete(1), action_space = space_discrete(2)
+  )
+  moving <- function(observation) {
+    setwd(other)
+    0
+  }
+  animation <- animate(moving, "here.gif", env = env)
+  expect_identical(animation$file, file)
+  expect_true(file.exists(file))
+})
+
 test_that("width, every and fps do what they say, and a file that is there is replaced", {
   skip_if_not_installed("magick")
   played <- short_rollout()

@@ -79,6 +79,18 @@ test_that("gym_sitrep() soon reports a uv that does not answer", {
   expect_equal(asked, 3)
 })
 
+test_that("a relative path of uv is that of this folder, wherever uv is run", {
+  skip_on_os("windows")
+  local_cache()
+  withr::local_dir(withr::local_tempdir())
+  fake_uv("here")
+  wanted <- file.path(getwd(), "here", "uv")
+  withr::local_envvar(GYM_UV = "here/uv")
+  expect_identical(find_uv(), wanted)
+  withr::local_envvar(GYM_UV = NA, RETICULATE_UV = "here/uv")
+  expect_identical(find_uv(), wanted)
+})
+
 test_that("GYM_UV must name a uv that runs", {
   local_cache()
   withr::local_envvar(GYM_UV = "/no/such/uv")

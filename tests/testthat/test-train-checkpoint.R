@@ -237,15 +237,18 @@ test_that("the file stays small: of the policies those are kept that are needed"
 
 test_that("a relative path is that of the folder at the start", {
   folder <- normalizePath(withr::local_tempdir())
+  other <- withr::local_tempdir()
   withr::local_dir(folder)
   env <- fake_environment()
   reset <- env$reset
   env$reset <- function(...) {
-    setwd(tempdir())
+    setwd(other)
     reset(...)
   }
   quiet_search(env, rounds = 2, checkpoint = "here.rds")
   expect_identical(list.files(folder), "here.rds")
+  expect_true(read_checkpoint(file.path(folder, "here.rds"))$finished)
+  expect_identical(list.files(other), character())
 })
 
 test_that("a server that plays other episodes than the one before is an error", {

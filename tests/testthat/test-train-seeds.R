@@ -66,6 +66,25 @@ test_that("each seed has its own checkpoint and log, and all go on from there", 
   expect_length(idle$seeds, 6 * 4 + 2 * 4 + 4)
 })
 
+test_that("relative files of all seeds lie in the folder at the start, whatever a callback does", {
+  folder <- withr::local_tempdir()
+  other <- withr::local_tempdir()
+  withr::local_dir(folder)
+  callback <- function(training) {
+    setwd(other)
+    TRUE
+  }
+  trained <- quiet_trainings(checkpoint = "kept.rds", log = "log", callback = callback)
+  expect_identical(list.files(other), character())
+  setwd(folder)
+  expect_setequal(list.files(), c("log", paste0("kept-", 1:3, ".rds")))
+  for (seed in 1:3) {
+    log <- utils::read.csv(file.path("log", paste0("seed-", seed), "progress.csv"))
+    expect_length(log[[1L]], nrow(trained$trainings[[seed]]$history))
+    expect_true(read_checkpoint(file.path(folder, paste0("kept-", seed, ".rds")))$finished)
+  }
+})
+
 test_that("an interrupt and an error keep the trainings before them, and the one that they met", {
   stopping <- function(stop_it) {
     env <- fake_environment(reward = first_action)
