@@ -18,6 +18,7 @@ from gym_server.envs.extras import extra_of, is_available, missing_extra, unmet_
 from gym_server.envs.memory_estimate import environment_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import LONGEST_ID, importing, look_up, near
+from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.json_values import brief, parse_nonfinite
 
@@ -222,7 +223,8 @@ def make_from_spec(
     ours: dict[str, Any] = {"disable_env_checker": True}
     if render_mode is not None:
         ours["render_mode"] = render_mode
-    return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **kwargs}), kwargs)
+    given = with_tuples(load_creator(spec), kwargs)
+    return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
 
 
 def make_vector_entry_point(

@@ -16,6 +16,7 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import module_of
+from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
@@ -196,7 +197,7 @@ def _make_entry_point(request: _Request) -> VectorEnv:
     try:
         render_mode = make.choose_render_mode(creator, request.spec, request.config.render_mode)
         env = make.make_vector_entry_point(
-            request.spec, request.num_envs, render_mode, request.kwargs
+            request.spec, request.num_envs, render_mode, with_tuples(creator, request.kwargs)
         )
     except GymServerError as refusal:
         if refusal.code in ("invalid_parameter", "invalid_kwargs"):

@@ -1,0 +1,58 @@
+"""Arguments that an environment's constructor wants as tuples: JSON has lists only.
+
+Most constructors take any sequence, but some ask whether it is a tuple, such as Atari's for its
+``frameskip``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import types
+import typing
+from collections.abc import Callable
+
+
+def with_tuples(creator: Callable, kwargs: dict) -> dict:
+    """Return the arguments with tuples in place of lists where the constructor asks for tuples.
+
+    It does where the default is a tuple, or where the annotation names tuples and no other type
+    that a list belongs to.
+
+    Args:
+        creator: the class or function that makes the environment.
+        kwargs: its arguments.
+    """
+    if not any(isinstance(value, list) for value in kwargs.values()):
+        return kwargs
+    parameters = _parameters(creator)
+    return {
+        name: _as_tuple(value) if name in parameters and _wants(parameters[name]) else value
+        for name, value in kwargs.items()
+    }
+
+
+def _parameters(creator: Callable) -> typing.Mapping[str, inspect.Parameter]:
+    # An annotation may be a text that names what is imported for type checkers only, or anything
+    # else.
+    for eval_str in (True, False):
+        try:
+            return inspect.signature(creator, eval_str=eval_str).parameters
+        except Exception:
+            continue
+    return {}
+
+
+def _wants(parameter: inspect.Parameter) -> bool:
+    kinds = {typing.get_origin(one) or one for one in _members(parameter.annotation)}
+    takes_lists = any(isinstance(kind, type) and issubclass(list, kind) for kind in kinds)
+    return isinstance(parameter.default, tuple) or (tuple in kinds and not takes_lists)
+
+
+def _members(annotation: object) -> tuple:
+    """Return the members of a union, or the annotation itself."""
+    is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    return typing.get_args(annotation) if is_union else (annotation,)
+
+
+def _as_tuple(value: object) -> object:
+    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
