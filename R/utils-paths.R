@@ -1,8 +1,8 @@
 # Paths that are used later than they are given: the working directory may be another one by then,
 # and tools are run in one of their own and do not expand "~".
 
-# normalizePath() leaves the path of a file that does not exist yet as it is, and returns another one
-# after it was made, if a folder above it is a link.
+# normalizePath() leaves the path of a file that does not exist yet as it is, and returns another
+# one after it was made, if a folder above it is a link.
 absolute_path <- function(path) {
   path <- path.expand(path)
   if (is_windows()) {

@@ -12,6 +12,7 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import ask
+from gym_server.envs.outcomes import checked_info
 from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import time_limit
 from gym_server.errors import GymServerError, reset_needed
@@ -86,6 +87,8 @@ class LocalBackend:
         seed_to_use = self._seed_for_reset if seed is None else seed
         self._was_reset = False
         observation, info = ask(self._move, self._reset_env, seed_to_use, options, mask, form.infos)
+        if form.infos:
+            checked_info(info)
         self._seed_for_reset = None
         self._seed_bytes = _held_by(seed)
         if seed is not None and mask is None:
@@ -96,7 +99,7 @@ class LocalBackend:
         self._observation = observation
         return {
             "observation": ask(env.encode, observation, form),
-            "info": ask(plain, info) if info and form.infos else {},
+            "info": ask(plain, info) if form.infos else {},
         }
 
     def _reset_env(

@@ -12,6 +12,7 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.outcomes import checked_info, reward_number
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
@@ -81,7 +82,7 @@ class SingleEnvironment:
         """Return reward, terminated, truncated and done; remember the last."""
         terminated, truncated = bool(terminated), bool(truncated)
         self.has_ended = done = terminated or truncated
-        return float(reward), terminated, truncated, done
+        return reward_number(reward), terminated, truncated, done
 
     def count(self, which: np.ndarray | None, reward: float, done: bool) -> int:
         """Count a step, and return 1."""
@@ -106,7 +107,7 @@ class SingleEnvironment:
             "terminated": terminated,
             "truncated": truncated,
             # Converted while the environment cannot change it.
-            "info": plain(info) if info and form.infos else {},
+            "info": plain(checked_info(info)) if form.infos else {},
         }
 
     def encode(self, observation: Any, form: AnswerForm) -> object:

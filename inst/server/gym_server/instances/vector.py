@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.outcomes import checked_info
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
@@ -168,7 +169,8 @@ class VectorEnvironment:
         """Return rewards, terminated, truncated and done as arrays."""
         terminated = np.asarray(terminated, dtype=bool)
         truncated = np.asarray(truncated, dtype=bool)
-        return _reward(reward), terminated, truncated, terminated | truncated
+        reward = _reward(reward).reshape(terminated.shape)
+        return reward, terminated, truncated, terminated | truncated
 
     def count(self, which: np.ndarray | None, reward: np.ndarray, done: np.ndarray) -> int:
         """Count a step of those that took part in it; return how many they are."""
@@ -196,7 +198,7 @@ class VectorEnvironment:
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
-            "info": plain(info) if info and form.infos else {},
+            "info": plain(checked_info(info)) if form.infos else {},
             **final,
         }
         if isinstance(answer["observation"], spaces.Parts):

@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium
 
+from gym_server.envs.outcomes import reward_number
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.monitoring.monitor_files import MonitorFiles, refuse
@@ -113,7 +114,7 @@ class Monitor:
             result = self._env.step(action)
         if self._episode is not None:
             _, reward, terminated, truncated, _ = result
-            self._return += float(reward)
+            self._return += reward_number(reward)
             self._length += 1
             if terminated or truncated:
                 self._finish_episode()

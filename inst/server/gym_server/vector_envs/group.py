@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import concatenate, create_empty_array
 
 from gym_server.envs.drawing_on_demand import allow_drawing, save_drawing
+from gym_server.envs.outcomes import checked_info, reward_number
 from gym_server.errors import GymServerError, environment_error
 from gym_server.spaces.stacking import ARRAYS
 from gym_server.vector_envs.sub_env import SubEnv
@@ -132,7 +133,7 @@ class Group:
         for index, seed, seeds_later in zip(which, seeds, later, strict=True):
             with self._naming(index):
                 self._last[index], info = self.envs[index].reset(seed=seed, options=options)
-            infos.append(Info(info))
+            infos.append(Info(checked_info(info)))
             self._ended[index] = self._rests[index] = False
             self._seeds[index] = None if seeds_later is None else list(reversed(seeds_later))
         return stack_observations(self._observation_space, self._last), infos
@@ -170,9 +171,9 @@ class Group:
                     ended[index] = False
                     last[index], info = self._begin_next(index)
                 else:
-                    last[index], reward[row], terminated[row], truncated[row], info = steps[index](
-                        action
-                    )
+                    last[index], earned, over, cut, info = steps[index](action)
+                    reward[row] = reward_number(earned)
+                    terminated[row], truncated[row] = bool(over), bool(cut)
                     if terminated[row] or truncated[row]:
                         if self._mode is AutoresetMode.DISABLED:
                             pass
@@ -186,7 +187,8 @@ class Group:
                             final_info = _copied(info) if with_infos else None
                             last[index], info = self._begin_next(index)
                 if with_infos:
-                    infos.append(Info(info, final_info))
+                    final_info = None if final_info is None else checked_info(final_info)
+                    infos.append(Info(checked_info(info), final_info))
         except BaseException as failure:
             raise self._named(failure, index) from failure
         observations = last if len(which) == len(last) else [last[index] for index in which]

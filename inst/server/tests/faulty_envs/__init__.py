@@ -37,6 +37,7 @@ from faulty_envs.raising import (
     RaisesInStep,
     Variables,
 )
+from faulty_envs.returning import Returning
 from faulty_envs.rogue import Rogue
 from faulty_envs.tables import LooksTimed, Table
 from faulty_envs.uneven import CannotSaySo, Insists, KillsItself, SpoilsOneSubEnv, Uneven
@@ -71,6 +72,7 @@ for _kind in (
     RaisesInReset,
     RaisesInStep,
     ImportsInStep,
+    Returning,
     Rogue,
     Shifted,
     Spins,

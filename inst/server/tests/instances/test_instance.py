@@ -344,3 +344,40 @@ def test_frames_are_drawn_while_other_environments_close(app, create):
     for thread in threads:
         thread.join()
     assert not failures
+
+
+@pytest.mark.parametrize("num_envs", [None, 2])
+def test_an_array_of_one_number_is_a_reward(client, create, monitor_dir, num_envs):
+    kwargs = {"reward": [2.5], "info": {}}
+    url = create("faulty_envs:Returning-v0", kwargs=kwargs, num_envs=num_envs)
+    if num_envs is None:
+        client.post(f"{url}/monitor/start/", json={"directory": "run"})
+    client.post(f"{url}/reset/")
+    answer = client.post(f"{url}/step/", json={"action": 0 if num_envs is None else [0, 1]})
+    assert answer.json["reward"] == (2.5 if num_envs is None else [2.5, 2.5])
+
+
+@pytest.mark.parametrize("num_envs", [None, 2])
+@pytest.mark.parametrize("reward", [[1.0, 2.0], None])
+def test_a_reward_that_is_no_number_is_named(client, create, num_envs, reward):
+    kwargs = {"reward": reward, "info": {}}
+    url = create("faulty_envs:Returning-v0", kwargs=kwargs, num_envs=num_envs)
+    client.post(f"{url}/reset/")
+    answer = client.post(f"{url}/step/", json={"action": 0 if num_envs is None else [0, 1]})
+    assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
+    shown = "null" if reward is None else "[1.0, 2.0]"
+    assert answer.json["message"] == f"A reward must be a number, and the environment's is {shown}"
+
+
+@pytest.mark.parametrize("num_envs", [None, 2])
+@pytest.mark.parametrize("info", [None, ["lives", 3], []])
+@pytest.mark.parametrize("in_reset", [True, False])
+def test_an_info_that_is_no_dict_is_named(client, create, num_envs, info, in_reset):
+    kwargs = {"info": info, "in_reset": in_reset}
+    url = create("faulty_envs:Returning-v0", kwargs=kwargs, num_envs=num_envs)
+    answer = client.post(f"{url}/reset/")
+    if not in_reset:
+        answer = client.post(f"{url}/step/", json={"action": 0 if num_envs is None else [0, 1]})
+    assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
+    assert "An info must be a dict, and the environment's is " in answer.json["message"]
+    assert answer.json["hint"] == "return {} where there is nothing to tell"

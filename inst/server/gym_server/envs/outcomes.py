@@ -1,0 +1,41 @@
+"""What an environment returns from a reset or a step beside the observation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+
+
+def reward_number(reward: Any) -> float:
+    """Return a reward as a number, also where it is an array of one.
+
+    Raises:
+        GymServerError: ``environment_error``.
+    """
+    try:
+        return float(reward.item() if isinstance(reward, np.ndarray) else reward)
+    except (TypeError, ValueError):
+        raise GymServerError(
+            "environment_error",
+            f"A reward must be a number, and the environment's is {brief(reward)}",
+        ) from None
+
+
+def checked_info(info: Any) -> Any:
+    """Return an info, which is a dict.
+
+    Raises:
+        GymServerError: ``environment_error``.
+    """
+    if isinstance(info, Mapping):
+        return info
+    raise GymServerError(
+        "environment_error",
+        f"An info must be a dict, and the environment's is {brief(info)}",
+        "return {} where there is nothing to tell",
+    )
