@@ -27,8 +27,8 @@ _IDLE_SECONDS = 3600.0
 _REST_SECONDS = 60.0
 _SLOWEST_BYTES = 1000
 
-# Seconds for both, and for being idle, while the client is not recognized. Longer than the proxy
-# of inst/examples/nginx.conf keeps a connection that is idle.
+# Seconds for all that comes and goes while the client is not recognized, however it comes. Longer
+# than the proxy of inst/examples/nginx.conf keeps a connection that is idle.
 _UNRECOGNIZED_SECONDS = 20.0
 
 # When an answer was not read for so long, the client is slow, and not the network.
@@ -59,14 +59,9 @@ class _Pace:
     A client that sends or reads drop by drop is treated as one that does nothing.
     """
 
-    def __init__(self, seconds: float) -> None:
-        """Begin now.
-
-        Args:
-            seconds: that nothing may move.
-        """
-        self._seconds = seconds
-        self._due = time.monotonic() + seconds
+    def __init__(self) -> None:
+        """Begin now."""
+        self._due = time.monotonic() + _REST_SECONDS
 
     def left(self, moved: int) -> float:
         """Return how many seconds the next part may take.
@@ -78,7 +73,7 @@ class _Pace:
             TimeoutError: it is too slow.
         """
         self._due += moved / _SLOWEST_BYTES
-        left = min(self._seconds, self._due - time.monotonic())
+        left = min(_REST_SECONDS, self._due - time.monotonic())
         if left <= 0:
             raise TimeoutError("a request comes, or an answer is read, too slowly")
         return left
@@ -120,6 +115,8 @@ class Connection:
         self._recognizes = recognizes
         self._refuse = refuse
         self._is_recognized = False
+        # When its time is over if it is not recognized until then, in the clock's seconds.
+        self._due = time.monotonic() + _UNRECOGNIZED_SECONDS
         self._last: Request | None = None
         self._last_environ: dict = {}
         self._stopping = False
@@ -143,9 +140,13 @@ class Connection:
         """The size of the answer that its client has not read to the end."""
         return sum(self._sending)
 
-    @property
-    def _seconds(self) -> float:
-        return _REST_SECONDS if self._is_recognized else _UNRECOGNIZED_SECONDS
+    def _wait_at_most(self, seconds: float) -> None:
+        """Set how long the socket may take for the next part that comes or goes."""
+        if not self._is_recognized:
+            seconds = min(seconds, self._due - time.monotonic())
+            if seconds <= 0:
+                raise TimeoutError("a client that is not recognized has no more time")
+        self._socket.settimeout(seconds)
 
     def serve(self) -> None:
         """Answer until the client leaves, is silent for too long, or the server stops."""
@@ -155,7 +156,7 @@ class Connection:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if hasattr(socket, "TCP_NOTSENT_LOWAT"):
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
-            self._socket.settimeout(self._seconds)
+            self._wait_at_most(_REST_SECONDS)
             rest: _Pace | None = None
             while data := self._receive():
                 self._busy = True
@@ -166,13 +167,14 @@ class Connection:
                     self.waiting_since = time.monotonic()
                 self._busy = False
                 if not self._parser.began:
-                    if rest is not None:
-                        self._socket.settimeout(self._seconds)
+                    # For a client that plays the socket is set already.
+                    if rest is not None or not self._is_recognized:
+                        self._wait_at_most(_REST_SECONDS)
                     rest = None
                     continue
                 if requests or rest is None:
-                    rest = _Pace(self._seconds)
-                self._socket.settimeout(rest.left(len(data)))
+                    rest = _Pace()
+                self._wait_at_most(rest.left(len(data)))
 
     def _receive(self) -> bytes:
         while True:
@@ -197,7 +199,7 @@ class Connection:
     def _recognize(self, environ: dict) -> None:
         if self._recognizes(environ):
             self._is_recognized = True
-            self._socket.settimeout(self._seconds)
+            self._wait_at_most(_REST_SECONDS)
 
     def _answer_all(self, requests: list[Request]) -> bool:
         return all(map(self._answer, requests))
@@ -237,14 +239,14 @@ class Connection:
             raise ConnectionAbortedError("an answer was not read") from error
 
     def _send_rest(self, sent: int, *parts: memoryview) -> None:
-        pace = _Pace(self._seconds)
+        pace = _Pace()
         for part in parts:
             while part:
-                self._socket.settimeout(pace.left(sent))
+                self._wait_at_most(pace.left(sent))
                 sent = self._socket.send(part)
                 part = part[sent:]
                 self.waiting_since = time.monotonic()
-        self._socket.settimeout(self._seconds)
+        self._wait_at_most(_REST_SECONDS)
 
     def answer_for(self, status: str, headers: list[tuple[str, str]], body: bytes) -> None:
         """Answer on behalf of the serving thread, which is stuck in the application; then close.

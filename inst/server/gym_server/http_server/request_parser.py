@@ -11,6 +11,9 @@ from gym_server.http_server.interface import Answer, Refuse, Share, refuse_in_pl
 
 _LARGEST_HEAD_BYTES = 2**16
 
+# Browsers send some twenty, and a proxy adds a few. Each line takes far more memory than its bytes.
+_MOST_HEAD_LINES = 100
+
 # A body of this size is read without asking whether the request is admitted, and whether there is
 # memory left for it; of a larger one memory is taken in pieces of this size.
 _SMALL_BODY_BYTES = 2**16
@@ -28,6 +31,7 @@ class Request:
     Attributes:
         url: as it was sent.
         headers: names in lower case, and values.
+        head_bytes: the size of the URL, and of these names and values.
         body: what has come of it.
         body_bytes: the size of all that has come of it, also of what was thrown away.
         held_bytes: the memory that was taken for it.
@@ -41,6 +45,7 @@ class Request:
     def __init__(self) -> None:
         self.url = b""
         self.headers: list[tuple[bytes, bytes]] = []
+        self.head_bytes = 0
         self.body: bytes | bytearray = b""
         self.body_bytes = 0
         self.held_bytes = 0
@@ -176,11 +181,9 @@ class RequestParser:
         try:
             while data:
                 data = self._parse(data)
+            self._check_head(self._unreported_bytes)
         except HttpParserError as error:
             self._end_with(self._refuse(400, self._fault or str(error)))
-        if self._unreported_bytes > _LARGEST_HEAD_BYTES:
-            reason = f"its head has more than {_LARGEST_HEAD_BYTES} bytes"
-            self._end_with(self._refuse(400, reason))
         return self._complete
 
     def _parse(self, data: bytes) -> bytes:
@@ -218,12 +221,26 @@ class RequestParser:
     def on_url(self, url: bytes) -> None:
         """Take a piece of the URL."""
         self._request.url += url
+        self._request.head_bytes += len(url)
+        self._check_head(self._request.head_bytes)
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Take a header."""
         # Those that come after a body in chunks are ignored.
-        if not self._request.method:
-            self._request.headers.append((name.lower(), value))
+        request = self._request
+        if not request.method:
+            request.headers.append((name.lower(), value))
+            request.head_bytes += len(name) + len(value)
+            self._check_head(request.head_bytes)
+
+    def _check_head(self, size: int) -> None:
+        """Refuse a head of such a size, or of so many lines as it has, if that is too much."""
+        if size > _LARGEST_HEAD_BYTES:
+            self._fault = f"its head has more than {_LARGEST_HEAD_BYTES} bytes"
+            raise HttpParserError
+        if len(self._request.headers) > _MOST_HEAD_LINES:
+            self._fault = f"its head has more than {_MOST_HEAD_LINES} lines"
+            raise HttpParserError
 
     def on_headers_complete(self) -> None:
         """Decide whether the body is wanted."""

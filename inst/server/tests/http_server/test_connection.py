@@ -143,6 +143,32 @@ def test_an_unrecognized_client_may_not_be_silent(converse, begun):
     assert client.recv(1) == b""
 
 
+@pytest.mark.parametrize(
+    ("begun", "drop"),
+    [
+        (b"", b"\r\n"),
+        (b"GET / HTTP/1.1\r\nX: ", b"y"),
+        (POST % 1000, b"y"),
+        (POST % LARGE, b"y"),
+        (GET % b"%d" % LARGE, b""),
+    ],
+    ids=["empty lines", "head", "body", "large body", "reading"],
+)
+def test_a_client_that_is_not_recognized_gains_no_time_by_dripping(
+    converse, monkeypatch, begun, drop
+):
+    # Each byte gains a second for a client that is recognized.
+    monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 1)
+    client, thread = converse(most=2 * LARGE, recognizes=recognizes_nobody)
+    until = time.monotonic() + 1.5
+    with suppress(OSError):
+        client.sendall(begun)
+        while thread.is_alive() and time.monotonic() < until:
+            client.sendall(drop) if drop else client.recv(4096)
+            thread.join(0.01)
+    assert not thread.is_alive()
+
+
 def test_it_is_asked_about_a_client_until_that_is_recognized(converse):
     asked = []
     client, _ = converse(recognizes=lambda environ: asked.append(environ["PATH_INFO"]) or True)

@@ -66,3 +66,19 @@ def test_a_client_that_asks_before_it_sends_is_answered_once_to_go_on(parser, se
     assert sent == [b"HTTP/1.1 100 Continue\r\n\r\n"]
     (request,) = parser.feed(b"{}")
     assert request.body == b"{}"
+
+
+def test_a_head_has_at_most_100_lines(parser):
+    (request,) = parser.feed(b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 100 + b"\r\n")
+    assert request.refusal is None and len(request.headers) == 100
+    (request,) = parser.feed(b"GET / HTTP/1.1\r\n" + b"a:\r\n" * 1000)
+    assert request.refusal[0].startswith("400") and b"more than 100 lines" in request.refusal[2]
+    assert len(request.headers) == 101
+
+
+@pytest.mark.parametrize("begun", [b"GET / HTTP/1.1\r\nX: ", b"GET /"], ids=["header", "URL"])
+def test_a_head_that_comes_in_pieces_is_no_larger_for_that(parser, begun):
+    piece = b"y" * 40_000
+    assert parser.feed(begun + piece) == []
+    (request,) = parser.feed(piece + (b"\r\n\r\n" if b"X" in begun else b" HTTP/1.1\r\n\r\n"))
+    assert request.refusal[0].startswith("400") and b"65536 bytes" in request.refusal[2]
