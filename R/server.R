@@ -167,7 +167,7 @@ gym_server_stop <- function(client = NULL) {
 #' Read a server's log
 #'
 #' Warnings and errors of a server that this session started, and what its
-#' environments print; also after its end.
+#' environments print; also after its end. A log beyond 8 MiB is cut to its last MiB.
 #'
 #' @inheritParams gym_server_stop
 #' @return A character vector, one element a line; `character(0)` when the server

@@ -7,7 +7,7 @@ import traceback
 
 from werkzeug.exceptions import HTTPException
 
-from gym_server.json_values import brief
+from gym_server.json_values import LONGEST_MESSAGE, brief, shortened
 
 log = logging.getLogger(__name__)
 
@@ -67,10 +67,11 @@ class GymServerError(Exception):
     def __init__(
         self, code: str, message: str, hint: str | None = None, extra: str | None = None
     ) -> None:
-        super().__init__(message)
+        # An environment's message may repeat all that a client has sent.
+        self.message = shortened(message, LONGEST_MESSAGE)
+        super().__init__(self.message)
         self.code = code
-        self.message = message
-        self.hint = hint
+        self.hint = hint and shortened(hint, LONGEST_MESSAGE)
         self.extra = extra
 
     @property

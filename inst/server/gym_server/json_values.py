@@ -11,6 +11,9 @@ import numpy as np
 
 NONFINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
+# The characters of an error's message, wherever it goes.
+LONGEST_MESSAGE = 2000
+
 # Deeper than any honest info, and shallow enough for the recursion of the JSON encoder. A structure
 # that contains itself is cut off here.
 _DEEPEST = 128
@@ -49,8 +52,8 @@ def brief(value: object, width: int = 80) -> str:
         text += piece
         # The rest is not looked at: it may be as large as a request.
         if len(text) > width:
-            return text[: width - 3] + "..."
-    return text
+            break
+    return shortened(text, width)
 
 
 def _pieces(value: object, width: int) -> Iterator[str]:
@@ -74,6 +77,11 @@ def _pieces(value: object, width: int) -> Iterator[str]:
             yield json.dumps(plain(value))
         except ValueError:
             yield _repr(type(value))
+
+
+def shortened(text: str, width: int) -> str:
+    """Return a text of at most ``width`` characters."""
+    return text if len(text) <= width else text[: width - 3] + "..."
 
 
 def _number(value: float) -> float | str:

@@ -100,7 +100,7 @@ class ServerProcess:
     ``limits={"gym_server.cli.main._GRACE_SECONDS": 1}``.
     """
 
-    def __init__(self, *arguments, limits=None, **variables):
+    def __init__(self, *arguments, limits=None, stderr=subprocess.PIPE, **variables):
         environment = {
             **os.environ,
             **variables,
@@ -116,7 +116,7 @@ class ServerProcess:
             [sys.executable, *program, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=stderr,
             env=environment,
             text=True,
         )
@@ -167,7 +167,7 @@ class ServerProcess:
     def kill(self):
         self.process.kill()
         self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout, self.process.stderr):
+        for pipe in filter(None, (self.process.stdin, self.process.stdout, self.process.stderr)):
             pipe.close()
 
 

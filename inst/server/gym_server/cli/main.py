@@ -14,11 +14,13 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gym_server import logs
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
 from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
+from gym_server.cli.own_log import keep_short
 from gym_server.cli.port_holder import port_holder
 from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
 from gym_server.http_server.server import Server, bind
@@ -51,7 +53,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status: 0 after a stop, 1 when the server cannot start.
     """
     options = parser().parse_args(argv)
-    _set_up_logging(options.log_level)
+    logs.set_up(options.log_level.upper())
+    # RecordVideo warns of every folder that exists. The monitor itself looks after its folder.
+    warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
     try:
         token = _find_token(options)
     except BadTokenError as fault:
@@ -112,6 +116,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop, options.own_log), daemon=True).start()
+    if options.own_log is not None:
+        threading.Thread(target=keep_short, args=(options.own_log,), daemon=True).start()
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
     # From here on standard output goes where standard error goes: what environments print must not
@@ -119,17 +125,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.dup2(2, 1)
     _serve(app, server)
     return 0
-
-
-def _set_up_logging(level: str) -> None:
-    logging.basicConfig(
-        level=level.upper(),
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-    )
-    logging.captureWarnings(True)
-    # RecordVideo warns of every folder that exists. The monitor itself looks after its folder.
-    warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
 
 
 def _find_token(options: argparse.Namespace) -> str | None:

@@ -44,9 +44,9 @@ def parser() -> argparse.ArgumentParser:
         "--own-log",
         type=Path,
         metavar="FILE",
-        help="the file that standard error goes to; with --stop-on-stdin-eof it is removed when "
-        "standard input closes without a line, as it does when the program that started the "
-        "server was killed",
+        help="the file that standard error goes to; beyond 8 MiB it is cut to its last MiB, and "
+        "with --stop-on-stdin-eof it is removed when standard input closes without a line, as it "
+        "does when the program that started the server was killed",
     )
     options.add_argument(
         "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"

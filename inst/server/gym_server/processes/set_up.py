@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
-import logging
 import os
 import signal
-import sys
 
+from gym_server import logs
 from gym_server.processes import start
 
 
@@ -27,12 +26,7 @@ def set_up_process(log_level: int, max_mb: int = 0) -> None:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     start.exit_with_parent(group=True)
-    logging.basicConfig(
-        level=log_level,
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s (process %(process)d): %(message)s",
-    )
-    logging.captureWarnings(True)
+    logs.set_up(log_level, " (process %(process)d)")
     with contextlib.suppress(OSError, ValueError, AttributeError):
         # A crash in C prints where it happened.
         faulthandler.enable()
