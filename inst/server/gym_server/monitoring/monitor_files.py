@@ -17,6 +17,9 @@ from gym_server.monitoring.file_lock import try_lock
 
 _MANIFEST = re.compile(r"gym-monitor(?:-([0-9a-f]{8}))?\.json")
 
+# A greater number was not counted by a monitor, and names of files could become too long.
+_MOST_EPISODES = 10**15
+
 
 class MonitorFiles:
     """The files of one monitor in a directory that several may write.
@@ -103,15 +106,30 @@ class MonitorFiles:
         Raises:
             GymServerError: ``monitor_directory``.
         """
+        reading = self._manifest.name
         try:
             manifest = json.loads(self._manifest.read_text(encoding="utf-8"))
             self._listed = {str(name) for name in manifest["files"]}
+            self.next_episode = _episode(manifest["next_episode"])
+            reading = self.table_name
             # A server that was killed did not write the last number.
-            self.next_episode = max([int(manifest["next_episode"]), *self._episodes_in_table()])
+            self.next_episode = max([self.next_episode, *self._episodes_in_table()])
         except FileNotFoundError:
             return
-        except (ValueError, KeyError, TypeError) as error:
-            raise refuse(self.path, "what an earlier monitor left is damaged") from error
+        except (
+            OSError,
+            ValueError,
+            ArithmeticError,
+            LookupError,
+            TypeError,
+            RecursionError,
+        ) as error:
+            raise refuse(
+                self.path,
+                f"{reading} is damaged: {error}",
+                "mend that file, or move it and the other files of its monitor away, or take "
+                "another directory",
+            ) from error
 
     def left_behind(self) -> set[str]:
         """Return the names of the files there that earlier monitors wrote."""
@@ -181,7 +199,7 @@ class MonitorFiles:
 
     def _episodes_in_table(self) -> list[int]:
         lines = (self.path / self.table_name).read_text(encoding="ascii").splitlines()[1:]
-        return [int(line.split(",")[0]) + 1 for line in lines if line]
+        return [_episode(line.split(",")[0]) + 1 for line in lines if line]
 
     def _write_manifest(self) -> None:
         if not _is_at(self.table, self.path / self.table_name):
@@ -198,6 +216,14 @@ class MonitorFiles:
         with open(new, "x", encoding="utf-8") as file:
             json.dump(manifest, file, indent=1)
         new.replace(self._manifest)
+
+
+def _episode(number: str | float) -> int:
+    """Read an episode's number from a file."""
+    episode = int(number)
+    if not 0 <= episode <= _MOST_EPISODES:
+        raise ValueError(f"{number} is no episode's number")
+    return episode
 
 
 def files_in(path: Path) -> list[MonitorFiles]:

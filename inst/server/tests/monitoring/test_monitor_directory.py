@@ -188,10 +188,11 @@ def test_a_forged_list_deletes_nothing(root, monitor_dir):
     assert (path / "notes.txt").exists()
 
 
-def test_a_damaged_table_is_refused(root):
+@pytest.mark.parametrize("row", ["\u00e9pisode", "one,2", "-5", "9" * 30, "9" * 5000, "\0"])
+def test_a_damaged_table_is_refused(root, row):
     path = fill(root)
-    (path / "episodes.csv").write_text("episode\n\u00e9pisode\n", encoding="utf-8")
-    refused(root, "run", resume=True)
+    (path / "episodes.csv").write_text(f"episode\n{row}\n", encoding="utf-8")
+    assert "episodes.csv is damaged" in refused(root, "run", resume=True)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links")
@@ -203,12 +204,40 @@ def test_writing_the_list_follows_no_link(root, monitor_dir, tmp_path):
     assert (tmp_path / "precious").read_text() == "precious"
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 1}'])
-def test_a_list_that_cannot_be_read_is_refused(root, text):
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"files": 1}',
+        "[" * 100_000,
+        *(
+            f'{{"files": ["episodes.csv"], "next_episode": {number}}}'
+            for number in ("Infinity", "NaN", "1e999", "-1", "1" + "0" * 100, "null", '"x"')
+        ),
+    ],
+    ids=lambda text: text[-20:],
+)
+@pytest.mark.parametrize("options", [{"resume": True}, {"force": True}], ids=str)
+def test_a_list_that_cannot_be_read_is_refused(root, text, options):
     path = fill(root)
     (path / "gym-monitor.json").write_text(text)
-    refused(root, "run", force=True)
+    assert "gym-monitor.json is damaged" in refused(root, "run", **options)
     assert (path / "episodes.csv").exists()
+
+
+def test_a_directory_in_place_of_the_list_is_refused(root):
+    path = fill(root)
+    (path / "gym-monitor.json").unlink()
+    (path / "gym-monitor.json").mkdir()
+    assert "gym-monitor.json is damaged" in refused(root, "run", resume=True)
+
+
+def test_the_damaged_list_of_another_monitor_is_named(root):
+    path = fill(root)
+    (path / "gym-monitor-89abcdef.json").write_text("[" * 100_000)
+    assert "gym-monitor-89abcdef.json is damaged" in refused(root, "run", force=True)
 
 
 def test_a_directory_that_was_refused_is_free_again(root, monitor_dir):
