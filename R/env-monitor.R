@@ -33,7 +33,10 @@
 #' @return Nothing, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance, a directory
 #'   that is refused, a monitor that is active already, or videos that cannot be made, with
-#'   the reason; `gym_error_argument`; `gym_error_connection`.
+#'   the reason; `gym_error_http_429` when all monitors together have written as much as the server
+#'   allows (`max_monitor_mb` of [gym_server_start()]): a monitor stops recording then, the
+#'   environment goes on, and closing either raises the error; `gym_error_argument`;
+#'   `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

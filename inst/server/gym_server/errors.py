@@ -24,6 +24,7 @@ _STATUS = {
     "instance_memory_closed": 410,
     "upload_closed": 410,
     "body_too_large": 413,
+    "monitors_full": 429,
     "too_many_instances": 429,
     "too_many_keys": 429,
     "too_many_sub_envs": 429,
@@ -45,7 +46,7 @@ _HEADERS = {
 }
 
 # Errors below 500 that can come after a part of the work was done. An error from 500 on always can.
-_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory"})
+_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory", "monitors_full"})
 
 # Describes the routes for people.  The classic R client shows no message of an error without it.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"

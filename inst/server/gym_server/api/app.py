@@ -89,7 +89,9 @@ class GymApp(Flask):
         """Set up the services and the routes."""
         super().__init__("gym_server", static_folder=None)
         self._renderer = RenderThread()
-        self._monitor_root = MonitorRoot(config.monitor_dir, config.temporary_monitors)
+        self._monitor_root = MonitorRoot(
+            config.monitor_dir, config.temporary_monitors, config.limits.max_monitor_mb * 2**20
+        )
         self._instances = InstanceManager(
             config.allowed_modules,
             self._renderer,

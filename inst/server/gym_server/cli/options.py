@@ -106,6 +106,12 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "and measured afterwards (%(default)s)",
     )
     limits.add_argument(
+        "--max-monitor-mb",
+        type=_number(1, 2**30),
+        default=Limits.max_monitor_mb,
+        help="what all monitors together may write on the disk until the server ends (%(default)s)",
+    )
+    limits.add_argument(
         "--max-watchers",
         type=_number(1, 1_000_000),
         default=Limits.max_watchers,

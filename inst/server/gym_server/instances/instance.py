@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.instances.backend import Backend, Seed
 from gym_server.instances.lock import InstanceLock
+from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
@@ -19,6 +23,11 @@ from gym_server.viewing.watchable import Moves
 
 if TYPE_CHECKING:
     import numpy as np
+
+log = logging.getLogger(__name__)
+
+# How often it is looked at what a monitor writes: less often than the shortest episodes end.
+_MEASURE_SECONDS = 1.0
 
 
 class Instance:
@@ -53,6 +62,10 @@ class Instance:
         self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
+        # Where a monitor writes, if one does; when that was measured; why the last one stopped.
+        self._monitored: tuple[Path, DiskUse] | None = None
+        self._measured = 0.0
+        self._monitor_full: GymServerError | None = None
 
     # Moves ----------------------------------------------------------------------------------
 
@@ -89,6 +102,8 @@ class Instance:
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
+            if self._monitored is not None:
+                self._stop_full_monitor(*self._monitored)
             return self._backend.reset(seed, options, form, mask)
 
     def step(
@@ -264,13 +279,23 @@ class Instance:
                 "create it without num_envs",
             )
         with self.lock:
+            path, disk_use = root.resolve(directory), root.disk_use
+            disk_use.measure(path)
+            disk_use.check(path, emptied=force)
             self._backend.start_monitor(
                 self.instance_id, root, directory, force, resume, video_every
             )
+            self._monitored, self._monitor_full = (path, disk_use), None
+            self._measure_monitor()
 
     def close_monitor(self) -> None:
-        """Stop recording and finish the files, if it is recorded."""
-        with self.lock:
+        """Stop recording and finish the files, if it is recorded.
+
+        Raises:
+            GymServerError: ``monitors_full`` when something was not recorded for that reason;
+                ``monitor_directory`` when something could not be written.
+        """
+        with self.lock, self._monitor_ends():
             self._backend.close_monitor()
 
     @property
@@ -282,6 +307,37 @@ class Instance:
     def pids(self) -> Sequence[int]:
         """The processes that run it, beside the server's."""
         return self._backend.pids
+
+    @contextlib.contextmanager
+    def _monitor_ends(self) -> Iterator[None]:
+        """Measure what a monitor leaves, and say whether it had no more room."""
+        try:
+            yield
+        finally:
+            self._measure_monitor()
+            self._monitored = None
+        full, self._monitor_full = self._monitor_full, None
+        if full is not None:
+            raise full
+
+    def _measure_monitor(self) -> None:
+        if self._monitored is not None:
+            path, disk_use = self._monitored
+            disk_use.measure(path)
+            self._measured = time.monotonic()
+
+    def _stop_full_monitor(self, path: Path, disk_use: DiskUse) -> None:
+        """Stop to record, if monitors may write no more; the environment goes on."""
+        if time.monotonic() < self._measured + _MEASURE_SECONDS:
+            return
+        self._measure_monitor()
+        try:
+            disk_use.check(path)
+        except GymServerError as full:
+            log.warning("%s", full.message)
+            with contextlib.suppress(GymServerError), self._monitor_ends():
+                self._backend.close_monitor()
+            self._monitor_full = full
 
     # Beginning and end ----------------------------------------------------------------------
 
@@ -304,7 +360,8 @@ class Instance:
             why = self.lock.refusal()
             self.lock.closed = True
             self.viewer.end(why)
-            self._backend.close(why)
+            with self._monitor_ends():
+                self._backend.close(why)
 
     def abandon(self, why: GymServerError) -> int | None:
         """Close the instance without waiting for its lock: a call on it has taken too long.

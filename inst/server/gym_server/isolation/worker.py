@@ -29,6 +29,7 @@ from gym_server.errors import GymServerError, answer_to
 from gym_server.instances.backend import Seed
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
+from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_directory import claim
 from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
@@ -243,6 +244,11 @@ class _Resolved:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        # The server looks after that.
+        self.disk_use = DiskUse(math.inf)
+
+    def resolve(self, directory: str) -> Path:
+        return self._path
 
     def claim(self, directory: str, *how: Any) -> MonitorFiles:
         return claim(self._path, directory, *how)

@@ -43,6 +43,8 @@ class Limits:
         max_memory_mb: how much memory all of them may take together, in MiB, as it is estimated
             beforehand (``memory_estimate``) and measured afterwards (``Account``). Half of what a
             small machine has.
+        max_monitor_mb: how much all monitors together may write on the disk until the server ends,
+            in MiB; some hundred thousand short videos.
         max_watchers: how many pages may be shown something at a time.
         max_call_seconds: how long one call may take before its instance is evicted; 0 for no limit.
             Longer than an ordinary call takes, and short enough that somebody who comes back from
@@ -56,6 +58,7 @@ class Limits:
     max_total_sub_envs: int | None = None
     max_processes: int = 128
     max_memory_mb: int = 4096
+    max_monitor_mb: float = 4096
     max_watchers: int = 100
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_files import MonitorFiles, files_in, refuse
 
 
 class MonitorRoot:
-    """Where the monitors of a server may write."""
+    """Where the monitors of a server may write.
 
-    def __init__(self, root: Path | None, allow_temporary: bool) -> None:
+    Attributes:
+        disk_use: how much they have written, and may write.
+    """
+
+    def __init__(
+        self, root: Path | None, allow_temporary: bool, most_bytes: float = math.inf
+    ) -> None:
         """Set the limits.
 
         Args:
@@ -23,7 +31,9 @@ class MonitorRoot:
                 directory, created when the first monitor starts.
             allow_temporary: whether absolute ones may also lie below the system's temporary
                 directory, as the classic examples have it.
+            most_bytes: what all of them together may write.
         """
+        self.disk_use = DiskUse(most_bytes)
         self._root = root
         self._own_root: Path | None = None
         self._allowed: list[Path] = []

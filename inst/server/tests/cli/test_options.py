@@ -32,6 +32,7 @@ def test_limits_of_time_are_numbers(name, value, capsys):
         "--max-num-envs",
         "--max-processes",
         "--max-memory-mb",
+        "--max-monitor-mb",
     ],
 )
 def test_limits_of_numbers_are_at_least_1(name):

@@ -1,0 +1,66 @@
+"""How much monitors have written on the disk, all together, and whether that is too much."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+from gym_server.errors import GymServerError
+
+# Every file takes whole blocks.
+_BLOCK_BYTES = 4096
+
+_WRITTEN_BY_MONITORS = ("episodes", "gym-monitor", "rl-video")
+
+
+class DiskUse:
+    """What the directories take that monitors have written since the server started."""
+
+    def __init__(self, most_bytes: float) -> None:
+        """Start with none.
+
+        Args:
+            most_bytes: what they may take together.
+        """
+        self._most_bytes = most_bytes
+        self._lock = threading.Lock()
+        self._sizes: dict[Path, int] = {}
+        self._total = 0
+
+    def measure(self, path: Path) -> None:
+        """Note what the files of monitors in a directory take now."""
+        with self._lock:
+            size = _size(path)
+            self._total += size - self._sizes.get(path, 0)
+            self._sizes[path] = size
+
+    def check(self, path: Path, emptied: bool = False) -> None:
+        """Refuse to write more, if all directories together take too much.
+
+        Args:
+            path: a directory that was measured.
+            emptied: whether what it holds is going to be deleted.
+
+        Raises:
+            GymServerError: ``monitors_full``.
+        """
+        if self._total - (self._sizes[path] if emptied else 0) >= self._most_bytes:
+            raise GymServerError(
+                "monitors_full",
+                f"Nothing more is recorded in {path}: all monitors together have written "
+                f"{self._total / 2**20:.0f} MiB since this server started, and may write "
+                f"{self._most_bytes / 2**20:.0f}",
+                "record with force = true into a directory whose recordings nobody needs; the "
+                "server's option --max-monitor-mb sets the limit",
+            )
+
+
+def _size(path: Path) -> int:
+    try:
+        with os.scandir(path) as entries:
+            files = [entry for entry in entries if entry.name.startswith(_WRITTEN_BY_MONITORS)]
+            sizes = [entry.stat(follow_symlinks=False).st_size for entry in files]
+    except FileNotFoundError:
+        return 0
+    return _BLOCK_BYTES * (1 + sum(-(-size // _BLOCK_BYTES) for size in sizes))
