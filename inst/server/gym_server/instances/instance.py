@@ -280,7 +280,6 @@ class Instance:
             )
         with self.lock:
             path, disk_use = root.resolve(directory), root.disk_use
-            disk_use.measure(path)
             disk_use.check(path, emptied=force)
             self._backend.start_monitor(
                 self.instance_id, root, directory, force, resume, video_every

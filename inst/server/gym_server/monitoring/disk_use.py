@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from pathlib import Path
@@ -39,13 +40,13 @@ class DiskUse:
         """Refuse to write more, if all directories together take too much.
 
         Args:
-            path: a directory that was measured.
+            path: the directory to write into.
             emptied: whether what it holds is going to be deleted.
 
         Raises:
             GymServerError: ``monitors_full``.
         """
-        if self._total - (self._sizes[path] if emptied else 0) >= self._most_bytes:
+        if self._total - (self._sizes.get(path, 0) if emptied else 0) >= self._most_bytes:
             raise GymServerError(
                 "monitors_full",
                 f"Nothing more is recorded in {path}: all monitors together have written "
@@ -57,10 +58,11 @@ class DiskUse:
 
 
 def _size(path: Path) -> int:
-    try:
-        with os.scandir(path) as entries:
-            files = [entry for entry in entries if entry.name.startswith(_WRITTEN_BY_MONITORS)]
-            sizes = [entry.stat(follow_symlinks=False).st_size for entry in files]
-    except FileNotFoundError:
-        return 0
-    return _BLOCK_BYTES * (1 + sum(-(-size // _BLOCK_BYTES) for size in sizes))
+    blocks = 1
+    # Somebody may just have removed the directory, or one of its files.
+    with contextlib.suppress(OSError):
+        for name in os.listdir(path):
+            if name.startswith(_WRITTEN_BY_MONITORS):
+                with contextlib.suppress(OSError):
+                    blocks += -(-os.lstat(path / name).st_size // _BLOCK_BYTES)
+    return blocks * _BLOCK_BYTES
