@@ -76,6 +76,15 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
     (instances[[instance_id]] <- ask_instance(client, instance_id, call))
 }
 
+# Calling handlers, such as those of read_values(), do not see that the stack has overflowed.
+read_space <- function(answer, name, space_of) {
+  what <- paste0("Its `", name, "`")
+  tryCatch(
+    read_values(space_of(answer[[name]]), what),
+    stackOverflowError = function(cnd) abort_answer(paste(what, "is nested too deeply"))
+  )
+}
+
 ask_instance <- function(client, instance_id, call) {
   route <- instance_route(instance_id)
   answer <- tryCatch(
@@ -94,10 +103,8 @@ ask_instance <- function(client, instance_id, call) {
   instance$num_workers <- answer$num_workers
   instance$vectorization_mode <- shown_line(answer$vectorization_mode)
   instance$autoreset_mode <- shown_line(answer$autoreset_mode)
-  instance$single_action_space <- read_values(space_of(answer$action_space), "Its `action_space`")
-  instance$single_observation_space <- read_values(
-    space_of(answer$observation_space), "Its `observation_space`"
-  )
+  instance$single_action_space <- read_space(answer, "action_space", space_of)
+  instance$single_observation_space <- read_space(answer, "observation_space", space_of)
   instance$single_observation_space$names <- observation_names(
     answer$env_id, instance$single_observation_space, answered_wrapper_names(answer$wrappers)
   )

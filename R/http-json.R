@@ -106,11 +106,44 @@ json_atoms <- function(x) {
 
 # Parses JSON. Integers beyond 2^53 become text, so that none is rounded.
 from_json <- function(text) {
+  check_json_depth(text)
   Encoding(text) <- "UTF-8"
   if (grepl("\\u0000", text, fixed = TRUE, useBytes = TRUE)) {
     refuse_nul(text)
   }
   with_decimal_point(jsonlite::parse_json(text, bigint_as_char = TRUE))
+}
+
+# Our server nests spaces up to 100 levels deep, with three brackets a level. The parser would
+# overflow the stack at some ten thousand levels, and what reads the values sooner.
+deepest_json <- 320L
+
+check_json_depth <- function(text) {
+  # Each level opens and closes a bracket.
+  if (nchar(text, "bytes") > 2L * deepest_json && json_depth(text) > deepest_json) {
+    abort_answer(paste("Its JSON is nested more than", deepest_json, "levels deep"))
+  }
+}
+
+# How deep a JSON text is nested. It is quick, though rough, where there are few brackets in all.
+json_depth <- function(text) {
+  steps <- bracket_steps(text)
+  if (sum(steps > 0L) <= deepest_json) {
+    return(0L)
+  }
+  # Brackets in texts nest nothing.
+  if (grepl("\"", text, fixed = TRUE, useBytes = TRUE)) {
+    text <- gsub("\"(?:[^\"\\\\]++|\\\\.)*+\"", "", text, perl = TRUE, useBytes = TRUE)
+    steps <- bracket_steps(text)
+  }
+  max(0L, cumsum(steps))
+}
+
+# 1 for each opening bracket, -1 for each closing one.
+bracket_steps <- function(text) {
+  bytes <- as.integer(charToRaw(text))
+  bytes <- bytes[bytes %in% utf8ToInt("[]{}")]
+  ifelse(bytes == 0x5bL | bytes == 0x7bL, 1L, -1L)
 }
 
 # Refuses the escaped character NUL, but not an escaped backslash before "u0000".
@@ -181,19 +214,27 @@ check_exact <- function(numbers) {
 # Turns an info from JSON into R values. No space describes an info: arrays of plain values of one
 # kind become vectors, arrays of such arrays that have one shape become arrays, the rest stays a
 # list.
-info_from_json <- function(x) {
+info_from_json <- function(x, depth = 0L) {
+  if (depth > deepest_info) {
+    abort_answer(paste("Its info is nested more than", deepest_info, "levels deep"))
+  }
   if (!is.list(x)) {
     if (is_number_word(x)) number_from_json(x) else x
   } else if (!length(x)) {
     x
   } else if (!is.null(names(x))) {
-    lapply(x, info_from_json)
+    lapply(x, info_from_json, depth + 1L)
   } else if (any(vapply(x, is.list, NA))) {
-    stack_rows(lapply(x, info_from_json), x)
+    # Before the call, which would be on the stack at each level otherwise.
+    rows <- lapply(x, info_from_json, depth + 1L)
+    stack_rows(rows, x)
   } else {
     info_vector(x)
   }
 }
+
+# Our server nests it up to 128 levels deep.
+deepest_info <- 160L
 
 is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
 

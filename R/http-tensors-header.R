@@ -23,14 +23,23 @@ known_layout <- function(header, layouts) {
     return(layouts$seen[[known]])
   }
   layout <- read_layout(header)
-  seen <- c(stats::setNames(list(layout), start), layouts$seen)
-  layouts$seen <- utils::head(seen, max_layouts)
+  if (nchar(start, "bytes") <= max_seen_bytes) {
+    seen <- c(stats::setNames(list(layout), start), layouts$seen)
+    layouts$seen <- utils::head(seen, max_layouts)
+  }
   layout
 }
 
 # Enough for the kinds of answer of a few environments. With autoreset mode "SameStep" an answer has
 # the last observations of as many sub-environments as have ended.
 max_layouts <- 256L
+
+# A longer table of tensors is not remembered, so that no server can fill the memory with them.
+max_seen_bytes <- 2^16
+
+# A table may have so many bytes, as in a request to our server: that is room for some ten thousand
+# tensors, which take some seconds to read.
+max_table_bytes <- 2^20
 
 # Marks where the metadata begin: elsewhere, in names and texts, quotes are escaped.
 metadata_key <- ",\"__metadata__\":"
@@ -48,6 +57,9 @@ read_layout <- function(header) {
     table <- paste0(rawToChar(header[seq_len(at - 1L)]), "}")
     header <- header[seq_len(at - 1L + nchar(metadata_key))]
   }
+  if (nchar(table, "bytes") > max_table_bytes) {
+    abort_tensors(paste("the table of tensors is larger than", count_of(max_table_bytes, "byte")))
+  }
   entries <- tryCatch(
     from_json(table),
     error = function(cnd) abort_tensors("the header is no JSON")
@@ -55,14 +67,39 @@ read_layout <- function(header) {
   if (!is.list(entries) || is.null(names(entries)) && length(entries)) {
     abort_tensors("the header is no JSON object")
   }
+  check_entry_names(names(entries))
   tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry)
   list(
     entries = tensors,
     metadata = entries[["__metadata__"]],
-    end = max(0, vapply(tensors, function(entry) entry$begin + entry$size, 0)),
+    end = end_of_tensors(tensors),
     start = header,
     metadata_last = metadata_last
   )
+}
+
+check_entry_names <- function(names) {
+  if (!all(nzchar(names))) {
+    abort_tensors("a tensor has no name")
+  }
+  twice <- anyDuplicated(names)
+  if (twice) {
+    abort_tensors(paste("the header has the name", to_json(names[[twice]]), "twice"))
+  }
+}
+
+# Where the last tensor ends. Tensors that lie over one another would take more memory than the
+# file, so they must fill the data, one after the other.
+end_of_tensors <- function(tensors) {
+  begins <- vapply(tensors, function(entry) as.double(entry$begin), 0)
+  ends <- begins + vapply(tensors, function(entry) as.double(entry$size), 0)
+  in_order <- order(begins, ends)
+  wrong <- match(FALSE, begins[in_order] == c(0, ends[in_order])[seq_along(tensors)])
+  if (!is.na(wrong)) {
+    name <- names(tensors)[[in_order[[wrong]]]]
+    abort_tensors(paste("there is a gap or an overlap before the tensor", to_json(name)))
+  }
+  max(0, ends)
 }
 
 last_metadata <- function(header, layout) {

@@ -21,12 +21,14 @@ read_tensors <- function(bytes, layouts = NULL, expected = NULL, by_column = FAL
   size <- header_size(bytes)
   data <- 8L + size
   header <- bytes[9L:data]
+  check_json_size(header)
   if (any(header == as.raw(0L))) {
     abort_tensors("the header is no JSON")
   }
   layout <- known_layout(header, layouts)
-  if (layout$end > length(bytes) - data) {
-    abort_tensors("an offset lies outside of the file")
+  if (layout$end != length(bytes) - data) {
+    abort_tensors(paste("the tensors have", count_of(layout$end, "byte"), "and the file",
+                        length(bytes) - data))
   }
   place <- if (by_column) place_by_column else place_by_row
   tensors <- read_entries(layout$entries, bytes, data, place)
@@ -46,8 +48,8 @@ read_entries <- function(entries, bytes, data, place) {
     file <- rawConnection(bytes)
     on.exit(close(file))
   }
-  for (name in names(entries)) {
-    entry <- entries[[name]]
+  for (i in seq_along(entries)) {
+    entry <- entries[[i]]
     part <- if (large) {
       seek(file, data + entry$begin)
       readBin(file, "raw", entry$size)
@@ -57,7 +59,7 @@ read_entries <- function(entries, bytes, data, place) {
     } else {
       raw()
     }
-    entries[[name]] <- place(entry$read(part, entry$n), entry$shape)
+    entries[[i]] <- place(entry$read(part, entry$n), entry$shape)
   }
   entries
 }

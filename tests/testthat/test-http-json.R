@@ -95,3 +95,34 @@ test_that("an empty list with names is an object", {
 test_that("a value that JSON has no form for is refused", {
   expect_error(to_json(quote(a)), class = "gym_error_argument")
 })
+
+test_that("what is nested as deeply as honest servers nest it is read, and nothing deeper", {
+  nested <- function(depth, open, close) paste0(strrep(open, depth), 1, strrep(close, depth))
+  refused <- function(expr, levels) {
+    expect_error(
+      expr, paste("nested more than", levels, "levels deep"), class = "gym_error_connection"
+    )
+  }
+  for (form in list(c("[", "]"), c("{\"a\":", "}"), c("[\"]\\\"]\",", "]"))) {
+    text <- function(depth) nested(depth, form[[1L]], form[[2L]])
+    expect_no_error(info_from_json(from_json(text(130L))))
+    expect_no_error(from_json(text(deepest_json)))
+    refused(info_from_json(from_json(text(deepest_json))), "160")
+    refused(from_json(text(deepest_json + 1L)), "320")
+    refused(from_json(text(20000L)), "320")
+  }
+  # Brackets in texts, and beside one another, nest nothing.
+  text <- strrep("[{", 1000)
+  expect_identical(from_json(paste0("[\"", text, "\"]")), list(text))
+  expect_length(from_json(json_array(rep("[1]", 1000))), 1000)
+})
+
+test_that("a space nested too deeply is an error of the answer", {
+  levels <- 159L
+  text <- paste0(strrep('{"name":"Tuple","spaces":[', levels), '{"name":"Discrete","n":2}',
+                 strrep("]}", levels))
+  server <- local_bad_environment()
+  say(server, "/v1/envs/0a1b2c3d/" = list(text = sprintf('{"action_space":%s}', text)))
+  expect_error(env_action_space_info(server, "0a1b2c3d"), "nested too deeply",
+               class = "gym_error_connection")
+})

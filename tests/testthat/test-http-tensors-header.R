@@ -51,3 +51,48 @@ test_that("a header that is no UTF-8 is refused without a warning", {
   file <- c(writeBin(c(length(bytes), 0L), raw(), size = 4L, endian = "little"), bytes)
   expect_no_warning(expect_error(read_tensors(file), class = "gym_error_connection"))
 })
+
+# A header of tensors of one byte each, at these places in the data.
+bytes_at <- function(begins, names = paste0("t", seq_along(begins))) {
+  entries <- sprintf(
+    "\"%s\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[%d,%d]}",
+    names, begins, begins + 1L
+  )
+  paste0("{", paste(entries, collapse = ","), "}")
+}
+
+test_that("tensors fill the data, one after the other", {
+  in_any_order <- read_tensors(file_of(bytes_at(c(1L, 0L)), as.raw(1:2)))$tensors
+  expect_identical(in_any_order, list(t1 = 2L, t2 = 1L))
+  wrong <- list(overlap = c(0L, 0L), gap = c(0L, 2L), start = c(1L, 2L), rest = c(0L, 1L))
+  for (name in names(wrong)) {
+    expect_error(
+      read_tensors(file_of(bytes_at(wrong[[name]]), raw(3))), "gap|overlap|have 2 bytes",
+      class = "gym_error_connection", info = name
+    )
+  }
+  expect_error(
+    read_tensors(file_of(bytes_at(0:1, c("t", "t")), raw(2))), "\"t\" twice",
+    class = "gym_error_connection"
+  )
+  expect_error(
+    read_tensors(file_of(bytes_at(0:1, c("t", "")), raw(2))), "no name",
+    class = "gym_error_connection"
+  )
+})
+
+test_that("neither many tensors nor much metadata take the session's time and memory", {
+  many <- function(n) file_of(bytes_at(seq_len(n) - 1L), raw(n))
+  expect_lt(system.time(read_tensors(many(10000L)))[["elapsed"]], 5)
+  expect_error(read_tensors(many(30000L)), "1,048,576 bytes", class = "gym_error_connection")
+  # What is long is not remembered.
+  layouts <- new.env(parent = emptyenv())
+  read_tensors(many(2000L), layouts)
+  expect_length(layouts$seen, 0)
+  withr::local_options(gym.max_answer_bytes = 2^20)
+  long <- sprintf(",\"__metadata__\":{\"info\":\"%s\"}", strrep(" ", 2^17))
+  expect_error(
+    read_tensors(file_of(header_of(more = long), raw(8))), "larger than 65,536 bytes",
+    class = "gym_error_connection"
+  )
+})
