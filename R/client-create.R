@@ -33,9 +33,9 @@
 #'   several of them joined by [c()]. What [httr::set_config()] has set for the whole session
 #'   at the time of a call holds, too, except for a proxy where the server is on this machine.
 #' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
-#'   default is what the environment variable `GYM_SERVER_TOKEN` holds, so that no script has
-#'   to. It is sent with each call, to this server only, and nothing that is printed and no
-#'   error shows it. A saved client holds it: such a file is as secret as the token.
+#'   default is the server's own token where this session started it, and else what the environment
+#'   variable `GYM_SERVER_TOKEN` holds, so that no script has to. It is sent with each call, to this
+#'   server only, and nothing that is printed and no error shows it. A saved client holds it: such a file is as secret as the token.
 #' @return An object of class `GymClient`, a list with the element
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https
@@ -55,6 +55,7 @@
 #' gym_server_stop(server)
 create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
                              token = Sys.getenv("GYM_SERVER_TOKEN")) {
+  is_default <- missing(token)
   # First, as every later error would show the call.
   token <- as_token(token)
   check_string(remote_base)
@@ -71,6 +72,9 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
   if (!inherits(config, "request")) {
     must <- "made with httr, such as by httr::add_headers()"
     abort_argument(config, must, "config", rlang::current_env())
+  }
+  if (is_default) {
+    token <- known_token(sub("/+$", "", remote_base))
   }
   client <- new_client(remote_base, timeout, config, token)
   client$state$may_prompt <- TRUE
@@ -143,8 +147,11 @@ query_text <- function(data) {
 #'   when the answer is not JSON.
 #' @export
 #' @examplesIf gym:::can_start_server()
-#' response <- httr::GET(paste0(gym_client()$remote_base, "/v1/envs/"))
+#' # One that asks for no token, as httr would have to send it.
+#' server <- gym_server_start(token = FALSE)
+#' response <- httr::GET(paste0(server$remote_base, "/v1/envs/"))
 #' parse_server_error_or_raise_for_status(response)
+#' gym_server_stop(server)
 parse_server_error_or_raise_for_status <- function(response) {
   if (!inherits(response, "response")) {
     abort_argument(response, "an answer of httr's", "response", rlang::current_env())

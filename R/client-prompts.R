@@ -17,10 +17,14 @@ prompt_for_server <- function(client, call = rlang::caller_env()) {
     return(FALSE)
   }
   place <- local_place(base)
-  server <- start_server(place$port, options = list(host = place$host), call = call)
+  # Without a token of its own, as the script's client knows none.
+  server <- start_server(
+    place$port, options = list(host = place$host), token = FALSE, call = call
+  )
   # The script may call the same address by another name, such as localhost.
   the_session$servers[[base]] <- the_session$servers[[server$remote_base]]
-  cli::cli_inform(c(v = "The server at {base} is ready. It stops with this R session."))
+  everybody <- if (is.null(server$token)) ", for any account of this machine"
+  cli::cli_inform(c(v = "The server at {base} is ready{everybody}. It stops with this R session."))
   TRUE
 }
 

@@ -5,7 +5,9 @@
 #' Returns the client that functions take when they are given none. It talks to
 #' the server that the environment variable `GYM_SERVER_URL` names or, without
 #' it, to one on this machine, which is started at the first call and stops with
-#' the session. A server that requires a token is sent the one that `GYM_SERVER_TOKEN` holds.
+#' the session. That one takes calls from this session alone, by a token that nobody else knows (see
+#' [gym_server_start()]); a server that `GYM_SERVER_URL` names is sent the token that
+#' `GYM_SERVER_TOKEN` holds.
 #'
 #' @inheritSection gym_server_start Where there is no Python
 #' @return A client, as [create_GymClient()] makes it.
@@ -40,9 +42,12 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  names <- list(url, Sys.getenv(token_variable))
+  # It may be the address of a server that this session runs.
+  base <- base_of(url)
+  pid <- the_session$servers[[base]]$pid
+  names <- list(url, Sys.getenv(token_variable), pid)
   if (!identical(the_session$named_by, names)) {
-    the_session$named_client <- new_client(url, token = variable_token(call))
+    the_session$named_client <- new_client(url, token = known_token(base, call))
     the_session$named_by <- names
   }
   the_session$named_client

@@ -63,8 +63,13 @@ server_token <- function(options, call = rlang::caller_env()) {
   }
 }
 
+# Whether options, or the variable, say which token a server asks for, or that it asks for none.
+says_token <- function(options) {
+  !is.null(options$token_file) || isTRUE(options$no_auth) || nzchar(Sys.getenv(token_variable))
+}
+
 # The token for an address: that of a server which this session started, else the variable's.
-known_token <- function(base) {
+known_token <- function(base, call = rlang::caller_env()) {
   server <- the_session$servers[[base]]
-  if (is.null(server)) variable_token() else server$token
+  if (is.null(server)) variable_token(call) else server$token
 }

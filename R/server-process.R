@@ -26,9 +26,11 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   if (is.null(process)) {
     return(not_started_reason(python))
   }
-  url <- await_start(process, log, timeout, call)
-  if (!is.null(url)) {
-    return(list(url = url, process = process, python = python, log = log, pid = process$get_pid()))
+  started <- await_start(process, log, timeout, call)
+  if (!is.null(started)) {
+    return(c(
+      started, list(process = process, python = python, log = log, pid = process$get_pid())
+    ))
   }
   lines <- log_tail(log)
   own <- grep(server_line_start, lines, value = TRUE)
@@ -104,10 +106,12 @@ own_library_path <- function() {
   c(LD_LIBRARY_PATH = path)
 }
 
-# Waits for the line by which the server reports that it takes connections. Returns its address,
-# NULL when the process ended first.
+# Waits for the line by which the server reports that it takes connections. Returns a list of its
+# address, `url`, and the `token` of its own that it has told before; NULL when the process ended
+# first.
 await_start <- function(process, log, timeout, call) {
   deadline <- Sys.time() + timeout
+  lines <- character()
   repeat {
     left <- as.numeric(deadline - Sys.time(), units = "secs")
     if (left <= 0) {
@@ -118,18 +122,24 @@ await_start <- function(process, log, timeout, call) {
       )
     }
     process$poll_io(as.integer(ceiling(left * 1000)))
-    lines <- process$read_output_lines()
-    address <- grep("^Server starting at: ", lines, value = TRUE)
-    if (length(address)) {
+    lines <- c(lines, process$read_output_lines())
+    address <- said_after("Server starting at: ", lines)
+    if (!is.null(address)) {
       # A server that listens on all addresses is reached by the loopback address.
-      address <- sub("//0.0.0.0:", "//127.0.0.1:", address[1L], fixed = TRUE)
-      return(sub("^Server starting at: ", "", address))
+      url <- sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)
+      return(list(url = url, token = as_token(said_after("Token: ", lines), call)))
     }
     if (!process$is_incomplete_output()) {
       await_end(process, 5)
       return(NULL)
     }
   }
+}
+
+# What follows a beginning in the first line that has it, NULL where none has.
+said_after <- function(beginning, lines) {
+  line <- lines[startsWith(lines, beginning)]
+  if (length(line)) substring(line[[1L]], nchar(beginning) + 1L)
 }
 
 log_tail <- function(log, n = 20L) {

@@ -40,10 +40,18 @@ is_running <- function(base) {
 #'   environment is evicted, 300, 0 for no limit) and
 #'   `idle_minutes` (until an environment that nobody uses or watches is evicted, 1,440,
 #'   0 for never). `token_file = "token"` names a file with a token of 16
-#'   characters or more, which every call must then carry; the client that is returned does.
+#'   characters or more, which every call must then carry in place of the server's own one.
 #'   What else a server for a group takes (`isolate`, `max_worker_mb`, `allow_host`, `allow_path`,
 #'   `no_auth`, `no_shutdown`) is described in `vignette("server", package = "gym")`.
 #' @param timeout How long the start may take, in seconds; the default is 60.
+#' @param token Whether the server asks for a token of its own, `TRUE` or `FALSE`. It makes one at
+#'   its start and tells it to this session alone, so that no other account of the machine can use it: the client
+#'   that is returned carries the token, and so does each one that [create_GymClient()] makes for
+#'   the server's address in this session. Other processes, such as another R session or clients
+#'   in other languages, need a token that they know, or `FALSE`. The default is `TRUE` for a server
+#'   without `port`, and `FALSE` for one with a port, whose address scripts name: any account of the
+#'   machine can use that one, which is said in a message of class `gym_message_open_server`. What
+#'   `token_file`, `no_auth = TRUE` or the environment variable `GYM_SERVER_TOKEN` say comes first.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own message: no
 #'   Python can run it, the port is taken, it did not start in time; `gym_error_install`
@@ -55,26 +63,53 @@ is_running <- function(base) {
 #' server <- gym_server_start()
 #' env_list_all(server)
 #' gym_server_stop(server)
-gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60) {
+gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
+                             token = is.null(port)) {
+  # First, as every later error would show the call.
+  check_own_token(token)
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
-  start_server(port, python, list(...), timeout)
+  options <- list(...)
+  client <- start_server(port, python, options, timeout, token)
+  if (missing(token) && is.null(client$token) && !isTRUE(options$no_auth)) {
+    cli::cli_inform(
+      c(i = paste("The server at {client$remote_base} asks for no token: any account of this",
+                  "machine can use it.")),
+      class = "gym_message_open_server"
+    )
+  }
+  client
+}
+
+check_own_token <- function(token, call = rlang::caller_env()) {
+  hide_token(token)
+  if (!is_flag(token)) {
+    gym_abort(
+      c(
+        "`token` must be `TRUE` or `FALSE`.",
+        i = paste0("`token_file = ` names a file that holds a token of yours, and the environment ",
+                   "variable ", token_variable, " may hold it.")
+      ),
+      class = "gym_error_argument", argument = "token", call = call
+    )
+  }
 }
 
 #' Start a server with the first Python that can run it
+#' @param token Whether it asks for a token of its own, unless there is another one.
 #' @param install Whether a Python environment may be installed, after a question or as
 #'   `GYM_INSTALL` says, when no Python can run the server.
 #' @return A client for the server.
 #' @noRd
-start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60,
+start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60, token = TRUE,
                          install = TRUE, call = rlang::caller_env()) {
   if (rlang::is_string(options$token_file)) {
     options$token_file <- path.expand(options$token_file)
   }
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
-    server_options(options, call)
+    if (token && !says_token(options)) "--own-token", server_options(options, call)
   )
   refusals <- character()
   # Launches the server with the first Python that can run it. Returns NULL when none can.
@@ -82,7 +117,7 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     for (candidate in pythons) {
       server <- launch_server(candidate, arguments, timeout, call)
       if (is.list(server)) {
-        server$token <- server_token(options, call)
+        server$token <- server$token %||% server_token(options, call)
         return(register_server(server))
       }
       refusals[[candidate]] <<- server

@@ -57,9 +57,7 @@ measure_task <- function(setup, task, turns = 3L) {
   apply(each, 1L, stats::median)
 }
 
-client_health <- function(client) {
-  jsonlite::fromJSON(paste0(client$remote_base, "/v1/health/"))
-}
+client_health <- function(client) get_request(client, "/v1/health/")
 
 wanted <- commandArgs(trailingOnly = TRUE)
 chosen <- if (length(wanted)) tasks[wanted] else tasks

@@ -67,7 +67,7 @@ medians <- function(episode) apply(replicate(episodes, episode()), 1L, stats::me
 profile <- function() {
   python <- Sys.getenv("GYM_PYTHON")
   worker <- start_worker(python, "tools/bench/profile_server.py")
-  client <- gym_server_start(python = python)
+  client <- gym_server_start(python = python, token = FALSE)
   on.exit({
     end_worker(worker)
     gym_server_stop(client)

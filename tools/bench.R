@@ -61,7 +61,7 @@ bench <- function(parts, quick) {
 set_up <- function(python) {
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
   list(
-    client = gym_server_start(python = python),
+    client = gym_server_start(python = python, token = FALSE),
     development = start_development_server(python),
     python = start_python(python),
     reticulate = lapply(c(list(NULL), numpy_1), start_reticulate, python = python)

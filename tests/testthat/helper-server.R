@@ -99,8 +99,11 @@ say <- function(client, ...) {
 local_cut_client <- function(server, when, pattern, times = 1, frame = parent.frame()) {
   port <- sub(".*:", "", server$remote_base)
   proxy <- local_python_server("cutting_proxy.py", port, when, pattern, times, frame = frame)
-  create_GymClient(proxy, timeout = 10)
+  create_GymClient(proxy, timeout = 10, token = token_of(server))
 }
+
+# For another address of a server, or another process.
+token_of <- function(client) if (!is.null(client$token)) client$token()
 
 # A port on which nobody listens.
 free_port <- function() {
@@ -139,7 +142,8 @@ run_session <- function(server, ..., timeout = 60) {
     ...
   ))
   processx::run(
-    file.path(R.home("bin"), "Rscript"), script, timeout = timeout, error_on_status = FALSE
+    file.path(R.home("bin"), "Rscript"), script, timeout = timeout, error_on_status = FALSE,
+    env = c("current", GYM_SERVER_TOKEN = token_of(server) %||% "")
   )
 }
 

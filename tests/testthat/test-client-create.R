@@ -36,7 +36,7 @@ test_that("a server that stops in the middle is an error, one that is back is us
   env_reset(server, id)
   gym_server_stop(server)
   expect_error(env_step(server, id, 1), class = "gym_error_connection")
-  again <- local_server(port = port)
+  again <- suppressMessages(local_server(port = port))
   expect_identical(again$remote_base, server$remote_base)
   expect_error(env_step(server, id, 1), "unknown", class = "gym_error_http_400")
   expect_length(env_reset(server, env_create(server, "CartPole-v1")), 4)
@@ -411,7 +411,7 @@ test_that("classic requests go to any route", {
 })
 
 test_that("an answer of httr's is read or raised", {
-  base <- test_client()$remote_base
+  base <- local_server(token = FALSE)$remote_base
   answer <- parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/health/")))
   expect_equal(answer$status, "ok")
   expect_error(

@@ -26,7 +26,8 @@ local_cutter <- function(server, frame = parent.frame()) {
   }
   port <- read()
   list(
-    client = create_GymClient(paste0("http://127.0.0.1:", port), timeout = 20),
+    client = create_GymClient(paste0("http://127.0.0.1:", port), timeout = 20,
+                              token = token_of(server)),
     tell = function(...) {
       proxy$write_input(paste0(paste(...), "\n"))
       read()

@@ -12,7 +12,12 @@ local_viewer <- function(frame = parent.frame()) {
   seen
 }
 
-be_there <- function(address) curl::curl_fetch_memory(paste0(address, "presence/"))
+be_there <- function(address) curl::curl_fetch_memory(below(address, "presence/"))
+
+# An address below a page's, with the page's key.
+below <- function(address, path) sub("?", paste0(path, "?"), address, fixed = TRUE)
+
+without_key <- function(address) sub("[?]key=[A-Za-z0-9_-]+$", "", address)
 
 # The page, as a browser asks for it.
 fetch_page <- function(address) {
@@ -26,10 +31,10 @@ test_that("env_watch() gives the address of a page", {
   env <- local_env()
   address <- expect_invisible(env_watch(env$client, env$instance_id))
   expect_identical(
-    address, paste0(env$client$remote_base, "/v1/envs/", env$instance_id, "/watch/")
+    without_key(address), paste0(env$client$remote_base, "/v1/envs/", env$instance_id, "/watch/")
   )
-  expect_identical(env$watch(), address)
-  expect_identical(seen$addresses, rep(address, 2))
+  expect_identical(without_key(env$watch()), without_key(address))
+  expect_identical(without_key(seen$addresses), rep(without_key(address), 2))
   page <- fetch_page(address)
   expect_identical(page$status_code, 200L)
   expect_match(page$type, "text/html")
@@ -74,7 +79,8 @@ test_that("a script prints the address, once an environment", {
   expect_message(env <- local_env(render_mode = "human"), class = "gym_message_watch")
   env$reset()
   expect_no_message(env_step(env$client, env$instance_id, 1, render = TRUE))
-  expect_message(env$watch(), "Watch CartPole-v1 at http.*/watch/$", class = "gym_message_watch")
+  expect_message(env$watch(), "Watch CartPole-v1 at http.*/watch/[?]key=[^/ ]+$",
+                 class = "gym_message_watch")
 })
 
 test_that("an interactive session opens the pane where there is one, else the browser", {
@@ -130,7 +136,7 @@ test_that("the call knows when the page is there", {
   asked <- 0
   withr::local_options(gym.viewer = function(address) {
     # What the page does first.
-    get_request(client, sub(client$remote_base, "", paste0(address, "state/"), fixed = TRUE))
+    get_request(client, sub(client$remote_base, "", below(address, "state/"), fixed = TRUE))
     asked <<- asked + 1
   })
   env <- local_env(client = client)

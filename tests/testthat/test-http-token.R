@@ -25,6 +25,60 @@ test_that("a server that asks for a token gets it from the client that was retur
   expect_identical(get_request(server, "/v1/health/")$status, "ok")
 })
 
+test_that("the session's server is this session's alone", {
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  client <- test_client()
+  token <- client$token()
+  expect_gte(nchar(token), 32)
+  for (other in list(NULL, token_text)) {
+    stranger <- create_GymClient(client$remote_base, token = other)
+    expect_error(env_list_all(stranger), class = "gym_error_http_401")
+    expect_error(env_create(stranger, "CartPole-v1"), class = "gym_error_http_401")
+    expect_error(shutdown_server(stranger), class = "gym_error_http_401")
+  }
+  # Within the session nobody needs to know.
+  expect_type(env_list_all(create_GymClient(paste0(client$remote_base, "/"))), "list")
+  withr::local_envvar(GYM_SERVER_URL = client$remote_base)
+  expect_type(env_list_all(gym_client()), "list")
+  seen <- c(capture.output(client, the_session$servers), gym_server_log(client))
+  expect_false(any(grepl(token, seen, fixed = TRUE)))
+  command_line <- file.path("/proc", the_session$servers[[client$remote_base]]$pid, "cmdline")
+  skip_if_not(file.exists(command_line))
+  command_line <- readBin(command_line, "raw", 1e5)
+  expect_length(grepRaw("--own-token", command_line, fixed = TRUE), 1)
+  expect_length(grepRaw(token, command_line, fixed = TRUE), 0)
+})
+
+test_that("each server has another token, which is not drawn from R's generator", {
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  set.seed(1)
+  before <- .Random.seed
+  expect_silent(server <- local_server())
+  expect_identical(.Random.seed, before)
+  expect_false(identical(server$token(), test_client()$token()))
+})
+
+test_that("a server on a port that was asked for is open, and says so", {
+  skip_if_no_server()
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  is_open <- function(server) {
+    tryCatch(
+      is.list(env_list_all(create_GymClient(server$remote_base, token = NULL))),
+      gym_error_http_401 = function(cnd) FALSE
+    )
+  }
+  expect_message(server <- local_server(port = free_port()), class = "gym_message_open_server")
+  expect_true(is_open(server))
+  expect_silent(server <- local_server(port = free_port(), token = TRUE))
+  expect_false(is_open(server))
+  expect_silent(server <- local_server(token = FALSE))
+  expect_true(is_open(server))
+  error <- expect_error(gym_server_start(token = "correct-horse-battery-staple"),
+                        class = "gym_error_argument")
+  expect_match(conditionMessage(error), "token_file")
+  expect_hidden(error)
+})
+
 test_that("without it, or with another, the error is a 401 that says what helps", {
   server <- local_locked_server()
   withr::local_envvar(GYM_SERVER_TOKEN = NA)
@@ -42,6 +96,8 @@ test_that("without it, or with another, the error is a 401 that says what helps"
 
 test_that("the variable is the token of every client", {
   server <- local_locked_server()
+  # As if another session had started it.
+  local_session(servers = list())
   withr::local_envvar(GYM_SERVER_TOKEN = token_text, GYM_SERVER_URL = server$remote_base)
   expect_length(env_list_all(create_GymClient(server$remote_base)), 0)
   expect_length(env_list_all(gym_client()), 0)

@@ -35,7 +35,7 @@ test_that("it is found out who listens", {
 
   server <- local_server()
   id <- env_create(server, "CartPole-v1")
-  gym <- probe_server(server$remote_base, timeout = 5)
+  gym <- probe_server(server$remote_base, timeout = 5, known_token(server$remote_base))
   expect_true(gym$listens && gym$is_gym)
   expect_identical(gym$instances, 1L)
 

@@ -44,7 +44,7 @@ test_that("without a Python the report names the call that fixes it", {
 })
 
 test_that("a session that plays on another machine needs no Python", {
-  url <- test_client()$remote_base
+  url <- local_server(token = FALSE)$remote_base
   report(runs = FALSE, reason = "No module named 'flask'")
   withr::local_envvar(GYM_SERVER_URL = url)
   seen <- sitrep()

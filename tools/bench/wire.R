@@ -7,8 +7,8 @@ wire_names <- c(
 )
 
 compare_steps <- function(python, turns, steps) {
-  client <- gym_server_start(python = python)
-  isolated <- gym_server_start(python = python, isolate = "all")
+  client <- gym_server_start(python = python, token = FALSE)
+  isolated <- gym_server_start(python = python, token = FALSE, isolate = "all")
   recorder <- start_recorder(python, client)
   on.exit({
     end_worker(recorder)

@@ -121,6 +121,10 @@ class ServerProcess:
             text=True,
         )
         self.first_line = self.process.stdout.readline()
+        self.token = None
+        if self.first_line.startswith("Token: "):
+            self.token = self.first_line.removeprefix("Token: ").strip()
+            self.first_line = self.process.stdout.readline()
         self.port = int(self.first_line.rsplit(":", 1)[1]) if self.first_line else None
 
     def connect(self):

@@ -69,12 +69,35 @@ def test_no_auth_says_that_the_variable_is_not_meant(serve):
     assert ask(serve("--no-auth", GYM_SERVER_TOKEN=TOKEN), token=None)[0] == 200
 
 
+def test_a_token_of_its_own_is_told_to_who_started_the_server_and_serves_one_user(serve, tmp_path):
+    server = serve("--own-token", GYM_SERVER_TOKEN=TOKEN)
+    assert len(server.token) >= 32
+    assert ask(server, token=server.token)[0] == 200
+    assert ask(server, token=None)[0] == ask(server, token=TOKEN)[0] == 401
+    assert ask(server, "POST", "/v1/shutdown/", token=None)[0] == 401
+    # It is that user's own machine: monitors may write to any temporary folder.
+    made = ask(server, "POST", "/v1/envs/", {"env_id": "CartPole-v1"}, server.token)[1]
+    start = f"/v1/envs/{made['instance_id']}/monitor/start/"
+    monitor = {"directory": str(tmp_path / "monitor"), "force": False}
+    assert ask(server, "POST", start, monitor, server.token)[0] in (200, 204)
+    other = serve("--own-token")
+    assert other.token != server.token
+    _, output, errors = server.stop()
+    assert server.token not in output + errors
+
+
+def test_a_token_of_its_own_is_nothing_for_others(capsys):
+    assert main.main(["--port", "0", "--own-token", "--host", "0.0.0.0"]) == 1
+    assert "--token-file" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
         ("short", [], "16 to 1,024"),
         ("", [], "16 to 1,024"),
         (TOKEN, ["--no-auth"], "exclude each other"),
+        (TOKEN, ["--own-token"], "exclude each other"),
         (None, [], "cannot be read"),
     ],
 )

@@ -22,7 +22,7 @@ from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.own_log import keep_short
 from gym_server.cli.port_holder import port_holder
-from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
+from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token, new_token
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
 from gym_server.processes import memory, start
@@ -62,8 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(fault))
     except OSError as error:
         return _fail(f"the file {options.token_file} cannot be read: {error.strerror or error}")
-    is_private = is_loopback(options.host) and token is None
-    if not is_loopback(options.host) and token is None and not options.no_auth:
+    of_one_user = token is None or options.own_token
+    is_private = is_loopback(options.host) and of_one_user
+    if not is_loopback(options.host) and of_one_user and not options.no_auth:
         return _fail(
             f"--host {options.host} lets anybody on the network run environments on this machine "
             f"and write files; give --token-file FILE or the variable {VARIABLE}, or --no-auth if "
@@ -120,6 +121,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.own_log is not None:
         threading.Thread(target=keep_short, args=(options.own_log,), daemon=True).start()
     memory.prepare()
+    if options.own_token:
+        print(f"Token: {token}", flush=True)
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
     # From here on standard output goes where standard error goes: what environments print must not
     # fill a pipe that is not read.
@@ -129,9 +132,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _find_token(options: argparse.Namespace) -> str | None:
-    if options.no_auth and options.token_file is not None:
-        raise BadTokenError("--no-auth and --token-file exclude each other")
+    if options.no_auth + options.own_token + (options.token_file is not None) > 1:
+        raise BadTokenError("--no-auth, --own-token and --token-file exclude each other")
     token = find_token(options.token_file, os.environ)
+    if options.own_token:
+        return new_token()
     return None if options.no_auth else token
 
 

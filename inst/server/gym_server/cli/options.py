@@ -193,6 +193,12 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         f"this option the variable {VARIABLE} may hold it",
     )
     options.add_argument(
+        "--own-token",
+        action="store_true",
+        help="make a token, and print it before the address: for one user, to whom nothing of "
+        "what this server can do is forbidden",
+    )
+    options.add_argument(
         "--no-auth",
         action="store_true",
         help="serve everybody without a token, also on a --host that others can reach",
