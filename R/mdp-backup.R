@@ -36,13 +36,30 @@ backup_of <- function(model, call) {
   expected <- rowSums(rewards)
   # Rewards that cancel out leave nothing but rounding.
   expected[abs(expected) <= 4 * .Machine$double.eps * rowSums(abs(rewards))] <- 0
-  list(
+  with_flow(list(
     states = states, actions = actions,
     next_state = filled(state_rows(model, table$next_state), 1L),
     probability = probability, terminated = filled(table$terminated, TRUE),
     weight = filled(table$probability * !table$terminated),
     expected = expected, possible = seq_len(shape[[1L]]) %in% row
-  )
+  ))
+}
+
+# Up to so many states moves are kept in a full matrix: loading the package Matrix takes longer
+# than computing with such a matrix.
+full_states <- 500L
+
+# Where there are many states, sweeps are quicker with the weights in one sparse matrix.
+with_flow <- function(backup) {
+  if (backup$states > full_states) {
+    used <- which(backup$weight > 0)
+    rows <- nrow(backup$weight)
+    backup$flow <- Matrix::sparseMatrix(
+      i = (used - 1L) %% rows + 1L, j = backup$next_state[used], x = backup$weight[used],
+      dims = c(rows, backup$states)
+    )
+  }
+  backup
 }
 
 # The most numbers in a table: 0.8 GB, and several such tables are needed.
@@ -71,11 +88,15 @@ pair_rows <- function(model, row, action) {
 # The value of each action in each state, a matrix, given the value of each state: Bellman's
 # equation. Actions that cannot be taken have -Inf.
 action_values <- function(backup, values, discount) {
-  ahead <- values[backup$next_state]
-  # Where nothing leads an infinite value counts nothing.
-  if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
-  ahead <- backup$weight * ahead
-  q <- backup$expected + discount * .rowSums(ahead, nrow(backup$weight), ncol(backup$weight))
+  if (is.null(backup$flow)) {
+    ahead <- values[backup$next_state]
+    # Where nothing leads an infinite value counts nothing.
+    if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
+    ahead <- .rowSums(backup$weight * ahead, nrow(backup$weight), ncol(backup$weight))
+  } else {
+    ahead <- times(backup$flow, values)
+  }
+  q <- backup$expected + discount * ahead
   q[!backup$possible] <- -Inf
   dim(q) <- c(backup$states, backup$actions)
   q
@@ -93,10 +114,6 @@ mean_values <- function(q, probabilities) {
   q[probabilities == 0] <- 0
   .rowSums(q * probabilities, nrow(q), ncol(q))
 }
-
-# Up to so many states a policy's moves are a full matrix: loading the package Matrix takes longer
-# than such a matrix costs.
-full_states <- 500L
 
 #' How a policy moves from state to state
 #'

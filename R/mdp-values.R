@@ -144,37 +144,45 @@ chain_solver <- function(weight, call) {
 
 #' Apply a policy's equations until the values stay
 #'
-#' Where after k sweeps from 0 no value grows by more than a share e of itself, none grows by more
-#' than a share of about 2 k e in the k sweeps that follow, and so on: this is how far off they are
-#' at most.
+#' How far off they are at most is known in two ways. Where after k sweeps from 0 no value grows by
+#' more than a share e of itself, none grows by more than a share of about 2 k e in the k sweeps
+#' that follow, and so on. And what is still to come lies between the least and the greatest growth
+#' times the steps that are still to go, for which the middle is taken (MacQueen 1966, A modified
+#' dynamic programming method for Markovian decision problems).
 #' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
 #' @noRd
-swept_values <- function(weight, rewards, most = 5000L, every = 200L, enough = 1e-15) {
+swept_values <- function(weight, rewards, enough = 1e-15) {
+  most <- if (is.matrix(weight)) 100L else 500L
+  every <- 25L
+  goes_on <- range(times(weight, rep(1, length(rewards))))
+  to_go <- goes_on / (1 - goes_on)
+  rounding <- 4 * .Machine$double.eps / (1 - goes_on[[2L]])
+  bounded <- rounding > 0 && rounding < tie_tolerance
   values <- rewards
   before <- Inf
   for (sweep in seq_len(most)) {
     new <- rewards + as.vector(weight %*% values)
-    growth <- max((new - values) / pmax(new, .Machine$double.xmin))
+    growth <- new - values
     values <- new
-    if (growth <= enough) {
+    if (bounded) {
+      to_come <- to_go * range(growth)
+      if (diff(to_come) <= max(sweep_tolerance, rounding) * min(values)) {
+        return(values + mean(to_come))
+      }
+    }
+    share <- max(growth / pmax(values, .Machine$double.xmin))
+    if (share <= enough) {
       return(values)
     }
     if (sweep %% every == 0L) {
-      # How many more sweeps it takes when growth shrinks as it did.
-      if (growth >= before || every * log(enough / growth) / log(growth / before) > most - sweep) {
+      # How many more sweeps it takes when growth goes down as it did.
+      if (share >= before || every * log(enough / share) / log(share / before) > most - sweep) {
         break
       }
-      before <- growth
+      before <- share
     }
   }
   NULL
-}
-
-new_solver <- function(weight, call) {
-  tryCatch(
-    if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight),
-    error = function(e) abort_unsolved(nrow(weight), call)
-  )
 }
 
 solved_values <- function(weight, rewards, solver, call) {
@@ -189,6 +197,13 @@ solved_values <- function(weight, rewards, solver, call) {
     values <- pmax(values + solver(left), 0)
   }
   values
+}
+
+new_solver <- function(weight, call) {
+  tryCatch(
+    if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight),
+    error = function(e) abort_unsolved(nrow(weight), call)
+  )
 }
 
 full_solver <- function(weight) {
@@ -355,6 +370,7 @@ with_rest <- function(backup) {
   rested$possible <- c(backup$possible, rest$states)
   ending <- surely_ending(rested, possible_of(rested))
   rested$possible <- as.vector(ending$allowed)
+  rested <- with_flow(rested)
   leaves <- rowSums(possible_of(backup)) > 0
   list(backup = rested, stays = rest$actions, hopeless = !ending$states & leaves)
 }

@@ -330,7 +330,8 @@ test_that("what no memory holds is refused, with its number", {
     state = 0, action = 0, next_state = c(1:299, 4e5), probability = 1 / 300, reward = 0
   )
   model <- gym_model(wide, start = 0)
-  expect_error(solve_mdp(model), "takes tables of 120,000,300 numbers", class = "gym_error_argument")
+  expect_error(solve_mdp(model), "takes tables of 120,000,300 numbers",
+               class = "gym_error_argument")
   expect_error(solve_mdp(walk_model(), horizon = 1e8), "400,000,000 numbers",
                class = "gym_error_argument")
 })
