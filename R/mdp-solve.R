@@ -21,12 +21,17 @@
 #' # Methods
 #'
 #' Value iteration applies Bellman's equation to all states at once until the values no longer
-#' change; then, or after 20,000 sweeps, the linear equations of the best policy are solved. Policy
-#' iteration solves those of a policy, improves it, and so on. Without a discount a state that can
+#' change, or 20,000 times; then policy iteration goes on from the policy that it found, and mostly
+#' confirms it. Policy iteration calculates the values of a policy, improves it, and so on; the
+#' values of a policy are found by sweeps where few are enough, and otherwise by solving its linear
+#' equations, which are sparse from 500 states on. Without a discount a state that can
 #' stay for ever where no reward comes is worth at least 0, and one from which no policy comes to an
-#' end for sure is worth `-Inf`. Where several actions are worth the same, which is common with a
-#' discount of 1, some may lead in circles for ever; those are taken that end episodes in the fewest
-#' steps.
+#' end for sure is worth `-Inf`.
+#'
+#' Differences count whatever the size of the rewards: actions are worth the same where their values
+#' differ by less than 1e-12 of their own size, which is that of the rewards that they add up. Where
+#' several actions are worth the same, which is common with a discount of 1, some may lead in
+#' circles for ever; those are taken that end episodes in the fewest steps.
 #'
 #' @param model A model, see [gym_model()], or an environment that has one, as for [env_model()].
 #' @param policy The policy to value: a [policy_table()], [policy_random()], or another policy that
@@ -63,7 +68,8 @@
 #'   }
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a model
 #'   whose values have no end: one without an end, or one in which rewards go on for ever, and
-#'   neither a discount below 1 nor a horizon.
+#'   neither a discount below 1 nor a horizon; or one that is too large for the memory, in states
+#'   times actions times transitions of each.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press, chapter 4.
 #' @seealso [evaluate_policy()][evaluate_policy.gym_model()], which judges several policies by a

@@ -135,80 +135,83 @@ chain_solver <- function(weight, call) {
       return(rewards)
     }
     swept <- if (length(rewards) > unswept_states) swept_values(weight, rewards)
-    if (is.null(swept)) {
-      solver <<- solver %||% new_solver(weight, call)
+    if (!is.null(swept)) {
+      return(swept)
     }
-    swept %||% solved_values(weight, rewards, solver, call)
+    tryCatch({
+      solver <<- solver %||% if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight)
+      solved_values(weight, rewards, solver)
+    }, error = function(e) abort_unsolved(length(rewards), call))
   }
 }
 
 #' Apply a policy's equations until the values stay
 #'
-#' How far off they are at most is known in two ways. Where after k sweeps from 0 no value grows by
-#' more than a share e of itself, none grows by more than a share of about 2 k e in the k sweeps
-#' that follow, and so on. And what is still to come lies between the least and the greatest growth
-#' times the steps that are still to go, for which the middle is taken (MacQueen 1966, A modified
-#' dynamic programming method for Markovian decision problems).
+#' Where after k sweeps from 0 no value grows by more than a share e of itself, none grows by more
+#' than a share of about 2 k e in the k sweeps that follow, and so on: this is how far off they are
+#' at most. Or the bounds of what is still to come are close to each other, which is often sooner.
 #' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
 #' @noRd
 swept_values <- function(weight, rewards, enough = 1e-15) {
-  most <- if (is.matrix(weight)) 100L else 500L
+  most <- if (is.matrix(weight)) 150L else 500L
   every <- 25L
-  goes_on <- range(times(weight, rep(1, length(rewards))))
-  to_go <- goes_on / (1 - goes_on)
-  rounding <- 4 * .Machine$double.eps / (1 - goes_on[[2L]])
-  bounded <- rounding > 0 && rounding < tie_tolerance
+  bounded <- growth_bounds(weight)
   values <- rewards
   before <- Inf
   for (sweep in seq_len(most)) {
     new <- rewards + as.vector(weight %*% values)
     growth <- new - values
     values <- new
-    if (bounded) {
-      to_come <- to_go * range(growth)
-      if (diff(to_come) <= max(sweep_tolerance, rounding) * min(values)) {
-        return(values + mean(to_come))
-      }
-    }
     share <- max(growth / pmax(values, .Machine$double.xmin))
-    if (share <= enough) {
-      return(values)
+    final <- if (share <= enough) values else bounded(values, growth)
+    if (!is.null(final)) {
+      return(final)
     }
     if (sweep %% every == 0L) {
       # How many more sweeps it takes when growth goes down as it did.
       if (share >= before || every * log(enough / share) / log(share / before) > most - sweep) {
-        break
+        return(NULL)
       }
       before <- share
     }
   }
-  NULL
 }
 
-solved_values <- function(weight, rewards, solver, call) {
+#' Prepare to judge values by how they grew in a sweep
+#'
+#' What is still to come lies between the least and the greatest growth times the steps that are
+#' still to go (MacQueen 1966, A modified dynamic programming method for Markovian decision
+#' problems).
+#' @return A function of values and their growth that returns the values with the middle of these
+#'   bounds added, or `NULL` where they are too far from each other.
+#' @noRd
+growth_bounds <- function(weight) {
+  goes_on <- range(times(weight, rep(1, nrow(weight))))
+  to_go <- goes_on / (1 - goes_on)
+  rounding <- 8 * .Machine$double.eps / (1 - goes_on[[2L]])
+  if (goes_on[[2L]] >= 1 || rounding >= tie_tolerance) {
+    return(function(values, growth) NULL)
+  }
+  function(values, growth) {
+    to_come <- to_go * range(growth)
+    if (diff(to_come) <= max(sweep_tolerance, rounding) * min(values)) values + mean(to_come)
+  }
+}
+
+solved_values <- function(weight, rewards, solver) {
   values <- solver(rewards)
   # What solving left over is solved again, until it is only rounding in every single state.
   for (round in 1:3) {
     left <- rewards + times(weight, values) - values
-    if (!all(is.finite(left))) {
-      abort_unsolved(length(rewards), call)
-    }
-    if (all(abs(left) <= 4 * .Machine$double.eps * values)) break
+    if (all(abs(left) <= 8 * .Machine$double.eps * values)) break
     values <- pmax(values + solver(left), 0)
   }
   values
 }
 
-new_solver <- function(weight, call) {
-  tryCatch(
-    if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight),
-    error = function(e) abort_unsolved(nrow(weight), call)
-  )
-}
-
 full_solver <- function(weight) {
-  inverse <- solve(diag(nrow(weight)) - weight, tol = 0)
-  function(rewards) times(inverse, rewards)
+  equations <- diag(nrow(weight)) - weight
+  function(rewards) solve(equations, rewards, tol = 0)
 }
 
 sparse_solver <- function(weight) {
