@@ -29,6 +29,16 @@ look_at_environment <- function(check, seed) {
   look_at_render(check, seed)
 }
 
+#' Look whether an environment that has a model plays as that says
+#'
+#' @param env The environment itself.
+#' @param seed Episodes are played with seeds above it.
+#' @noRd
+look_at_model <- function(env, check, seed) UseMethod("look_at_model")
+
+#' @exportS3Method
+look_at_model.default <- function(env, check, seed) NULL
+
 # The generators of two episodes with different seeds can only come to the same state when somebody
 # sets it.
 look_at_draws <- function(check, states, others) {

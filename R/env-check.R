@@ -10,6 +10,11 @@
 #' with the same actions, which must give the same again, bit for bit. All sub-environments of a
 #' vector environment are looked at together, until the first of them ends.
 #'
+#' Where nothing is wrong with an environment made by `gym_env(model = )`, its model is compared
+#' with some 1000 further steps: where play starts, where it leads, for which reward, and whether
+#' the episode ends there must be possible by the model, and what is likely by the model must be
+#' seen.
+#'
 #' @param env The environment: one that was made by [gym_env()], a class that inherits from
 #'   [GymEnv], or [gym_make()]; any list or environment with functions `reset(seed)` and
 #'   `step(action)`; or an id such as `"CartPole-v1"`, perhaps with wrappers (see [gym_wrap()]).
@@ -23,7 +28,7 @@
 #'   each finding, none for an environment in which nothing was found, and the columns
 #'   \describe{
 #'     \item{topic}{What was looked at, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`,
-#'       `"end"` or `"render"`.}
+#'       `"end"`, `"render"` or `"model"`.}
 #'     \item{severity}{`"wrong"` for what is a mistake, `"note"` for what may be meant.}
 #'     \item{finding}{What was found, a sentence.}
 #'   }
@@ -65,7 +70,10 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
   }
-  keep_random_state(look_at_environment(check, seed))
+  keep_random_state({
+    look_at_environment(check, seed)
+    look_at_model(env, check, seed + 1)
+  })
   new_check(check)
 }
 

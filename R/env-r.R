@@ -49,7 +49,8 @@
 #'   sub-environments this object has, 256 unless it is given.
 #' @param model The environment's [model][gym_model()], for [env_model()], the table of its
 #'   transitions, or a function of the environment that returns one of them; `NULL`, the default,
-#'   for an environment that has none.
+#'   for an environment that has none. A table does not say where episodes start: that is taken
+#'   from `reset`, exactly where it draws nothing, and from 1000 resets where it draws.
 #' @param id What the environment is called in messages and titles, a string.
 #' @param max_episode_steps After how many steps an episode is cut off, a whole number; `NULL`, the
 #'   default, for never.

@@ -81,12 +81,49 @@ model_of_env.gym_r_env <- function(env, call) {
   if (is.null(model)) {
     abort_without_model(env, call)
   }
-  if (is.data.frame(model)) {
+  is_table <- is.data.frame(model)
+  if (is_table) {
     model <- gym_model(model)
   }
   check_fits_env(model, env, call)
+  if (is_table) {
+    model$start <- starts_of(env, model, call)
+  }
   model$spec <- env$spec[c("id", "reward_threshold", "max_episode_steps")]
   model
+}
+
+# How many resets show where episodes start that `reset()` draws.
+most_resets <- 1000L
+
+# How likely each state of a model is the first one, as `reset()` of its environment has it. What is
+# reset is another sub-environment.
+starts_of <- function(env, model, call) {
+  definition <- definition_of(env)
+  sub_env <- definition_sub_env(definition, if (definition$vectorized) most_resets)
+  reset <- function(seed = NULL) as.double(reset_sub_env(sub_env, seed, call = call))
+  first <- reset(1)
+  draws <- !identical(sub_env$generator$state, new_generator(1)$state)
+  more <- if (draws && !definition$vectorized) seq_len(most_resets - 1L)
+  seen <- c(first, unlist(lapply(more, function(again) reset())))
+  states <- state_numbers(model$observation_space)
+  stuck <- setdiff(seen, model$transitions$state)
+  if (length(stuck)) {
+    gym_abort(
+      paste0("`reset()` of ", environment_label(env), " starts in state ", stuck[[1L]],
+             ", but no row of the model leaves that."),
+      class = "gym_error_argument", argument = "model", value = model, call = call
+    )
+  }
+  count <- length(unique(seen))
+  if (count > 1L) {
+    cli::cli_inform(
+      c(i = "{count} states start episodes of the model, as often as {length(seen)} resets did.",
+        " " = "`gym_model(start = )` names their probabilities."),
+      class = "gym_message_model"
+    )
+  }
+  stats::setNames(tabulate(match(seen, states), length(states)) / length(seen), states)
 }
 
 abort_without_model <- function(env, call) {

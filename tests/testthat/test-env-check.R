@@ -332,3 +332,46 @@ test_that("an environment that sets a seed of its own is found", {
   }))
   expect_match(seeded_reset$finding, "^`reset\\(\\)` sets the state", all = FALSE)
 })
+
+# A walk with a model, which is true where nothing else is given.
+modelled <- function(model, reset = function(self) self$at <- 1, slips = 0, ends = c(0, 3)) {
+  gym_env(
+    reset,
+    function(self, action) {
+      right <- xor(action == 1, runif(1) < slips)
+      self$at <- max(self$at + if (right) 1 else -1, 0)
+      list(observation = self$at, reward = as.numeric(self$at == 3), terminated = self$at %in% ends)
+    },
+    observation_space = space_discrete(4), action_space = space_discrete(2), id = "Walk",
+    model = model, max_episode_steps = 50
+  )
+}
+
+test_that("a model that says what is played is found to be right", {
+  expect_identical(nrow(check_env(modelled(walk_table()))), 0L)
+  slippery <- merge(walk_table(), data.frame(slip = c(FALSE, TRUE), probability = c(0.7, 0.3)))
+  slippery$next_state <- with(slippery, ifelse(xor(action == 1, slip), state + 1, state - 1))
+  slippery$reward <- as.numeric(slippery$next_state == 3)
+  slippery$terminated <- slippery$next_state %in% c(0, 3)
+  expect_identical(nrow(check_env(modelled(gym_model(slippery, start = 1), slips = 0.3))), 0L)
+  expect_identical(nrow(check_env(model_env(gym_model(slippery), num_envs = 4))), 0L)
+  # Where it plays otherwise than its model says, in either direction.
+  expect_finding(modelled(gym_model(slippery, start = 1)), "model",
+                 "and never led to state 2 in play, for which the model has the probability 0.3")
+  expect_finding(modelled(walk_model(), slips = 0.3), "model",
+                 "in play, and the model gives that the probability 0.")
+})
+
+test_that("starts, rewards and ends that a model does not have are found", {
+  table <- walk_table()
+  expect_finding(modelled(gym_model(table, start = 2)), "model", "started in state 1")
+  anywhere <- check_env(modelled(gym_model(table)))
+  expect_match(anywhere$finding, "No episode started in state 2 in [0-9]+ episodes of play")
+  table$reward <- 5 * table$reward
+  expect_finding(modelled(gym_model(table, start = 1)), "model",
+                 "state 3 in play for the reward 1, which by the model is 5.")
+  expect_finding(modelled(walk_model(), ends = 3, reset = function(self) self$at <- 1), "model",
+                 "Action 0 led from state 1 to state 0 in play and the episode went on")
+  expect_finding(modelled(table[1:2, ]), "model", "has the observation space")
+  expect_finding(modelled(function(env) stop("no table")), "model", "no table")
+})

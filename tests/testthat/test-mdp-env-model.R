@@ -106,6 +106,33 @@ test_that("an environment in R has the model that it was given", {
   expect_equal(solve_mdp("OwnWalk-v0", policy = policy_random())$values[["1"]], 1 / 3)
 })
 
+test_that("of a table that names no start episodes start where `reset()` does", {
+  make <- function(reset, model = walk_table(), ...) {
+    gym_env(
+      reset = reset, step = function(self, action) NULL, model = model,
+      observation_space = space_discrete(4), action_space = space_discrete(2), id = "Walk-v0", ...
+    )
+  }
+  start_of <- function(...) env_model(make(...))$start
+  at_two <- c("0" = 0, "1" = 0, "2" = 1, "3" = 0)
+  expect_identical(start_of(function(self) 2), at_two)
+  expect_identical(start_of(function(self) 2, function(env) walk_table()), at_two)
+  expect_identical(start_of(function(self) rep(2, self$num_envs), vectorized = TRUE), at_two)
+  # A model says where itself.
+  expect_identical(start_of(function(self) 2, walk_model())[["1"]], 1)
+
+  drawn <- function(self) sample(1:2, 1, prob = c(0.2, 0.8))
+  before <- make(drawn)
+  set.seed(1)
+  expect_message(start <- env_model(before)$start, "1000 resets", class = "gym_message_model")
+  expect_equal(unname(start), c(0, 0.2, 0.8, 0), tolerance = 0.1)
+  expect_identical(suppressMessages(env_model(before))$start, start)
+  after <- runif(1)
+  set.seed(1)
+  expect_identical(runif(1), after)
+  expect_error(env_model(make(function(self) 3)), "starts in state 3", class = "gym_error_argument")
+})
+
 test_that("an environment in R with sub-environments has the model of one of them", {
   model <- walk_model()
   env <- model_env(model, num_envs = 4)

@@ -1,0 +1,168 @@
+# What check_env() finds where an environment in R has a model: whether it plays as the model says.
+
+# So many steps are taken, and no more in an episode than this.
+most_compared <- 1000L
+most_compared_in_episode <- 100L
+
+# What the model says and play never shows is a mistake where chance would make it as rare as this.
+too_rare <- 1e-9
+
+#' @exportS3Method
+look_at_model.gym_r_env <- function(env, check, seed) {
+  if (is.null(definition_of(env)$model) || is_wrong(check)) {
+    return()
+  }
+  model <- call_and_look(check, "model", "`gym_env(model = )`", suppressMessages(
+    model_of_env(env, NULL), classes = "gym_message_model"
+  ))
+  if (has_raised(model)) {
+    return()
+  }
+  played <- with_generator(new_generator(seed), play_by_model(check, model, seed))
+  if (!is_wrong(check)) {
+    compare_starts(check, model, played$starts)
+    compare_steps(check, model, played$steps)
+  }
+}
+
+is_wrong <- function(check) {
+  any(vapply(check$found, function(finding) finding$severity == "wrong", NA))
+}
+
+# Plays with random actions of those that the model has; all sub-environments together, until the
+# first of them ends. Returns what all of them came to, one after the other.
+play_by_model <- function(check, model, seed) {
+  possible <- possible_actions(model)
+  starts <- steps <- list()
+  while (length(steps) < most_compared && length(starts) < most_compared && !is_wrong(check)) {
+    seed <- seed + 1
+    place <- paste0("`reset(seed = ", seed, ")`")
+    state <- call_and_look(check, "reset", place, check$env$reset(seed = seed))
+    if (has_raised(state)) break
+    look_at_observation(check, "reset", state, "The first observation")
+    starts <- c(starts, list(state))
+    steps <- c(steps, steps_by_model(check, model, possible, state, seed))
+  }
+  columns <- c("state", "action", "next_state", "reward", "terminated")
+  names(columns) <- columns
+  list(
+    starts = unlist(starts),
+    steps = list2DF(lapply(columns, function(name) unlist(lapply(steps, `[[`, name))))
+  )
+}
+
+# The steps of one episode, which has begun in `state`.
+steps_by_model <- function(check, model, possible, state, seed) {
+  steps <- list()
+  ended <- FALSE
+  while (!ended && length(steps) < most_compared_in_episode && !is_wrong(check)) {
+    choices <- possible[state_rows(model, state), , drop = FALSE]
+    # Where nothing can be done, by the model, the episode should have ended.
+    if (!all(rowSums(choices) > 0)) break
+    action <- state_numbers(model$action_space)[draw_by_row(choices / rowSums(choices))]
+    place <- paste0("step ", length(steps) + 1L, " of the episode with seed ", seed)
+    out <- call_and_look(check, "step", paste("`step()` in", place), check$env$step(action))
+    if (has_raised(out)) break
+    look_at_step(check, out, place)
+    steps <- c(steps, list(list(
+      state = state, action = action, next_state = out$observation, reward = out$reward,
+      terminated = out$terminated
+    )))
+    state <- out$observation
+    ended <- any(out$terminated | out$truncated)
+  }
+  steps
+}
+
+compare_starts <- function(check, model, starts) {
+  states <- state_numbers(model$observation_space)
+  seen <- states %in% starts
+  unknown <- states[seen & model$start == 0]
+  unseen <- which(!seen & (1 - model$start)^length(starts) < too_rare)
+  if (length(unknown)) {
+    note_finding(check, "model", paste0(
+      "An episode started in state ", unknown[[1L]], " in play, and the model gives that the ",
+      "probability 0."
+    ))
+  } else if (length(unseen)) {
+    state <- unseen[[1L]]
+    note_finding(check, "model", paste0(
+      "No episode started in state ", states[[state]], " in ",
+      count_of(length(starts), "episode"), " of play, for which the model has the probability ",
+      number_text(model$start[[state]]), "."
+    ))
+  }
+}
+
+compare_steps <- function(check, model, steps) {
+  table <- model$transitions[model$transitions$probability > 0, ]
+  one <- first_unlike(steps, table)
+  if (is.null(one)) {
+    return(look_for_unseen(check, steps, table))
+  }
+  led <- paste0("Action ", one$action, " led from state ", one$state, " to state ",
+                one$next_state, " in play")
+  note_finding(check, "model", switch(
+    one$unlike,
+    next_state = paste0(led, ", and the model gives that the probability 0."),
+    terminated = paste0(
+      led,
+      if (one$terminated) {
+        " and ended the episode, which by the model goes on."
+      } else {
+        " and the episode went on, which by the model ends there."
+      }
+    ),
+    reward = {
+      same <- step_keys(table)$terminated == step_keys(one)$terminated
+      paste0(led, " for the reward ", number_text(one$reward), ", which by the model is ",
+             paste(number_text_each(unique(table$reward[same])), collapse = " or "), ".")
+    }
+  ))
+}
+
+# The first step that the table does not have, and in which column, or `NULL`.
+first_unlike <- function(steps, table) {
+  played <- step_keys(steps)
+  known <- step_keys(table)
+  for (name in names(played)) {
+    unlike <- !played[[name]] %in% known[[name]]
+    if (any(unlike)) {
+      return(c(as.list(steps[which(unlike)[[1L]], ]), unlike = name))
+    }
+  }
+}
+
+# Texts that are the same for the same steps: up to where they lead, the end and the reward, which
+# may have been rounded.
+step_keys <- function(steps) {
+  next_state <- paste(steps$state, steps$action, steps$next_state)
+  terminated <- paste(next_state, steps$terminated)
+  list(
+    next_state = next_state, terminated = terminated,
+    reward = paste(terminated, signif(steps$reward, 7L))
+  )
+}
+
+look_for_unseen <- function(check, steps, table) {
+  known <- step_keys(table)
+  played <- step_keys(steps)
+  probability <- stats::ave(table$probability, known$reward, FUN = sum)
+  pair <- paste(table$state, table$action)
+  tries <- tabulate(match(paste(steps$state, steps$action), pair), nrow(table))[match(pair, pair)]
+  unseen <- which(!known$reward %in% played$reward & (1 - probability)^tries < too_rare)
+  if (length(unseen)) {
+    row <- unseen[[1L]]
+    one <- table[row, ]
+    there <- known$next_state[[row]] %in% played$next_state
+    note_finding(check, "model", paste0(
+      "Action ", one$action, " was taken ", count_of(tries[[row]], "time"), " in state ",
+      one$state, " and never led to state ", one$next_state,
+      if (there) {
+        paste0(" for the reward ", number_text(one$reward), if (one$terminated) " and the end")
+      },
+      " in play, for which the model has the probability ",
+      number_text(probability[[row]]), "."
+    ))
+  }
+}
