@@ -35,7 +35,7 @@
 #' @return An object of class `gym_searches`, which [print()], [summary()], [as.data.frame()]
 #'   and [plot()][plot.gym_searches()] know; a list with the elements
 #'   \describe{
-#'     \item{searches}{A data frame with one row for each seed: `seed` (integer), `solved`
+#'     \item{searches}{A data frame with one row for each seed: `seed` (a whole number), `solved`
 #'       (logical), `round` (integer, the round that reached the target, `NA` where none
 #'       did), `rounds` (integer, how many were played), `mean_return` (double, of the best
 #'       round), `steps` (integer), `elapsed` (double, in seconds). `as.data.frame()` gives
@@ -149,7 +149,7 @@ play_seed <- function(with_env, template, settings, seed, call) {
 
 search_row <- function(search) {
   data.frame(
-    seed = as.integer(search$seed), solved = search$solved,
+    seed = narrow_whole(search$seed), solved = search$solved,
     round = if (search$solved) search$round else NA_integer_,
     rounds = nrow(search$rounds), mean_return = max(search$rounds$mean_return),
     steps = sum(search$rounds$steps), elapsed = search$elapsed

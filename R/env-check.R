@@ -22,7 +22,7 @@
 #' @param ... The environment's own arguments, by name, where it is named by its id.
 #' @param max_steps After how many steps an episode counts as one that never ends, a whole number,
 #'   1000 by default. An environment's own limit of steps is awaited, if it is higher.
-#' @param seed The first seed, a whole number of at least 0.
+#' @param seed The first seed, a whole number from 0 to 2^53.
 #' @param client The client of the server where an environment of Gymnasium's is made.
 #' @return An object of class `gym_check`, which prints what was found: a data frame with a row for
 #'   each finding, none for an environment in which nothing was found, and the columns
@@ -50,7 +50,7 @@
 #' check_env(walk)
 check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client()) {
   check_count(max_steps)
-  check_count(seed, min = 0)
+  check_seed(seed, min = 0)
   if (is.character(env) || inherits(env, "gym_wrapped")) {
     check_environment(env)
     env <- gym_make(env, ..., seed = seed, client = client)

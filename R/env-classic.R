@@ -124,7 +124,7 @@ env_list_all <- function(x) {
 #' @inheritParams env_create
 #' @param instance_id An instance's id, as [env_create()] returns it.
 #' @param seed Seed of the environment and of the sampling of actions: a whole
-#'   number of at least 0; `NULL` goes on with the generator as it is. In a vector environment
+#'   number from 0 to 2^53; `NULL` goes on with the generator as it is. In a vector environment
 #'   one number is for all: the first sub-environment gets it, the second gets it plus 1, and so
 #'   on; where the environment's own implementation has one generator for all of them, that gets
 #'   it. Or give one number for each sub-environment, `NA` where its generator goes on as it is.

@@ -163,7 +163,7 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   }
   seed <- plain_numbers(seed, call = call)
   if (is.null(num_envs) || length(seed) == 1L) {
-    check_count(seed, min = 0, max = 2^53, call = call)
+    check_seed(seed, min = 0, call = call)
     return(whole_text(seed))
   }
   check_sub_env_seeds(seed, num_envs, call)
@@ -172,7 +172,7 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
 
 # A vector of seeds for each sub-environment, `NULL` for those that are not reset.
 encode_seed_lists <- function(seeds, num_envs, call) {
-  fits <- function(one) is.null(one) || length(one) && are_whole(one, 0, 2^53)
+  fits <- function(one) is.null(one) || length(one) && are_whole(one, 0, largest_seed)
   if (is.null(num_envs) || length(seeds) != num_envs || !all(vapply(seeds, fits, NA))) {
     abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seeds", call)
   }

@@ -15,7 +15,7 @@ checked_methods <- function(sub_env) {
 reset_r_env <- function(sub_env, seed, options, return_info, call = rlang::caller_env()) {
   check_sub_env_open(sub_env, call)
   seed <- plain_numbers(seed, call = call)
-  check_count(seed, min = 0, allow_null = TRUE, call = call)
+  check_seed(seed, min = 0, call = call)
   check_flag(return_info, call = call)
   if (!is.null(options)) {
     check_named_list(options, call = call)

@@ -19,7 +19,9 @@
 #' Each environment, and each sub-environment, has a random generator of its own. `runif()`,
 #' `sample()` and the others draw from it within `reset` and `step`, and the session's own is
 #' afterwards as it was. `$reset(seed = 1)` seeds it, and a seed gives the same draws whatever
-#' `RNGkind()` the session has. An environment that was never seeded draws one seed from the
+#' `RNGkind()` the session has. A seed of at most 2^31 - 1 gives what [set.seed()] gives for R's
+#' generator `"L'Ecuyer-CMRG"`; one up to 2^53 a stream of its own, made of its lower 31 bits and of
+#' the others. An environment that was never seeded draws one seed from the
 #' session's generator when it is reset for the first time, so that [set.seed()] fixes it, too.
 #'
 #' # Vectorised functions

@@ -210,7 +210,7 @@ refuse_argument <- function(strange, known, id, from, call) {
 make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., call) {
   id <- with_wrappers(id, wrappers, call)
   check_for_r(id, list(...), call)
-  check_count(seed, min = 0, allow_null = TRUE, call = call)
+  check_seed(seed, min = 0, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
   env <- make_registered(id, arguments, call)
   id <- format(id)

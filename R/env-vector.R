@@ -145,7 +145,7 @@ check_has_sub_envs <- function(num_envs, x, arg, call) {
 }
 
 check_sub_env_seeds <- function(seed, num_envs, call) {
-  right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, 2^53)
+  right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, largest_seed)
   if (!right || length(seed) != num_envs) {
     must <- paste0(
       "a whole number of at least 0, or ", num_envs,

@@ -46,9 +46,9 @@
 #'   to the environment; most have a limit of their own, but without one a policy
 #'   that never fails plays forever. No episode goes on beyond the environment's own limit;
 #'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one with another.
-#' @param seed A whole number that fixes all that is drawn, whatever [RNGkind()] the session has;
-#'   the session's generator stays as it was. `NULL`, the default, draws one from the session's
-#'   generator.
+#' @param seed A whole number of at most 2^53 that fixes all that is drawn, whatever [RNGkind()] the
+#'   session has; the session's generator stays as it was. `NULL`, the default, draws one from the
+#'   session's generator.
 #' @param steps Keep each step as well? `FALSE`, the default, `TRUE` for a table, or `"arrays"`.
 #' @param client The client of the server where an environment named by its id is
 #'   made; the default is the session's own, [gym_client()].

@@ -215,7 +215,7 @@ check_training <- function(settings, call) {
   check_trained_policy(settings$policy, settings$agent, call)
   check_number(settings$steps, min = 1, allow_null = TRUE, arg = "steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
-  check_seed(settings$seed, "seed", call)
+  check_seed(settings$seed, arg = "seed", call = call)
   for (name in c("iterations", "max_steps")) {
     check_count(settings[[name]], allow_null = TRUE, arg = name, call = call)
   }

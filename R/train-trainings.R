@@ -20,9 +20,9 @@
 #'       have ended early.}
 #'     \item{provenance}{What [provenance()] tells, with all seeds.}
 #'   }
-#'   `as.data.frame()` gives a row for each seed: `seed` (integer), `solved` (logical: has the final
-#'   evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`, `se`,
-#'   `lower`, `upper` (of the final evaluation, doubles), `elapsed` (seconds, a double),
+#'   `as.data.frame()` gives a row for each seed: `seed` (a whole number), `solved` (logical: has the
+#'   final evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`,
+#'   `se`, `lower`, `upper` (of the final evaluation, doubles), `elapsed` (seconds, a double),
 #'   `interrupted` (logical).
 #'
 #'   `coef()` gives the weights of the policies, a matrix with a row for each seed.
@@ -64,7 +64,7 @@ as.data.frame.gym_trainings <- function(x, row.names = NULL, optional = FALSE, .
   of_final <- function(name) column(function(training) final(training, name), 0)
   mean_return <- of_final("mean_return")
   data.frame(
-    seed = column(function(training) as.integer(training$seed), 0L),
+    seed = narrow_whole(column(function(training) as.numeric(training$seed), 0)),
     solved = vapply(mean_return, reaches, NA, target = x$target),
     iterations = column(function(training) NROW(training$history), 0L),
     steps = column(function(training) training$steps, 0),

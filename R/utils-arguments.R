@@ -33,9 +33,16 @@ check_above_zero <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   invisible(x)
 }
 
-# A seed may be what set.seed() takes: any whole number that R's integers can hold.
-check_seed <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  check_count(x, min = -.Machine$integer.max, allow_null = TRUE, arg = arg, call = call)
+# Up to here doubles hold every whole number.
+largest_seed <- 2^53
+
+# The rule for all seeds: what set.seed() takes, and more, as Gymnasium does. Those of environments
+# are at least 0.
+check_seed <- function(x, min = -.Machine$integer.max, arg = rlang::caller_arg(x),
+                       call = rlang::caller_env()) {
+  # The largest one is mentioned only where it is exceeded.
+  max <- if (is_number(x) && x > largest_seed) largest_seed else Inf
+  check_count(x, min = min, max = max, allow_null = TRUE, arg = arg, call = call)
 }
 
 check_seeds <- function(seeds, call = rlang::caller_env()) {
@@ -43,8 +50,7 @@ check_seeds <- function(seeds, call = rlang::caller_env()) {
     abort_argument(seeds, "one or more whole numbers", "seeds", call)
   }
   for (i in seq_along(seeds)) {
-    check_count(seeds[[i]], min = -.Machine$integer.max, arg = paste0("seeds[", i, "]"),
-                call = call)
+    check_seed(seeds[[i]], arg = paste0("seeds[", i, "]"), call = call)
   }
   if (anyDuplicated(seeds)) {
     twice <- seeds[[anyDuplicated(seeds)]]
@@ -159,7 +165,7 @@ range_text <- function(min, max) {
   } else if (above) {
     paste(" of at least", format(min))
   } else if (bounded) {
-    paste(" of at most", format(max))
+    paste(" of at most", format(max, scientific = FALSE))
   } else {
     ""
   }

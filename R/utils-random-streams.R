@@ -10,14 +10,23 @@ draw_seed <- function() sample.int(.Machine$integer.max, 1L)
 # them do not depend on how many there are.
 draw_environment_seeds <- function(n) sample.int(.Machine$integer.max, n, replace = TRUE)
 
-# The first stream of a seed.
+# The first stream of a seed. set.seed() takes no seed beyond 2^31 - 1. Of a larger one it makes two
+# streams, of its lower 31 bits and of the others, negative and less 1 so that they are no smaller
+# seed's; the generator joins two smaller ones, of three numbers each, and gets one of each stream.
 seed_stream <- function(seed) {
   # A seed that is drawn in the call must move the session's generator.
   force(seed)
-  keep_random_state({
+  stream_of <- function(seed) {
     set.seed(seed, "L'Ecuyer-CMRG", "Inversion", "Rejection")
     globalenv()$.Random.seed
-  })
+  }
+  keep_random_state(
+    if (seed <= .Machine$integer.max) {
+      stream_of(seed)
+    } else {
+      c(stream_of(seed %% 2^31)[1:4], stream_of(-(seed %/% 2^31) - 1)[5:7])
+    }
+  )
 }
 
 #' Make a random generator beside the session's

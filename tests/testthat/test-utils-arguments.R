@@ -29,9 +29,38 @@ test_that("a seed may be negative or zero but not a fraction", {
   expect_null(check_seed(NULL))
   seed <- 0.5
   expect_error(check_seed(seed), "`seed` must be a whole number or NULL, not 0.5.", fixed = TRUE)
-  for (bad in list(NA, "1", 1:2, 2^31)) {
+  for (bad in list(NA, "1", 1:2, -2^31, 2^53 + 2, Inf)) {
     expect_error(check_seed(bad), class = "gym_error_argument")
   }
+  seed <- 2^60
+  expect_error(check_seed(seed), "of at most 9007199254740992 or NULL", fixed = TRUE)
+})
+
+test_that("a large seed is one everywhere", {
+  large <- 2^40
+  # As it goes to a server.
+  expect_identical(encode_seed(large), "1099511627776")
+  env <- gym_env(
+    reset = function(self) runif(1),
+    step = function(self, action) list(observation = runif(1), reward = 1, terminated = TRUE),
+    observation_space = space_box(0, 1), action_space = space_discrete(2)
+  )
+  expect_identical(env$reset(seed = large), env$reset(seed = large))
+  gym_register("Large-v0", env)
+  withr::defer(gym_unregister("Large-v0"))
+  expect_identical(gym_make("Large-v0", seed = large)$reset(), env$reset(seed = large))
+  expect_identical(sum(check_env(env, seed = large)$severity == "wrong"), 0L)
+  play <- function(seed) rollout(env, policy_random(), episodes = 2, seed = seed, steps = TRUE)
+  expect_identical(play(large)$seed, large)
+  expect_identical(play(large)$steps, play(large)$steps)
+  expect_false(identical(play(large)$steps, play(large + 1)$steps))
+  repeated <- search_repeat(env, policy_network(c(1, 1)), rounds = 1, episodes = 1, target = 9,
+                            seeds = c(1, large))
+  expect_identical(as.data.frame(repeated)$seed, c(1, large))
+  trained <- train_agent(agent_cem(4, 2), env, iterations = 1, seeds = c(1, large), target = 9,
+                         eval_episodes = 2)
+  expect_identical(as.data.frame(trained)$seed, c(1, large))
+  expect_identical(as.data.frame(trained[["trainings"]][["1"]])$iteration, 1L)
 })
 
 test_that("a number may be infinite but not missing, and has its bounds named", {

@@ -5,6 +5,18 @@ test_that("a generator goes on from where it was, and gives what its seed gives"
   expect_false(identical(drawn, with_generator(new_generator(8), runif(3))))
 })
 
+test_that("each seed beyond set.seed()'s has a stream of its own", {
+  seeds <- c(-1, 0, 1, 2, 2^31 - 1, 2^31, 2^31 + 1, 2^31 + 2, 2^32, 2^32 + 1, 2^40, 2^53)
+  streams <- lapply(seeds, seed_stream)
+  expect_length(unique(streams), length(seeds))
+  expect_length(unique(vapply(streams, function(stream) {
+    with_generator(new_generator(stream = stream), runif(1))
+  }, 0)), length(seeds))
+  # Written down, as it must stay the same.
+  expect_identical(with_generator(new_generator(2^40), sample.int(1e6, 3)),
+                   c(222100L, 199631L, 831809L))
+})
+
 test_that("what a seed gives is L'Ecuyer's stream, whatever the session's kinds are", {
   withr::local_preserve_seed()
   set.seed(7, "L'Ecuyer-CMRG", "Inversion", "Rejection")
