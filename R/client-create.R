@@ -35,7 +35,8 @@
 #' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
 #'   default is the server's own token where this session started it, and else what the environment
 #'   variable `GYM_SERVER_TOKEN` holds, so that no script has to. It is sent with each call, to this
-#'   server only, and nothing that is printed and no error shows it. A saved client holds it: such a file is as secret as the token.
+#'   server only, and nothing that is printed and no error shows it. A saved client holds it: such a
+#'   file is as secret as the token.
 #' @return An object of class `GymClient`, a list with the element
 #'   `remote_base`.
 #' @section Errors: `gym_error_argument` when the address is not an http or https

@@ -45,13 +45,14 @@ is_running <- function(base) {
 #'   `no_auth`, `no_shutdown`) is described in `vignette("server", package = "gym")`.
 #' @param timeout How long the start may take, in seconds; the default is 60.
 #' @param token Whether the server asks for a token of its own, `TRUE` or `FALSE`. It makes one at
-#'   its start and tells it to this session alone, so that no other account of the machine can use it: the client
-#'   that is returned carries the token, and so does each one that [create_GymClient()] makes for
-#'   the server's address in this session. Other processes, such as another R session or clients
-#'   in other languages, need a token that they know, or `FALSE`. The default is `TRUE` for a server
-#'   without `port`, and `FALSE` for one with a port, whose address scripts name: any account of the
-#'   machine can use that one, which is said in a message of class `gym_message_open_server`. What
-#'   `token_file`, `no_auth = TRUE` or the environment variable `GYM_SERVER_TOKEN` say comes first.
+#'   its start and tells it to this session alone, so that no other account of the machine can use
+#'   it: the client that is returned carries the token, and so does each one that
+#'   [create_GymClient()] makes for the server's address in this session. Other processes, such as
+#'   another R session or clients in other languages, need a token that they know, or `FALSE`. The
+#'   default is `TRUE` for a server without `port`, and `FALSE` for one with a port, whose address
+#'   scripts name: any account of the machine can use that one, which is said in a message of class
+#'   `gym_message_open_server`. What `token_file`, `no_auth = TRUE` or the environment variable
+#'   `GYM_SERVER_TOKEN` say comes first.
 #' @return A client for the server, as [create_GymClient()] makes it.
 #' @section Errors: `gym_error_server_start`, with the server's own message: no
 #'   Python can run it, the port is taken, it did not start in time; `gym_error_install`

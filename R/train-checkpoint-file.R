@@ -37,10 +37,7 @@ remove_parts <- function(path) {
   unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
 }
 
-#' Write the file of a search
-#'
-#' It is written beside the file that is there, and then replaces it by a rename.
-#' @noRd
+# Writes the file of a search.
 write_checkpoint <- function(path, state) {
   state <- serialize(state, NULL)
   file <- structure(
@@ -50,17 +47,40 @@ write_checkpoint <- function(path, state) {
     ),
     class = "gym_checkpoint"
   )
-  # The name is this process's own, because another process may write the same checkpoint.
+  replace_content(path, serialize(file, NULL))
+}
+
+#' Replace what a file holds, completely or not at all
+#'
+#' It is written beside the file that is there, and then replaces it by a rename.
+#' @param bytes A raw vector.
+#' @noRd
+replace_content <- function(path, bytes) {
+  # The name is this process's own, because another process may write the same file.
   part <- tempfile(paste0(basename(path), "-", Sys.getpid(), "-"), dirname(path), ".part")
   on.exit(unlink(part))
-  bytes <- serialize(file, NULL)
-  # The warning says more than the error that follows.
-  tryCatch(writeBin(bytes, part), warning = function(cnd) stop(conditionMessage(cnd)))
-  # Closing a file does not always fail when the disk is full.
-  if (!identical(file.size(part), as.numeric(length(bytes)))) {
-    stop("not all of it could be written")
-  }
+  write_bytes(part, bytes, "wb")
   replace_file(part, path)
+}
+
+# Writes bytes to a file, or behind what it has: `mode` is "wb" or "ab".
+write_bytes <- function(path, bytes, mode) {
+  before <- if (mode == "ab" && file.exists(path)) file.size(path) else 0
+  # It is made before it is opened: what cannot be opened would stay among R's connections.
+  connection <- file(path, raw = TRUE)
+  tryCatch(
+    {
+      open(connection, mode)
+      writeBin(bytes, connection)
+    },
+    # The warning says more than the error that follows.
+    warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE),
+    finally = suppressWarnings(close(connection))
+  )
+  # Closing a file does not always fail when the disk is full.
+  if (!identical(file.size(path), before + length(bytes))) {
+    stop("not all of it could be written", call. = FALSE)
+  }
 }
 
 # On Windows a file that somebody reads, such as a virus scanner, cannot be replaced just then.
@@ -99,13 +119,28 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
   }
   rest_until <- -Inf
   failed <- FALSE
+  overtaken <- FALSE
+  written <- if (is.null(checkpoint$saved)) file_mark(path) else checkpoint$mark
+  write <- function() {
+    own <- state()
+    if (!identical(file_mark(path), written)) {
+      whose <- overtaken_by(path, own, what)
+      if (!is.null(whose)) {
+        if (!overtaken) warn_overtaken(path, whose)
+        overtaken <<- TRUE
+        return()
+      }
+    }
+    write_checkpoint(path, own)
+    written <<- file_mark(path)
+  }
   function(now = FALSE) {
     began <- proc.time()[["elapsed"]]
     if (!now && began < rest_until) {
       return(invisible())
     }
     tryCatch(
-      write_checkpoint(path, state()),
+      write(),
       error = function(cnd) {
         # A full disk must not end what has played for hours.
         if (!failed) warn_not_written(path, what, cnd)
@@ -115,6 +150,30 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
     ended <- proc.time()[["elapsed"]]
     rest_until <<- ended + rest_per_writing * (ended - began)
   }
+}
+
+# What changes when another process replaces a file.
+file_mark <- function(path) as.list(file.info(path)[c("size", "mtime", "ctime")])
+
+# Whether the file is one that another process has written meanwhile, and that must be kept. Returns
+# whose it is, in words, NULL where ours may take its place.
+overtaken_by <- function(path, own, what) {
+  there <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
+  if (is.null(there)) {
+    NULL
+  } else if (!is_same(there$what, own$what) || !is_same(there$arguments, own$arguments)) {
+    paste("is now that of another", what)
+  } else if (there$training$steps > own$training$steps) {
+    paste("is that of the same", what, "in another process, which is further")
+  }
+}
+
+warn_overtaken <- function(path, whose) {
+  rlang::warn(
+    c(paste0("The checkpoint \"", path, "\" ", whose, ", and is left as it is."),
+      i = "Give each of them a file of its own as `checkpoint`."),
+    class = "gym_warning_checkpoint"
+  )
 }
 
 warn_not_written <- function(path, what, cnd) {

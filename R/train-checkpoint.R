@@ -7,8 +7,8 @@
 #' @param arguments What fixes it, a list, in which the file must agree.
 #' @param resume Whether to go on with what the file has.
 #' @param what What is kept, `"search"` or `"training"`.
-#' @return A list: `path`, `arguments` and `saved`, what the file has, `NULL` where there is none to
-#'   go on with.
+#' @return A list: `path`, `arguments`, `saved`, what the file has, `NULL` where there is none to
+#'   go on with, and `mark`, by which the file is known again.
 #' @noRd
 open_checkpoint <- function(path, arguments, resume, what = "search",
                             call = rlang::caller_env()) {
@@ -19,6 +19,7 @@ open_checkpoint <- function(path, arguments, resume, what = "search",
     abort_checkpoint(path, problem, call = call)
   }
   remove_parts(path)
+  mark <- file_mark(path)
   saved <- if (resume) read_checkpoint(path, call)
   if (!is.null(saved)) {
     if (!identical(saved$what, what)) {
@@ -26,7 +27,7 @@ open_checkpoint <- function(path, arguments, resume, what = "search",
     }
     check_same_search(path, saved$arguments, arguments, what, call)
   }
-  list(path = path, arguments = arguments, saved = saved)
+  list(path = path, arguments = arguments, saved = saved, mark = mark)
 }
 
 # What must be the same in two runs of one search. Policies are compared by what is drawn from them,

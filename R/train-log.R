@@ -32,7 +32,7 @@ training_log <- function(folder, settings, iteration, call) {
     return(function(state) NULL)
   }
   table <- file.path(folder, "progress.csv")
-  tryCatch(
+  missing <- tryCatch(
     {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
       write_config(file.path(folder, "config.json"), settings)
@@ -41,11 +41,18 @@ training_log <- function(folder, settings, iteration, call) {
     error = function(cnd) abort_log(folder, cnd, call),
     warning = function(cnd) abort_log(folder, cnd, call)
   )
+  if (missing > 0L) warn_incomplete(table, missing)
   failed <- FALSE
+  cut <- FALSE
   function(state) {
     # A full disk must not end what has trained for hours.
     tryCatch(
-      append_row(table, log_row(state)),
+      {
+        if (cut) keep_iterations(table, Inf)
+        cut <<- TRUE
+        append_row(table, log_row(state))
+        cut <<- FALSE
+      },
       error = function(cnd) {
         if (!failed) warn_not_logged(table, cnd)
         failed <<- TRUE
@@ -70,6 +77,14 @@ warn_not_logged <- function(table, cnd) {
   )
 }
 
+warn_incomplete <- function(table, missing) {
+  rlang::warn(
+    c(paste0("The log \"", table, "\" lacks ", count_of(missing, "iteration"), "."),
+      x = "Its lines were not written completely, as on a full disk, and are left out."),
+    class = "gym_warning_log"
+  )
+}
+
 write_config <- function(file, settings) {
   numbers <- c("iterations", "steps", "episodes", "target", "max_steps", "eval_every",
                "eval_episodes", "seed")
@@ -85,8 +100,10 @@ write_config <- function(file, settings) {
   json <- with_decimal_point(jsonlite::toJSON(
     config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA, force = TRUE
   ))
-  writeLines(json, file)
+  replace_content(file, as_lines(json))
 }
+
+as_lines <- function(lines) charToRaw(paste0(enc2utf8(lines), "\n", collapse = ""))
 
 # In JSON an empty list would be an array.
 empty_as_object <- function(values) if (length(values)) values else rlang::set_names(list())
@@ -97,18 +114,34 @@ plain_provenance <- function(from) {
   from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
 }
 
+#' Take out of a log the lines of later iterations, and those that were not written completely
+#' @return How many iterations are missing because their lines were not complete.
+#' @noRd
 keep_iterations <- function(table, iteration) {
   if (!file.exists(table)) {
-    return(invisible())
+    return(0L)
   }
   if (iteration == 0L) {
     # It is another training's.
-    return(invisible(file.rename(table, free_name(table))))
+    file.rename(table, free_name(table))
+    return(0L)
   }
-  lines <- readLines(table)
+  lines <- readLines(table, warn = FALSE, skipNul = TRUE)
+  complete <- are_complete(table, lines)
   # The first column counts iterations; the first line has the columns' names.
   of_lines <- suppressWarnings(as.numeric(sub(",.*", "", lines)))
-  writeLines(lines[is.na(of_lines) | of_lines <= iteration], table)
+  kept <- complete & (is.na(of_lines) | of_lines <= iteration)
+  if (any(kept)) replace_content(table, as_lines(lines[kept])) else unlink(table)
+  looked_for <- if (!all(complete) && is.finite(iteration)) seq_len(iteration)
+  length(setdiff(looked_for, of_lines[kept]))
+}
+
+# A line that was cut has no end, or the next one was written behind it.
+are_complete <- function(table, lines) {
+  commas <- nchar(gsub("[^,]", "", lines, useBytes = TRUE))
+  bytes <- readBin(table, "raw", file.size(table))
+  ends <- identical(utils::tail(bytes, 1L), charToRaw("\n"))
+  commas == commas[1L] & (ends | seq_along(lines) < length(lines))
 }
 
 # "progress-1.csv" for "progress.csv", or the first such name that is free.
@@ -126,12 +159,8 @@ append_row <- function(table, row) {
   # evaluated.
   old <- options(scipen = 15)
   on.exit(options(old))
-  withCallingHandlers(
-    with_decimal_point(utils::write.table(
-      row, table, append = !first, sep = ",", na = "", row.names = FALSE, col.names = first,
-      quote = FALSE
-    )),
-    # The warning says more than the error that follows.
-    warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE)
-  )
+  lines <- utils::capture.output(with_decimal_point(utils::write.table(
+    row, sep = ",", na = "", row.names = FALSE, col.names = first, quote = FALSE
+  )))
+  write_bytes(table, as_lines(lines), "ab")
 }

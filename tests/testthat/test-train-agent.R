@@ -269,6 +269,49 @@ test_that("a log that went further than the checkpoint is taken back to it", {
   expect_identical(again[columns], whole[columns])
 })
 
+test_that("a line of the log that a full disk cut is left out, with a warning where it is missed", {
+  folder <- withr::local_tempdir()
+  kept <- local_kept_files()
+  path <- local_checkpoint()
+  play <- function(iterations, path) {
+    quiet_training(agent_ars(), iterations = iterations, target = Inf, log = folder,
+                   checkpoint = path)
+  }
+  table <- file.path(folder, "progress.csv")
+  iterations <- function() utils::read.csv(table)[["time.iterations"]]
+  cut_by <- function(n) {
+    bytes <- readBin(table, "raw", file.size(table))
+    writeBin(bytes[seq_len(length(bytes) - n)], table)
+  }
+  play(3, path)
+  cut_by(1)
+  expect_warning(play(4, path), "1 iteration", class = "gym_warning_log")
+  expect_identical(iterations(), c(1L, 2L, 4L))
+  # A line that was cut and that another one was written behind.
+  cut_by(9)
+  cat("4,12,0.5,5,6\n", file = table, append = TRUE)
+  expect_no_warning(play(3, local_checkpoint(kept$list[[3]])))
+  expect_identical(iterations(), 1:3)
+})
+
+test_that("the log goes on with a whole line after one that could not be written", {
+  folder <- withr::local_tempdir()
+  write <- append_row
+  local_functions(append_row = function(table, row) {
+    if (row[["time/iterations"]] == 2) {
+      cat("2,10", file = table, append = TRUE)
+      stop("No space left on device")
+    }
+    write(table, row)
+  })
+  expect_warning(
+    quiet_training(agent_ars(), iterations = 3, target = Inf, log = folder),
+    class = "gym_warning_log"
+  )
+  table <- utils::read.csv(file.path(folder, "progress.csv"))
+  expect_identical(table[["time.iterations"]], c(1L, 3L))
+})
+
 test_that("a log that cannot be written in the middle warns once and ends nothing", {
   folder <- withr::local_tempdir()
   calls <- 0L

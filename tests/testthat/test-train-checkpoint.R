@@ -311,3 +311,50 @@ test_that("in a vector environment the file is written after each batch, however
   expect_identical(written(fake_vector_env(2, "sync", reward = first_action)), 4L)
   expect_lt(written(fake_environment(reward = first_action)), 25L)
 })
+
+test_that("of two searches on one file the one that is further is kept, with a warning", {
+  local_functions(rest_per_writing = 0)
+  path <- local_checkpoint()
+  writer <- function(steps, arguments = list(seed = 1), saved = NULL) {
+    played <- rlang::env(steps = steps)
+    state <- function() {
+      list(what = "search", arguments = arguments, training = list(steps = played$steps),
+           rest = numeric(played$steps))
+    }
+    opened <- open_checkpoint(path, arguments, resume = TRUE)
+    played$write <- checkpoint_writer(opened, state, "search", NULL)
+    played
+  }
+  steps_kept <- function() read_checkpoint(path, NULL)$training$steps
+  slow <- writer(0)
+  quick <- writer(0)
+  quick$steps <- 30
+  expect_silent(quick$write())
+  slow$steps <- 10
+  expect_warning(slow$write(), "further", class = "gym_warning_checkpoint")
+  expect_silent(slow$write())
+  expect_identical(steps_kept(), 30)
+  # Where the other has ended it is overtaken.
+  slow$steps <- 40
+  expect_silent(slow$write())
+  expect_identical(steps_kept(), 40)
+  unlink(path)
+  other <- writer(1, list(seed = 2))
+  expect_warning(quick$write(), "another search", class = "gym_warning_checkpoint")
+  expect_identical(steps_kept(), 1)
+})
+
+test_that("files that cannot be written leave no connection behind", {
+  connections <- function() nrow(showConnections(all = TRUE))
+  before <- connections()
+  nowhere <- file.path(withr::local_tempdir(), "no", "file")
+  for (i in 1:3) {
+    expect_error(append_row(nowhere, data.frame(a = 1)), "cannot open")
+    expect_error(write_checkpoint(nowhere, 1), "cannot open")
+    expect_error(write_config(nowhere, list(seed = 1)))
+  }
+  skip_if_not(file.exists("/dev/full"))
+  expect_error(write_bytes("/dev/full", raw(10), "wb"), "not all")
+  expect_error(append_row("/dev/full", data.frame(a = 1)), "not all")
+  expect_identical(connections(), before)
+})
