@@ -101,7 +101,8 @@ format.gym_agent_random <- function(x, ...) {
 #' @param client The client of the server where an environment named by its id is made; the
 #'   default is the session's own, [gym_client()].
 #' @param checkpoint The file in which to keep what is played, a string; `NULL`, the default,
-#'   keeps nothing.
+#'   keeps nothing. Where another process writes the same file, the state that is further is kept,
+#'   with a warning of class `gym_warning_checkpoint`.
 #' @param resume Go on with what the `checkpoint` has? `TRUE`, the default, goes on where
 #'   there is such a file and otherwise begins; a search that had ended is returned at once.
 #'   A message of class `gym_message_resumed` says so. `FALSE` begins anew, and replaces the
