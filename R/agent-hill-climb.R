@@ -72,8 +72,11 @@ format.gym_agent_hill_climb <- function(x, ...) {
 search_hill_climb <- function(env = "CartPole-v1", policy = policy_linear(), noise = 0.1,
                               candidates = 1, iterations = NULL, steps = NULL, target = NULL,
                               ...) {
-  train_agent(
-    agent_hill_climb(noise, candidates), env, policy, iterations = iterations, steps = steps,
-    target = target, ...
+  naming_own_call(
+    train_agent(
+      agent_hill_climb(noise, candidates), env, policy, iterations = iterations, steps = steps,
+      target = target, ...
+    ),
+    c("agent_hill_climb", "train_agent")
   )
 }

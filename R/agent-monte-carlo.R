@@ -116,8 +116,11 @@ learn_monte_carlo <- function(env, iterations = NULL, steps = NULL, target = NUL
                               discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
                               visits = c("first", "every"), exploring_starts = FALSE,
                               learning_rate = NULL, mask = NULL, ...) {
-  agent <- agent_monte_carlo(discount, epsilon, temperature, initial, visits, exploring_starts,
-                             learning_rate, mask)
-  train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
-              target = target, ...)
+  naming_own_call({
+    agent <- agent_monte_carlo(
+      discount, epsilon, temperature, initial, visits, exploring_starts, learning_rate, mask
+    )
+    train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
+                target = target, ...)
+  }, c("agent_monte_carlo", "train_agent"))
 }

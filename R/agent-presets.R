@@ -78,7 +78,7 @@ search_by <- function(agent, given, env, ..., call = rlang::caller_env()) {
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
-  made <- rlang::exec(make, !!!arguments)
+  made <- naming_own_call(rlang::exec(make, !!!arguments), make, call)
   training <- c(given[setdiff(names(given), own)], dots[of_training])
   # A budget of the user's own is the only one.
   budget <- any(c("iterations", "steps") %in% names(training))
@@ -93,7 +93,9 @@ search_by <- function(agent, given, env, ..., call = rlang::caller_env()) {
     made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
     made$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
   }
-  rlang::exec("train_agent", made, env, !!!training, !!!dots[!of_training])
+  naming_own_call(
+    rlang::exec("train_agent", made, env, !!!training, !!!dots[!of_training]), "train_agent", call
+  )
 }
 
 abort_no_budget <- function(agent, env, kwargs, call) {

@@ -176,8 +176,11 @@ format.gym_agent_q <- function(x, ...) {
 learn_q <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
                     discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
                     initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL, ...) {
-  agent <- agent_q(discount, learning_rate, epsilon, temperature, initial, features, double,
-                   planning, mask)
-  train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
-              target = target, ...)
+  naming_own_call({
+    agent <- agent_q(
+      discount, learning_rate, epsilon, temperature, initial, features, double, planning, mask
+    )
+    train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
+                target = target, ...)
+  }, c("agent_q", "train_agent"))
 }

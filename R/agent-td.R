@@ -76,10 +76,12 @@ format.gym_agent_td <- function(x, ...) {
 #' @export
 learn_td <- function(env, policy, iterations = NULL, steps = NULL, episodes = 10, discount = 0.99,
                      learning_rate = 0.1, initial = 0, features = NULL, n = 1, lambda = 0, ...) {
-  agent <- agent_td(policy, discount, learning_rate, initial, features, n, lambda)
   further <- list(...)
   # Learning values has no return to reach.
   if (!"target" %in% names(further)) further$target <- Inf
-  rlang::exec("train_agent", agent, env, iterations = iterations, steps = steps,
-              episodes = episodes, !!!further)
+  naming_own_call({
+    agent <- agent_td(policy, discount, learning_rate, initial, features, n, lambda)
+    rlang::exec("train_agent", agent, env, iterations = iterations, steps = steps,
+                episodes = episodes, !!!further)
+  }, c("agent_td", "train_agent"))
 }

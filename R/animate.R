@@ -78,10 +78,10 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
   file <- check_animation(file, fps, width, every)
-  played <- rlang::inject(rollout(
+  played <- naming_own_call(rlang::inject(rollout(
     x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
     !!!x$kwargs
-  ))
+  )), "rollout")
   new_animation(episode_frames(played), file, fps, width, every)
 }
 
@@ -91,8 +91,8 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
                                width = NULL, every = NULL, client = gym_client()) {
   check_dots_empty(...)
   file <- check_animation(file, fps, width, every)
-  played <- rollout(
-    env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE
+  played <- naming_own_call(
+    rollout(env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE), "rollout"
   )
   new_animation(episode_frames(played), file, fps, width, every)
 }

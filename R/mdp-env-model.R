@@ -47,7 +47,7 @@ as_model <- function(x, call = rlang::caller_env()) {
   if (!rlang::is_string(x) && !inherits(x, "gym_env")) {
     abort_argument(x, "a model, or an environment that has one", "model", call)
   }
-  env_model(x)
+  naming_own_call(env_model(x), "env_model", call)
 }
 
 model_of_env <- function(env, call) UseMethod("model_of_env")

@@ -143,7 +143,9 @@ play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
-  rollout(env, policy, seed = seed, steps = TRUE, client = client)
+  naming_own_call(
+    rollout(env, policy, seed = seed, steps = TRUE, client = client), "rollout", call
+  )
 }
 
 path_points <- function(path, names, call = rlang::caller_env()) {

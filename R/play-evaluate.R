@@ -48,10 +48,10 @@ evaluate_policy.default <- function(env, policy, episodes = 100, seed = NULL, ..
   if (!is_number(level) || level <= 0 || level >= 1) {
     abort_argument(level, "a number between 0 and 1", "level", rlang::current_env())
   }
-  played <- rollout(
+  played <- naming_own_call(rollout(
     env, policy, episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,
     progress = progress, client = client, num_workers = num_workers
-  )
+  ), "rollout")
   structure(
     evaluate_episodes(played$episodes, played$policy, level), level = level,
     env_id = played$env_id, policy = played$policy, seed = played$seed,

@@ -47,7 +47,10 @@ gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = N
   policy <- in_env(1, function(vector_env) policy_bind(policy, vector_env, call = call))
   played <- same_episodes(seed, as.integer(episodes), max_steps)
   objective <- function(weights) {
-    candidates <- policy_candidates(policy, if (is.matrix(weights)) weights else rbind(weights))
+    candidates <- naming_own_call(
+      policy_candidates(policy, if (is.matrix(weights)) weights else rbind(weights)),
+      "policy_candidates"
+    )
     count <- nrow(candidates$weights)
     -in_env(count * episodes, function(vector_env) played(vector_env, candidates, count))
   }

@@ -16,8 +16,9 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = 
   # Errors from making the environment name the user's call, too.
   rlang::local_error_call(call)
   arguments <- with_random_map(env, list(...), seed)
-  vector_env <- rlang::inject(
-    as_vector_env(env, !!!arguments, client = client, max_envs = episodes)
+  vector_env <- naming_own_call(
+    rlang::inject(as_vector_env(env, !!!arguments, client = client, max_envs = episodes)),
+    "as_vector_env", call
   )
   finished <- FALSE
   on.exit(vector_env$close(wait = finished))

@@ -188,10 +188,10 @@ summary.gym_search <- function(object, episodes = 100, seed = NULL, ...) {
   check_found(object)
   check_count(episodes)
   check_seed(seed)
-  fresh <- rollout(
+  fresh <- naming_own_call(rollout(
     object$env %||% object$env_id, object$policy, episodes = episodes,
     max_steps = object$max_steps, seed = seed, client = object$client
-  )
+  ), "rollout")
   returns <- fresh$episodes$return
   structure(
     list(

@@ -20,7 +20,7 @@
 #'       have ended early.}
 #'     \item{provenance}{What [provenance()] tells, with all seeds.}
 #'   }
-#'   `as.data.frame()` gives a row for each seed: `seed` (a whole number), `solved` (logical: has the
+#'   `as.data.frame()` gives a row for each seed: `seed` (whole number), `solved` (logical: has the
 #'   final evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`,
 #'   `se`, `lower`, `upper` (of the final evaluation, doubles), `elapsed` (seconds, a double),
 #'   `interrupted` (logical).

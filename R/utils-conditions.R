@@ -12,6 +12,24 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   )
 }
 
+#' Run code whose errors are to name the call of the function that runs it
+#'
+#' @param code Calls other functions that users call, too.
+#' @param of The names of these functions, strings.
+#' @param call The frame of the function that the user has called.
+#' @noRd
+naming_own_call <- function(code, of, call = rlang::caller_env()) {
+  own <- without_tokens(rlang::error_call(call))
+  rename <- function(cnd) {
+    if (is.call(cnd$call) && is.symbol(cnd$call[[1L]]) && as.character(cnd$call[[1L]]) %in% of) {
+      cnd["call"] <- list(own)
+    }
+    if (!is.null(cnd$parent)) cnd$parent <- rename(cnd$parent)
+    cnd
+  }
+  withCallingHandlers(code, gym_error = function(cnd) rlang::cnd_signal(rename(cnd)))
+}
+
 # `path` says where in the whole value the wrong one lies; it is "" for the whole.
 abort_space <- function(space, value, problem, call, path = "") {
   place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")

@@ -50,3 +50,50 @@ test_that("a name that an environment does not have is an error that names what 
   expect_output(print(env), "<gym_env: CartPole-v1>")
   expect_output(str(env), "gym_env")
 })
+
+test_that("an error names the function that was called, not one that this calls", {
+  corridor <- gym_env(
+    reset = function(self) 0,
+    step = function(self, action) list(observation = 0, reward = 1, terminated = TRUE),
+    observation_space = space_discrete(1), action_space = space_discrete(2)
+  )
+  random <- policy_random()
+  found <- search_random(corridor, policy_network(c(1, 1)), rounds = 1, episodes = 1)
+  found$env <- 3
+  objective <- gym_objective(corridor, episodes = 1, seed = 1)
+  calls <- alist(
+    rollout(corridor, random, size = 3),
+    evaluate_policy(corridor, random, episodes = 0),
+    evaluate_policy(corridor, random, size = 3),
+    evaluate_policy(corridor, function(observation) "left"),
+    summary(found),
+    learn_q(corridor, iterations = 0),
+    learn_q(corridor, iterations = 1, discount = 3),
+    learn_sarsa(corridor, iterations = 1, n = 0),
+    learn_td(corridor, random, iterations = 0),
+    learn_monte_carlo(corridor, iterations = 1, size = 3),
+    search_ars(corridor, iterations = 0),
+    search_cem(corridor, iterations = 1, population = -1),
+    search_hill_climb(corridor, iterations = 1, noise = 0),
+    gym_objective(corridor, size = 3),
+    objective(1:9),
+    solve_mdp(corridor)
+  )
+  if (requireNamespace("magick", quietly = TRUE)) {
+    calls <- c(calls, quote(animate(random, env = 3)), quote(animate(random, env = corridor)))
+  }
+  for (call in calls) {
+    cnd <- expect_error(eval(call), class = "gym_error_argument")
+    expect_identical(cnd$call[[1L]], call[[1L]], info = deparse1(call))
+  }
+  asked <- 0
+  failing <- function(observation) {
+    asked <<- asked + 1
+    if (asked > 12) "left" else integer(length(observation))
+  }
+  cnd <- expect_error(
+    evaluate_policy(corridor, failing, episodes = 300, seed = 1), class = "gym_error_rollout"
+  )
+  expect_identical(cnd$call[[1L]], quote(evaluate_policy))
+  expect_identical(cnd$parent$call[[1L]], quote(evaluate_policy))
+})
