@@ -157,7 +157,7 @@ episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_e
 new_animation <- function(frames, file, fps, width, every) {
   plan <- animation_plan(length(frames), fps %||% frame_rate(frames), every)
   # An interrupt leaves a file that was there before as it was.
-  written <- tempfile(fileext = ".gif")
+  written <- temporary_file(fileext = ".gif")
   write_gif(unclass(frames)[plan$steps + 1L], written, plan$delays, width)
   size <- gif_size(written)
   if (!is.null(file)) {
@@ -240,7 +240,7 @@ among_temporary_files <- function(file) {
   if (startsWith(folders[[1L]], folders[[2L]])) {
     return(file)
   }
-  copy <- tempfile(fileext = ".gif")
+  copy <- temporary_file(fileext = ".gif")
   file.copy(file, copy)
   copy
 }

@@ -91,7 +91,7 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
 #' @inheritParams env_create
 #' @param route The path of the request, a string such as `"/v1/envs/"`.
 #' @param data For `post_request()` the fields of the request's JSON body, for
-#'   `get_request()` those of its query: a named list, `NULL` for none.
+#'   `get_request()` those of its query, of one value each: a named list, `NULL` for none.
 #' @return The answer's JSON as nested lists, `NULL` (invisibly) for an empty
 #'   answer.
 #' @section Errors: `gym_error_http` when the server refuses,
@@ -105,7 +105,9 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
 post_request <- function(x, route, data = NULL) {
   check_client(x)
   check_route(route)
-  answer <- post_answer(x, route, json_texts(as.list(data)))
+  data <- as.list(data)
+  check_named_list(data)
+  answer <- post_answer(x, route, json_texts(data))
   if (is.null(answer)) invisible() else answer
 }
 
@@ -114,6 +116,14 @@ post_request <- function(x, route, data = NULL) {
 get_request <- function(x, route, data = NULL) {
   check_client(x)
   check_route(route)
+  data <- as.list(data)
+  check_named_list(data)
+  for (name in names(data)) {
+    value <- data[[name]]
+    if (!is.atomic(value) || length(value) != 1L || is.na(value)) {
+      abort_argument(value, "one value", paste0("data$", name), rlang::current_env())
+    }
+  }
   answer <- get_answer(x, paste0(route, query_text(data)))
   if (is.null(answer)) invisible() else answer
 }

@@ -87,6 +87,7 @@ as_vector_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALS
 as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
                                     client = gym_client(), num_workers = NULL) {
   check_environment(x)
+  check_one_framed(num_envs, frames)
   check_count(num_workers, min = 0, allow_null = TRUE)
   if (is_registered(x)) {
     check_for_r(x, list(num_workers = num_workers))
@@ -118,6 +119,17 @@ as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frame
   check_environment(x)
   check_made_before(num_envs, c(list(...), num_workers = num_workers), x)
   vector_env_of(x, frames)
+}
+
+# Frames are kept of one sub-environment, which plays one episode after the other.
+check_one_framed <- function(num_envs, frames, call = rlang::caller_env()) {
+  if (frames && isTRUE(num_envs > 1)) {
+    gym_abort(
+      c(paste0("`num_envs` must be 1 where frames are kept, not ", num_envs, "."),
+        i = "Leave it out, or leave out `frames = TRUE`."),
+      class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
+    )
+  }
 }
 
 check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env()) {

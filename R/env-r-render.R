@@ -72,7 +72,7 @@ abort_render <- function(cnd, sub_env, call) {
 #' @return The bytes of the file, `NULL` where nothing was plotted.
 #' @noRd
 plot_as_png <- function(size, code) {
-  file <- tempfile(fileext = ".png")
+  file <- temporary_file(fileext = ".png")
   on.exit(unlink(file))
   before <- grDevices::dev.cur()
   grDevices::png(file, size[[1L]], size[[2L]], res = 96)

@@ -9,9 +9,7 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
                                     client = NULL, num_workers = NULL) {
   check_made_before(NULL, c(list(...), num_workers = num_workers), x)
   check_count(num_envs, allow_null = TRUE)
-  if (isTRUE(num_envs > 1) && frames) {
-    abort_argument(num_envs, "1 where frames are kept", "num_envs", rlang::current_env())
-  }
+  check_one_framed(num_envs, frames)
   sub_env <- sub_env_of(x)
   check_sub_env_open(sub_env)
   if (frames) {

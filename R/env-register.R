@@ -173,15 +173,14 @@ change_function_env <- function(env, changes, parameters, id, call) {
   function_env$new(definition)
 }
 
-# The arguments that the function takes, or the `initialize()` of the class.
+# The arguments that the function takes, or the `initialize()` of the class or of one that it
+# inherits from; without one it takes none.
 check_taken <- function(given, entry_point, id, call) {
   taken <- entry_point
-  while (!is.function(taken)) {
-    taken <- entry_point$public_methods$initialize %||% {
-      entry_point <- entry_point$get_inherit()
-    }
+  while (inherits(taken, "R6ClassGenerator")) {
+    taken <- taken$public_methods$initialize %||% taken$get_inherit()
   }
-  known <- names(formals(args(taken)))
+  known <- if (!is.null(taken)) names(formals(args(taken)))
   strange <- if (!"..." %in% known) setdiff(given, known)
   refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
 }

@@ -64,7 +64,7 @@ estimate_model.gym_rollout <- function(x, ...) {
 #' @export
 estimate_model.data.frame <- function(x, ...) {
   call <- rlang::current_env()
-  if (is.null(x[["terminated"]])) x[["terminated"]] <- FALSE
+  if (is.null(x[["terminated"]])) x[["terminated"]] <- rep(FALSE, nrow(x))
   x[["probability"]] <- NULL
   steps <- check_transitions(x, "x", call)
   steps$terminated <- end_at_unknown(steps)

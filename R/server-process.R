@@ -10,7 +10,7 @@ run_server <- paste0(
 # Starts the server with one Python. Returns a description of the running server, or a string that
 # says why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
-  log <- tempfile("gym-server-", fileext = ".log")
+  log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
   process <- with_own_tree_id(tryCatch(
     processx::process$new(

@@ -25,7 +25,7 @@ print_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); s
 
 # Returns the running process and its output files, NULL when it could not be started.
 begin_trial <- function(python) {
-  output <- tempfile("gym-python-", fileext = c(".out", ".err"))
+  output <- temporary_file("gym-python-", fileext = c(".out", ".err"))
   process <- with_own_tree_id(tryCatch(
     processx::process$new(
       python, c("-c", paste0(print_version, run_server), "--version"),

@@ -12,3 +12,9 @@ absolute_path <- function(path) {
 }
 
 is_windows <- function() .Platform$OS.type == "windows"
+
+# tempfile(), also where the session's temporary folder is gone: systems that clean /tmp delete it
+# after some days. It is made again then.
+temporary_file <- function(pattern = "file", fileext = "") {
+  tempfile(pattern, tempdir(check = TRUE), fileext)
+}

@@ -14,8 +14,9 @@ draw_environment_seeds <- function(n) sample.int(.Machine$integer.max, n, replac
 # streams, of its lower 31 bits and of the others, negative and less 1 so that they are no smaller
 # seed's; the generator joins two smaller ones, of three numbers each, and gets one of each stream.
 seed_stream <- function(seed) {
-  # A seed that is drawn in the call must move the session's generator.
-  force(seed)
+  # First, as a seed that is drawn in the call must move the session's generator. set.seed() would
+  # take the bits of bit64's numbers for another one.
+  seed <- as.numeric(seed)
   stream_of <- function(seed) {
     set.seed(seed, "L'Ecuyer-CMRG", "Inversion", "Rejection")
     globalenv()$.Random.seed

@@ -13,7 +13,7 @@ step <- function(self, action) {
 }
 corridor <- gym_env(
   reset = function(self) self$place <- 0, step = step,
-  render = function(self) array(255L, c(8, 8, 3)),
+  render = function(self) plot(self$place),
   observation_space = space_discrete(4), action_space = space_discrete(2),
   max_episode_steps = 6
 )
@@ -115,3 +115,8 @@ if (requireNamespace("future", quietly = TRUE)) {
   works(search_ars("Point-v0", iterations = 1, eval_episodes = 2, seeds = 1:2))
   future::plan(future::sequential)
 }
+
+# Cleaners of /tmp delete the session's folder after some days.
+unlink(tempdir(), recursive = TRUE)
+works(rollout(corridor, random, frames = TRUE), plot(framed, type = "filmstrip"))
+if (requireNamespace("magick", quietly = TRUE)) works(animate(framed))

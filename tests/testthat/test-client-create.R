@@ -92,6 +92,23 @@ test_that("a timeout of httr's goes before the client's, after a repeat too", {
   expect_identical(timeout_of(server), 60)
 })
 
+test_that("what cannot be a query or a body is refused by name before it is sent", {
+  client <- create_GymClient("http://127.0.0.1:1")
+  refused <- function(data, text, request = get_request) {
+    cnd <- expect_error(request(client, "/v1/registry/", data), class = "gym_error_argument")
+    expect_match(conditionMessage(cnd), text, fixed = TRUE)
+  }
+  refused(list(search = c("a", "b")), "`data$search` must be one value, not c(\"a\", \"b\")")
+  refused(list(search = NULL), "`data$search` must be one value, not NULL")
+  refused(list(search = NA), "`data$search` must be one value, not NA")
+  refused(list(search = list(1)), "`data$search` must be one value, not a list of length 1")
+  for (request in list(get_request, post_request)) {
+    refused(list("a"), "`data` must be a list with names", request)
+    refused(3, "`data` must be a list with names", request)
+    refused(list(a = 1, a = 2), "`data` has `a` more than once", request)
+  }
+})
+
 test_that("a step whose answer was lost is not taken twice", {
   server <- local_server()
   client <- local_cut_client(server, "answered", "/step")

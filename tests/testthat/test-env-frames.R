@@ -85,6 +85,25 @@ test_that("a vector environment is refused, and a flag must be one", {
                "`frames` must be TRUE or FALSE", class = "gym_error_argument")
 })
 
+test_that("several sub-environments whose frames are wanted are refused, however they are named", {
+  drawn <- R6::R6Class("Drawn", inherit = GymEnv, public = list(
+    observation_space = space_discrete(1), action_space = space_discrete(2),
+    reset = function() 0, render = function() array(255L, c(8, 8, 3)),
+    step = function(action) list(observation = 0, reward = 1, terminated = TRUE)
+  ))
+  gym_register("Drawn-v0", drawn)
+  withr::defer(gym_unregister("Drawn-v0"))
+  play <- function(env, num_envs) {
+    rollout(env, policy_random(), frames = TRUE, num_envs = num_envs, client = no_client())
+  }
+  for (env in list("CartPole-v1", gym_wrap("CartPole-v1", "ClipReward"), "Drawn-v0")) {
+    cnd <- expect_error(play(env, 4), "`num_envs` must be 1 where frames are kept, not 4",
+                        class = "gym_error_argument")
+    expect_identical(cnd$argument, "num_envs")
+  }
+  expect_length(play("Drawn-v0", 1)$frames, 1)
+})
+
 test_that("an environment has its number of frames a second", {
   expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
   expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)

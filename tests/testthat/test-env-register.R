@@ -223,3 +223,22 @@ test_that("an argument that the entry point does not take is refused by name", {
   }
   gym_unregister("Refusing-v0")
 })
+
+test_that("a class without initialize() takes no arguments, wherever it inherits from", {
+  plain <- R6::R6Class("Plain", public = list(
+    observation_space = space_discrete(1), action_space = space_discrete(2),
+    spec = list(id = "Plain"), reset = function(seed = NULL) 0L,
+    step = function(action) {
+      list(observation = 0L, reward = 1, terminated = TRUE, truncated = FALSE)
+    }
+  ))
+  for (class in list(plain, R6::R6Class("Heir", inherit = plain))) {
+    local_registered("Plain-v0", class)
+    expect_identical(rollout("Plain-v0", policy_random(), episodes = 2)$episodes$return, c(1, 1))
+    expect_error(gym_make("Plain-v0", size = 3), "Plain-v0 has no argument `size`",
+                 class = "gym_error_argument")
+  }
+  local_registered("Empty-v0", R6::R6Class("Empty"))
+  expect_error(gym_make("Empty-v0"), "must return an environment, not an object of class Empty",
+               class = "gym_error_argument")
+})

@@ -35,6 +35,9 @@ test_that("what is no model is refused by name", {
     expect_error(gym_model(table, ...), text, class = "gym_error_argument", fixed = TRUE)
   }
   refused(3, "`transitions` must be a data frame")
+  refused(walk_table()[0, ], "with a row for each transition, not a data frame with 0 rows")
+  expect_error(estimate_model(walk_table()[0, ]), "not a data frame with 0 rows",
+               class = "gym_error_argument")
   refused(walk_table()[-4], "`transitions` has no column `reward`")
   wrong <- walk_table()
   wrong$probability <- c(1, 1, 0.5, 1)

@@ -31,7 +31,7 @@ test_that("what is no matrix of numbers is refused", {
                       class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "`rbind(weights)`", fixed = TRUE)
   expect_error(try_weights(matrix("a", 1, 4)), "a numeric matrix", class = "gym_error_argument")
-  expect_error(try_weights(data.frame(a = 1)), "object of class data.frame",
+  expect_error(try_weights(data.frame(a = 1)), "a data frame with 1 row",
                class = "gym_error_argument")
   expect_error(try_weights(matrix(0, 0, 4)), "an array of 0 x 4", class = "gym_error_argument")
   expect_error(try_weights(matrix(c(1, 2, 3, NA), 1)), "without missing values",

@@ -199,7 +199,7 @@ test_that("policies and functions stay, and results give theirs", {
 test_that("what is no model is refused", {
   expect_error(as_policy("left"), "a fitted model with a method of `predict()`, not \"left\"",
                fixed = TRUE, class = "gym_error_argument")
-  cnd <- expect_error(as_policy(data.frame(a = 1)), "not an object of class data.frame",
+  cnd <- expect_error(as_policy(data.frame(a = 1)), "not a data frame with 1 row",
                       class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "`library()`", fixed = TRUE)
   expect_error(as_policy(function() 1), "this one has no argument", class = "gym_error_argument")

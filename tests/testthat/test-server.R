@@ -240,3 +240,18 @@ test_that("a server that takes too long to start is killed, and the error says h
     class = "gym_error_server_start"
   )
 })
+
+test_that("a session whose temporary folder was deleted starts a server", {
+  skip_unless_all()
+  skip_if_no_server()
+  script <- withr::local_tempfile(lines = c(
+    paste0(".libPaths(", deparse1(.libPaths()), ")"),
+    "library(gym)", "unlink(tempdir(), recursive = TRUE)",
+    "server <- gym_server_start()", "cat(length(env_list_all(server)))"
+  ))
+  run <- processx::run(
+    file.path(R.home("bin"), "Rscript"), c("--no-init-file", script), timeout = 60,
+    error_on_status = FALSE
+  )
+  expect_identical(run[c("stdout", "stderr")], list(stdout = "0", stderr = ""))
+})

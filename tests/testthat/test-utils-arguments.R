@@ -94,7 +94,7 @@ test_that("what is long or odd is described, not printed", {
   x <- 1:100
   expect_error(check_count(x), "not an integer vector of length 100.", fixed = TRUE)
   x <- data.frame(a = 1)
-  expect_error(check_count(x), "not an object of class data.frame", fixed = TRUE)
+  expect_error(check_count(x), "not a data frame with 1 row", fixed = TRUE)
 })
 
 test_that("a missing package is named", {
