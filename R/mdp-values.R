@@ -153,13 +153,14 @@ chain_solver <- function(weight, call) {
 #' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
 #' @noRd
 swept_values <- function(weight, rewards, enough = 1e-15) {
-  most <- if (is.matrix(weight)) 150L else 500L
+  most <- 500L
   every <- 25L
   bounded <- growth_bounds(weight)
+  ahead <- if (is.matrix(weight)) padded_product(weight) else function(x) as.vector(weight %*% x)
   values <- rewards
   before <- Inf
   for (sweep in seq_len(most)) {
-    new <- rewards + as.vector(weight %*% values)
+    new <- rewards + ahead(values)
     growth <- new - values
     values <- new
     share <- max(growth / pmax(values, .Machine$double.xmin))
@@ -175,6 +176,20 @@ swept_values <- function(weight, rewards, enough = 1e-15) {
       before <- share
     }
   }
+}
+
+# A function that multiplies a full matrix by a vector, of which it looks only at the numbers that
+# are not 0, put to the left.
+padded_product <- function(weight) {
+  at <- which(t(weight) > 0, arr.ind = TRUE)
+  from <- at[, 2L]
+  place <- sequence(rle(from)$lengths)
+  shape <- c(nrow(weight), max(place, 1L))
+  column <- array(1L, shape)
+  column[cbind(from, place)] <- at[, 1L]
+  left <- array(0, shape)
+  left[cbind(from, place)] <- weight[at[, 2:1, drop = FALSE]]
+  function(x) .rowSums(left * x[column], shape[[1L]], shape[[2L]])
 }
 
 #' Prepare to judge values by how they grew in a sweep

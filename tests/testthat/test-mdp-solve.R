@@ -275,7 +275,7 @@ test_that("rewards of another size have values of that size, and the same best p
       list(discount = 0.9, method = "policy_iteration")
     )) {
       plain <- rlang::exec(solve_mdp, gym_model(table, start = 0), !!!given)
-      for (scale in c(1e-9, 1e-3, 1e9)) {
+      for (scale in c(1e-9, 1e9)) {
         scaled <- table
         scaled$reward <- scale * table$reward
         solved <- rlang::exec(solve_mdp, gym_model(scaled, start = 0), !!!given)
@@ -293,26 +293,29 @@ test_that("an end that costs more than many sweeps is found", {
 })
 
 test_that("many states are solved as exactly as few", {
+  skip_unless_all()
   set.seed(2)
-  random <- gym_model(random_table(states = 600, actions = 2, successors = 4), start = 0)
-  arrays <- model_arrays(random)
-  exact <- function(solved, discount) {
-    rows <- cbind(seq_len(600), solved$actions + 1L)
-    moves <- t(vapply(seq_len(600), function(i) arrays$P[i, -601L, rows[i, 2L]], numeric(600)))
-    unname(solve(diag(600) - discount * moves, arrays$R[rows]))
+  table <- random_table(states = 600, actions = 2, successors = 3)
+  random <- gym_model(table, start = 0)
+  exact <- function(actions, discount) {
+    taken <- table[table$action == actions[table$state + 1L], ]
+    moves <- stats::xtabs(probability ~ state + next_state, taken)
+    moves <- unclass(moves)[, match(0:599, colnames(moves))]
+    moves[is.na(moves)] <- 0
+    rewards <- tapply(taken$probability * taken$reward, taken$state, sum)
+    as.vector(solve(diag(600) - discount * moves, rewards))
   }
   for (method in c("value_iteration", "policy_iteration")) {
-    solved <- solve_mdp(random, discount = 0.95, method = method)
-    expect_equal(unname(solved$values), exact(solved, 0.95), tolerance = 1e-12)
+    solved <- solve_mdp(random, discount = 0.9, method = method)
+    expect_equal(unname(solved$values), exact(solved$actions, 0.9), tolerance = 1e-12)
   }
-  # So slow that its equations are solved, and one of its values is tiny.
+  # So slow that its equations are solved.
   slow <- solve_mdp(random, policy = solved$policy, discount = 0.9999)
-  expect_equal(unname(slow$values), exact(solved, 0.9999), tolerance = 1e-11)
-  line <- ruin_model(800, win = 0.4)
-  solved <- solve_mdp(line)
-  # The gambler's ruin, Feller (1968), chapter XIV.
-  theirs <- (1.5^(0:800) - 1) / (1.5^800 - 1)
-  expect_equal(unname(solved$values)[2:800] / theirs[2:800], rep(1, 799), tolerance = 1e-11)
+  expect_equal(unname(slow$values), exact(solved$actions, 0.9999), tolerance = 1e-11)
+  # The gambler's ruin, Feller (1968), chapter XIV: most values are tiny.
+  ruin <- solve_mdp(ruin_model(600, win = 0.4), method = "policy_iteration")
+  theirs <- (1.5^(1:599) - 1) / (1.5^600 - 1)
+  expect_equal(unname(ruin$values)[2:600] / theirs, rep(1, 599), tolerance = 1e-11)
 })
 
 test_that("a policy that never ends is told apart in a large model, too", {
