@@ -11,7 +11,7 @@ whole_number_text <- function(n) marked_text(n, scientific = FALSE)
 # Thousands are marked by a comma, but not where that is the decimal mark, which options(OutDec = )
 # and a locale change.
 marked_text <- function(x, ...) {
-  if (grepl(",", format(0.5), fixed = TRUE)) {
+  if (grepl(",", format(0.5, scientific = FALSE), fixed = TRUE)) {
     format(x, ..., big.mark = ".", decimal.mark = ",")
   } else {
     format(x, ..., big.mark = ",")

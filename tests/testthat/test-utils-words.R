@@ -20,6 +20,8 @@ test_that("thousands are not marked by the session's decimal mark", {
   expect_identical(number_text(0.125), "0,125")
   expect_identical(count_of(1e6, "step"), "1.000.000 steps")
   expect_output(print(schedule_linear(1, 0.5, 10000)), "to 0,5 in 10.000 steps", fixed = TRUE)
+  withr::local_options(scipen = -10)
+  expect_identical(count_of(1e6, "step"), "1.000.000 steps")
 })
 
 test_that("in a Turkish locale words of English keep their dots", {
