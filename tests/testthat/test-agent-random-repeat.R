@@ -122,6 +122,7 @@ test_that("bad arguments are refused before anything is made, naming argument an
 
 test_that("a progress bar is shown when asked for and nothing is said otherwise", {
   env <- function() scripted_environment(rep(1, 60))
+  withr::local_options(warnPartialMatchDollar = TRUE)
   expect_silent(search_repeat(env(), rounds = 1, target = 9, seeds = 1:2, progress = FALSE))
   withr::local_options(cli.progress_show_after = 0, cli.dynamic = FALSE, cli.num_colors = 1)
   slow <- env()
