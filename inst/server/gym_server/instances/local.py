@@ -309,7 +309,8 @@ class LocalBackend:
         with contextlib.suppress(BaseException):
             self.close_monitor()
         with contextlib.suppress(BaseException):
-            self.env.close()
+            # It may hang once more, and the watchdog looks at the render thread.
+            self._renderer.run(self.env.close)
 
 
 def _held_by(seed: Seed) -> int:

@@ -310,14 +310,14 @@ def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, gate, eventu
 def test_a_large_answer_under_way_arrives_in_full(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Counting-v0")
-    # Its options come back.
-    options = {"text": "x" * 5 * 2**20}
+    # Its options come back, each letter as an escape of six.
+    options = {"text": "é" * 500_000}
     with socket.socket() as connection:
         # Far less than the answer, which has to wait for this client.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**17)
         connection.settimeout(30)
         connection.connect(("127.0.0.1", server.port))
-        body = json.dumps({"options": options}).encode()
+        body = json.dumps({"options": options}, ensure_ascii=False).encode()
         connection.sendall(request("POST", f"{url}/reset/", body))
         assert connection.recv(1, socket.MSG_PEEK)
         server.process.terminate()

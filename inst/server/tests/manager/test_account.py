@@ -6,6 +6,7 @@ import pytest
 from conftest import created
 
 from gym_server.manager import account
+from gym_server.processes import memory
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 
@@ -16,6 +17,8 @@ HOARDER = {"frame": "hoards"}
 @pytest.fixture
 def client(quick, monkeypatch):
     """Return the client of an application whose environments may hold 100 MiB."""
+    # What earlier tests have left must not be given back meanwhile.
+    memory.give_back()
     monkeypatch.setattr(account, "_OWN_BYTES", 0)
     monkeypatch.setattr("gym_server.manager.watchdog._MEASURE_SECONDS", 0.05)
     return quick(max_memory_mb=100).test_client()
