@@ -73,7 +73,7 @@ gif_header <- function(size) {
 #'   place, its colours, its pixels.
 #' @noRd
 gif_picture <- function(image, part, delay) {
-  single <- gif_parts(magick::image_write(image, format = "gif"))
+  single <- gif_parts(in_plain_letters(magick::image_write(image, format = "gif")))
   c(
     as.raw(c(0x21, 0xf9, 4, 0x04)), two_bytes(delay), as.raw(c(0, 0)),
     as.raw(0x2c), two_bytes(c(part$x, part$y, part$width, part$height)),
@@ -108,6 +108,15 @@ gif_parts <- function(gif) {
 end_of_blocks <- function(number, at) {
   while (number(at) > 0L) at <- at + number(at) + 1L
   at + 1L
+}
+
+# ImageMagick looks for the format "gif" in capital and in small letters, which in a Turkish locale
+# are others.
+in_plain_letters <- function(code) {
+  locale <- Sys.getlocale("LC_CTYPE")
+  on.exit(Sys.setlocale("LC_CTYPE", locale))
+  Sys.setlocale("LC_CTYPE", "C")
+  code
 }
 
 two_bytes <- function(x) writeBin(as.integer(x), raw(), size = 2L, endian = "little")

@@ -138,7 +138,7 @@ download_uv <- function(url, archive, call) {
     handle, failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
     # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
     low_speed_limit = 100, low_speed_time = 60,
-    noprogress = FALSE, progressfunction = function(down, up) {
+    noprogress = FALSE, xferinfofunction = function(down, up) {
       touch_install_lock()
       received <<- down[[2L]]
       received <= most_bytes_of_uv
