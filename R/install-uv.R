@@ -132,34 +132,34 @@ most_bytes_of_uv <- 100e6
 
 download_uv <- function(url, archive, call) {
   write_log(paste("> download", url))
-  received <- 0
   handle <- curl::new_handle()
   set_curl(
     handle, failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
     # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
-    low_speed_limit = 100, low_speed_time = 60,
-    noprogress = FALSE, xferinfofunction = function(down, up) {
-      touch_install_lock()
-      received <<- down[[2L]]
-      received <= most_bytes_of_uv
-    }
+    low_speed_limit = 100, low_speed_time = 60
   )
   certificates <- Sys.getenv("SSL_CERT_FILE")
   if (nzchar(certificates)) {
     set_curl(handle, cainfo = certificates)
   }
+  file <- file(archive, "wb")
+  on.exit(close(file))
+  received <- 0
+  keep <- function(bytes) {
+    touch_install_lock()
+    received <<- received + length(bytes)
+    if (received > most_bytes_of_uv) {
+      stop("What is there is larger than ", most_bytes_of_uv / 1e6, " MB.", call. = FALSE)
+    }
+    writeBin(bytes, file)
+  }
   tryCatch(
-    # Unlike curl_download() it does not replace the handle's progress function.
-    curl::curl_fetch_disk(url, archive, handle = handle),
+    # Today's curl also warns, with the address.
+    suppressWarnings(curl::curl_fetch_stream(url, keep, handle = handle)),
     error = function(cnd) {
-      problem <- if (received > most_bytes_of_uv) {
-        paste("What is there is larger than", most_bytes_of_uv / 1e6, "MB.")
-      } else {
-        conditionMessage(cnd)
-      }
-      write_log(problem)
+      write_log(conditionMessage(cnd))
       abort_tool(
-        paste("uv could not be downloaded from", url), problem, call,
+        paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
         more = paste(
           "uv can also be installed by hand (<https://docs.astral.sh/uv/>), and so can Python",
           "3.10 to 3.13: `gym_server_install()` takes what it finds."
