@@ -3,6 +3,8 @@
 
 test_that("an installation runs the server, takes extras and repairs itself", {
   skip_unless_all()
+  # The server of all tests is not to be one of those that are installed here.
+  test_client()
   local_cache()
   skip_if_no_uv()
   skip_if_no_packages()
