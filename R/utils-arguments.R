@@ -40,11 +40,9 @@ largest_seed <- 2^53
 # are at least 0.
 check_seed <- function(x, min = -.Machine$integer.max, arg = rlang::caller_arg(x),
                        call = rlang::caller_env()) {
-  # bit64 has no numbers to compare with infinity.
-  value <- if (inherits(x, "integer64")) as.numeric(x) else x
   # The largest one is mentioned only where it is exceeded.
-  max <- if (is_number(value) && value > largest_seed) largest_seed else Inf
-  check_count(value, min = min, max = max, allow_null = TRUE, arg = arg, call = call)
+  max <- if (is_number(x) && x > largest_seed) largest_seed else Inf
+  check_count(x, min = min, max = max, allow_null = TRUE, arg = arg, call = call)
   invisible(x)
 }
 

@@ -17,14 +17,6 @@ test_that("each seed beyond set.seed()'s has a stream of its own", {
                    c(222100L, 199631L, 831809L))
 })
 
-test_that("a seed that is an integer64 is that seed", {
-  skip_if_not_installed("bit64")
-  for (seed in c(5, 2^40)) {
-    expect_identical(seed_stream(bit64::as.integer64(seed)), seed_stream(seed))
-    expect_identical(check_seed(bit64::as.integer64(seed)), bit64::as.integer64(seed))
-  }
-})
-
 test_that("what a seed gives is L'Ecuyer's stream, whatever the session's kinds are", {
   withr::local_preserve_seed()
   set.seed(7, "L'Ecuyer-CMRG", "Inversion", "Rejection")

@@ -1,12 +1,12 @@
 """What is held is measured, and the instance that has grown most goes."""
 
+import contextlib
 import sys
 
 import pytest
 from conftest import created
 
 from gym_server.manager import account
-from gym_server.processes import memory
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 
@@ -14,34 +14,9 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measu
 HOARDER = {"frame": "hoards"}
 
 
-@pytest.fixture
-def client(quick, monkeypatch):
-    """Return the client of an application whose environments may hold 100 MiB."""
-    # What earlier tests have left must not be given back meanwhile.
-    memory.give_back()
-    monkeypatch.setattr(account, "_OWN_BYTES", 0)
-    monkeypatch.setattr("gym_server.manager.watchdog._MEASURE_SECONDS", 0.05)
-    return quick(max_memory_mb=100).test_client()
-
-
 def reset(client, url):
     assert client.post(f"{url}/reset/").status_code == 200
     return url
-
-
-@pytest.mark.parametrize("how", [{}, {"num_envs": 2, "vectorization_mode": "sync"}])
-def test_what_grows_when_it_is_drawn_is_closed_and_the_others_go_on(client, eventually, how):
-    other = reset(client, created(client, "faulty_envs:Drawing-v0"))
-    hoarder = reset(client, created(client, "faulty_envs:Drawing-v0", kwargs=HOARDER, **how))
-    for _ in range(2):
-        client.get(f"{hoarder}/render/")
-    eventually(lambda: client.get(hoarder).status_code == 410)
-    answer = client.get(hoarder).json
-    assert answer["code"] == "instance_memory_closed"
-    assert "had grown most, by 12" in answer["message"]
-    # As soon as the memory is given back.
-    eventually(lambda: client.get(f"{other}/render/").status_code == 200)
-    reset(client, other)
 
 
 def test_above_the_limit_nothing_grows(client, monkeypatch):
@@ -65,8 +40,11 @@ def test_above_the_limit_nothing_grows(client, monkeypatch):
 
 
 @pytest.fixture
-def server(serve):
-    return serve(
+def limited(serve):
+    """Start a server whose environments may hold 100 MiB."""
+    return lambda isolate: serve(
+        "--isolate",
+        isolate,
         "--max-memory-mb",
         "100",
         limits={
@@ -76,7 +54,34 @@ def server(serve):
     )
 
 
-def test_a_process_that_grows_is_closed(server, eventually):
+def drawn(server, url):
+    """Draw a picture; return the status."""
+    with contextlib.closing(server.connect()) as connection:
+        connection.request("GET", f"{url}/render/")
+        with connection.getresponse() as answer:
+            return answer.status
+
+
+@pytest.mark.parametrize("how", [{}, {"num_envs": 2, "vectorization_mode": "sync"}])
+def test_what_grows_when_it_is_drawn_is_closed_and_the_others_go_on(limited, eventually, how):
+    server = limited("none")
+    other = server.create("CartPole-v1")
+    hoarder = server.create("faulty_envs:Drawing-v0", kwargs=HOARDER, **how)
+    for url in (other, hoarder):
+        assert server.post(f"{url}/reset/")[0] == 200
+    for _ in range(2):
+        drawn(server, hoarder)
+    eventually(lambda: server.get(hoarder)[0] == 410)
+    answer = server.get(hoarder)[1]
+    assert answer["code"] == "instance_memory_closed"
+    assert "had grown most, by " in answer["message"]
+    # As soon as the memory is given back.
+    eventually(lambda: drawn(server, other) == 200)
+    assert server.post(f"{other}/reset/")[0] == 200
+
+
+def test_a_process_that_grows_is_closed(limited, eventually):
+    server = limited("foreign")
     other = server.create("faulty_envs:Rogue-v0")
     hoarder = server.create("faulty_envs:Rogue-v0", kwargs={"does": "grows"})
     for url in (other, hoarder):

@@ -1,6 +1,5 @@
 """What is measured to choose the number of processes."""
 
-
 import gymnasium
 import pytest
 
