@@ -71,8 +71,9 @@
 #'   (`max_call_seconds` and `idle_minutes` of [gym_server_start()]). Every later call
 #'   then says so: `gym_error_http_504` with code `call_too_long`, `gym_error_http_410`
 #'   with code `instance_idle_closed`; with code `instance_memory_closed` where all environments
-#'   together held too much memory (`max_memory_mb`), and this one had grown most. When a process in which an environment or some of its
-#'   sub-environments live has ended, it is `gym_error_http_500` with code `environment_died`.
+#'   together held too much memory (`max_memory_mb`), and this one had grown most. When a process
+#'   in which an environment or some of its sub-environments live has ended, it is
+#'   `gym_error_http_500` with code `environment_died`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()

@@ -173,8 +173,7 @@ range_text <- function(min, max) {
 }
 
 describe_argument <- function(x) {
-  plain <- if (is_integer64(x)) unclass(x) else x
-  if (is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))) {
+  if (is_short(x)) {
     describe_value(x)
   } else if (is.array(x)) {
     paste0("an array of ", paste(dim(x), collapse = " x "))
@@ -188,4 +187,10 @@ describe_argument <- function(x) {
     kind <- if (is.list(x)) "list" else paste(typeof(x), "vector")
     paste0(if (is.integer(x)) "an " else "a ", kind, " of length ", length(x))
   }
+}
+
+# Can it be shown itself? The class of an integer64 is its only attribute.
+is_short <- function(x) {
+  plain <- if (is_integer64(x)) unclass(x) else x
+  is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))
 }
