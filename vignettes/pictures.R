@@ -2,7 +2,7 @@
 # stay below five megabytes.
 
 # Rewrites PNG files with fewer colours. They look the same and take a third of the room.
-fewer_colours <- function(files, max = 32) {
+fewer_colours <- function(files, max = 16) {
   for (file in files) {
     picture <- magick::image_quantize(
       magick::image_read(file), max = max, colorspace = "sRGB", dither = FALSE
@@ -14,7 +14,7 @@ fewer_colours <- function(files, max = 32) {
 # The options of a vignette's chunks. What they draw has fewer colours, where magick is there.
 set_up_pictures <- function(height) {
   knitr::opts_chunk$set(
-    collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height, dpi = 80,
+    collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height, dpi = 72,
     dev.args = list(antialias = "none")
   )
   write_link <- knitr::knit_hooks$get("plot")
