@@ -1,4 +1,4 @@
-# Makes the table of solved environments, inst/extdata/solve-table.csv (a row for each training) and
+# Makes the table of solved environments, inst/extdata/solve-table.csv.gz (a row for each training) and
 # solve-curves.csv.gz (the evaluations of each): trains every environment of tools/solve/jobs.R with
 # the settings of agent_presets(), with seeds that no setting was tried on.
 #
@@ -13,7 +13,7 @@ source("tools/solve/readme.R")
 
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
 
-table_file <- "inst/extdata/solve-table.csv"
+table_file <- "inst/extdata/solve-table.csv.gz"
 curve_file <- "inst/extdata/solve-curves.csv.gz"
 key <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
 read_rows <- function(file) {

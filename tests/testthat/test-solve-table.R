@@ -11,7 +11,7 @@ task_of <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
 choice_of <- function(rows) rows$seed %/% 1000L
 
 test_that("each seed has one row, without a gap, failures included", {
-  table <- read_solved("solve-table.csv")
+  table <- read_solved("solve-table.csv.gz")
   for (own in split(table, paste(table$env_id, table$kwargs))) {
     choice <- choice_of(own)
     expect_identical(unique(choice), seq_len(max(choice)))
@@ -26,7 +26,7 @@ test_that("each seed has one row, without a gap, failures included", {
 })
 
 test_that("the curves end with the final evaluations of the table", {
-  table <- read_solved("solve-table.csv")
+  table <- read_solved("solve-table.csv.gz")
   curves <- read_solved("solve-curves.csv.gz")
   final <- curves[curves$kind == "final", ]
   expect_identical(task_of(final), task_of(table))
@@ -36,7 +36,7 @@ test_that("the curves end with the final evaluations of the table", {
 })
 
 test_that("its settings are the presets, by which a row can be made again", {
-  table <- read_solved("solve-table.csv")
+  table <- read_solved("solve-table.csv.gz")
   presets <- agent_presets()
   for (own in split(table, paste(table$env_id, table$kwargs))) {
     own <- own[choice_of(own) == max(choice_of(own)), ]
@@ -53,7 +53,7 @@ test_that("its settings are the presets, by which a row can be made again", {
 })
 
 test_that("a training of the table comes out the same again", {
-  table <- read_solved("solve-table.csv")
+  table <- read_solved("solve-table.csv.gz")
   row <- table[table$env_id == "CartPole-v1" & table$seed == 1001, ]
   trained <- suppressMessages(search_ars("CartPole-v1", seed = 1001, client = test_client()))
   expect_equal(trained$steps, row$steps)

@@ -1,6 +1,6 @@
-# The rows of README.md's short table, between its lines <!-- solved -->, from solve-table.csv.
+# The rows of README.md's short table, between its lines <!-- solved -->, from solve-table.csv.gz.
 
-write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv") {
+write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv.gz") {
   table <- utils::read.csv(table_file, colClasses = c(kwargs = "character"))
   task <- paste0(table$env_id, ifelse(nzchar(table$kwargs), paste0(", ", table$kwargs), ""))
   rows <- vapply(split(table, factor(task, unique(task))), function(rows) {
