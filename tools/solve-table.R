@@ -1,6 +1,6 @@
-# Makes the table of solved environments, inst/extdata/solve-table.csv.gz (a row for each training)
-# and solve-curves.csv.gz (the evaluations of each): trains every environment of tools/solve/jobs.R with
-# the settings of agent_presets(), with seeds that no setting was tried on.
+# Makes the table of solved environments, inst/extdata/solve-table.csv.gz (a row for each training),
+# and solve-curves.csv.gz (the evaluations of each): trains every environment of tools/solve/jobs.R
+# with the settings of agent_presets(), with seeds that no setting was tried on.
 #
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
 #
