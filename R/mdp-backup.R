@@ -67,10 +67,9 @@ most_cells <- 1e8
 
 check_fits_memory <- function(cells, what, call) {
   if (cells > most_cells) {
-    text <- function(x) format(x, big.mark = ",", scientific = FALSE)
     gym_abort(
-      paste0(what, " takes tables of ", text(cells), " numbers, and at most ", text(most_cells),
-             " are possible."),
+      paste0(what, " takes tables of ", whole_number_text(cells), " numbers, and at most ",
+             whole_number_text(most_cells), " are possible."),
       class = "gym_error_argument", argument = "model", call = call
     )
   }

@@ -1,10 +1,11 @@
 """Processes as Linux lists them."""
 
-import contextlib
 import os
 import shutil
 import subprocess
 from pathlib import Path
+
+from gym_server.processes import memory
 
 
 def is_running(pid):
@@ -26,17 +27,7 @@ def _state(directory):
 
 
 def descendants(pid):
-    stats = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        # It may end while it is looked at.
-        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            stats.append(stat.read_text())
-    # The number, the name in parentheses, the state, the parent's number.
-    parents = {int(one.split()[0]): int(one.rpartition(")")[2].split()[1]) for one in stats}
-    found = [pid]
-    for parent in found:
-        found += [child for child, its_parent in parents.items() if its_parent == parent]
-    return found[1:]
+    return list(memory.descendants(pid))
 
 
 def r_has_the_package():

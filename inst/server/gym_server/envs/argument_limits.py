@@ -51,14 +51,14 @@ _ENVIRONMENT_LIMITS = {
     "num_threads": (0, 64),
 }
 
-# The same of wrappers, which check for themselves what is too small.
+# The most of such arguments of wrappers, which check for themselves what is too small.
 _WRAPPER_LIMITS = {
-    "AtariPreprocessing": {"screen_size": (-math.inf, 4_096)},
-    "DelayObservation": {"delay": (-math.inf, 1_000)},
-    "DiscretizeAction": {"bins": (-math.inf, 10_000)},
-    "DiscretizeObservation": {"bins": (-math.inf, 10_000)},
-    "FrameStackObservation": {"stack_size": (-math.inf, 1_000)},
-    "ResizeObservation": {"shape": (-math.inf, 4_096)},
+    "AtariPreprocessing": ("screen_size", 4_096),
+    "DelayObservation": ("delay", 1_000),
+    "DiscretizeAction": ("bins", 10_000),
+    "DiscretizeObservation": ("bins", 10_000),
+    "FrameStackObservation": ("stack_size", 1_000),
+    "ResizeObservation": ("shape", 4_096),
 }
 
 # A map of FrozenLake of 250 x 250, which takes a second to be made.
@@ -96,7 +96,9 @@ def check_wrapper(wrapper: Wrapper) -> None:
     Raises:
         GymServerError: ``invalid_kwargs``.
     """
-    _check_sizes(wrapper.kwargs, _WRAPPER_LIMITS.get(wrapper.name, {}), f"{wrapper.name}: ")
+    if wrapper.name in _WRAPPER_LIMITS:
+        name, most = _WRAPPER_LIMITS[wrapper.name]
+        _check_sizes(wrapper.kwargs, {name: (-math.inf, most)}, f"{wrapper.name}: ")
 
 
 def check_reset_options(env: gymnasium.Env | VectorEnv, options: dict | None) -> None:

@@ -52,6 +52,7 @@ class Environment(Protocol):
     draws_when_stepped: bool
     draws_on_render_thread: bool
     drawn: bool
+    fails_as_a_whole: bool
 
     @property
     def grown(self) -> int:
@@ -60,8 +61,6 @@ class Environment(Protocol):
     @property
     def pids(self) -> Sequence[int]:
         """See above."""
-
-    fails_as_a_whole: bool
 
     # Reset ---------------------------------------------------------------------------------
 

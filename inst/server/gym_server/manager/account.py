@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
 from gym_server.errors import GymServerError
@@ -35,7 +36,7 @@ class Account:
 
     def measure(self) -> None:
         """Look at the processes, which takes some milliseconds."""
-        self._descendants = memory.descendants()
+        self._descendants = memory.descendants(os.getpid())
         # Forked pages count several times; only if all are too much are they left out.
         for exactly in (False, True):
             self._of_processes = {pid: memory.bytes_of(pid, exactly) for pid in self._descendants}

@@ -378,12 +378,11 @@ class InstanceManager:
             return
         with self._lock:
             instances = list(self._instances.values())
-        sizes = [one.grown + self.account.of(one.pids) for one in instances]
-        largest = max(range(len(instances)), key=sizes.__getitem__, default=None)
-        if largest is None or sizes[largest] <= 0:
+        sizes = {one: one.grown + self.account.of(one.pids) for one in instances}
+        instance = max(sizes, key=sizes.__getitem__, default=None)
+        if instance is None or sizes[instance] <= 0:
             return
-        instance = instances[largest]
-        why = memory_closed(instance.instance_id, instance.env_id, sizes[largest] / 2**20)
+        why = memory_closed(instance.instance_id, instance.env_id, sizes[instance] / 2**20)
         if self._unlist(instance.instance_id, why) is not None:
             log.warning("%s", why.message)
             self._evicting.set()

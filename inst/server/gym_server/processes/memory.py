@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import gc
 import os
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TypeVar
 
 ResultT = TypeVar("ResultT")
@@ -67,7 +65,6 @@ def give_back(garbage: bool = True) -> None:
 
 # Measuring ----------------------------------------------------------------------------------
 
-_PROC = Path("/proc")
 _MEASURES = sys.platform == "linux"
 _PAGE = os.sysconf("SC_PAGE_SIZE") if _MEASURES else 0
 
@@ -84,18 +81,18 @@ def measured(call: Callable[[], ResultT]) -> tuple[ResultT, int]:
     return result, own_bytes() - before
 
 
-def descendants() -> dict[int, int]:
-    """Return the processes below this one, each with the one that started it."""
+def descendants(pid: int) -> dict[int, int]:
+    """Return the processes below one, each after and with the one that started it."""
     children: dict[int, list[int]] = defaultdict(list)
-    for pid, parent in _parents() if _MEASURES else ():
-        children[parent].append(pid)
+    for child, parent in _parents() if _MEASURES else ():
+        children[parent].append(child)
     found: dict[int, int] = {}
-    waiting = [os.getpid()]
+    waiting = [pid]
     while waiting:
         parent = waiting.pop()
-        for pid in children[parent]:
-            found[pid] = parent
-            waiting.append(pid)
+        for child in children[parent]:
+            found[child] = parent
+            waiting.append(child)
     return found
 
 
@@ -109,22 +106,26 @@ def bytes_of(pid: int, exactly: bool) -> int:
     """
     if not exactly:
         return _resident(pid)
-    with contextlib.suppress(OSError):
-        lines = (_PROC / str(pid) / "smaps_rollup").read_text().splitlines()
-        return 1024 * sum(int(line.split()[1]) for line in lines if line.startswith("Private_"))
-    return 0
+    lines = _read(pid, "smaps_rollup").splitlines()
+    return 1024 * sum(int(line.split()[1]) for line in lines if line.startswith("Private_"))
 
 
 def _resident(pid: int) -> int:
-    with contextlib.suppress(OSError):
-        _, resident, shared, *_ = (_PROC / str(pid) / "statm").read_text().split()
-        return (int(resident) - int(shared)) * _PAGE
-    return 0
+    _, resident, shared, *_ = _read(pid, "statm").split() or (0, 0, 0)
+    return (int(resident) - int(shared)) * _PAGE
 
 
 def _parents() -> Iterator[tuple[int, int]]:
-    for entry in _PROC.glob("[0-9]*"):
-        # It may end while it is looked at.
-        with contextlib.suppress(OSError):
-            # The number, the name in parentheses, the state, the parent's number.
-            yield int(entry.name), int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        # The number, the name in parentheses, the state, the parent's number.
+        if stat := _read(pid, "stat"):
+            yield int(pid), int(stat.rpartition(")")[2].split()[1])
+
+
+def _read(pid: int | str, name: str) -> str:
+    """Return what the system says of a process, nothing of one that is gone."""
+    try:
+        with open(f"/proc/{pid}/{name}", encoding="utf-8", errors="replace") as file:
+            return file.read()
+    except OSError:
+        return ""
