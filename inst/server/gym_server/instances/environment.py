@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from gymnasium.spaces import Space
 
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.drawing import Drawing
 from gym_server.errors import GymServerError
 from gym_server.instances.episode_statistics import Statistics
 from gym_server.protocol.answers import AnswerForm
@@ -33,8 +34,7 @@ class Environment(Protocol):
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_on_render_thread: whether ``draw()`` uses the render thread.
-        drawn: whether it may have been drawn, so that it is closed on the render thread.
-        grown: by how many bytes drawing has made this process grow.
+        drawing: how it is drawn, and closed.
         pids: the processes that run it, beside this one.
         fails_as_a_whole: whether it needs a reset after a step that failed.
     """
@@ -51,12 +51,8 @@ class Environment(Protocol):
     autoreset_mode: str | None
     draws_when_stepped: bool
     draws_on_render_thread: bool
-    drawn: bool
+    drawing: Drawing
     fails_as_a_whole: bool
-
-    @property
-    def grown(self) -> int:
-        """See above."""
 
     @property
     def pids(self) -> Sequence[int]:

@@ -244,7 +244,7 @@ class LocalBackend:
     @property
     def grown(self) -> int:
         """By how many bytes drawing and seeds for later episodes have made this process grow."""
-        return self.env.grown + self._seed_bytes
+        return self.env.drawing.grown + self._seed_bytes
 
     @property
     def pids(self) -> Sequence[int]:
@@ -273,7 +273,7 @@ class LocalBackend:
                 f"Instance {instance_id} is already monitored",
                 "close that monitor first",
             )
-        self.env.drawn = self.env.drawn or video_every > 0
+        self.env.drawing.drawn = self.env.drawing.drawn or video_every > 0
         self._monitor = Monitor.start(
             self.env.gym_env,
             root,

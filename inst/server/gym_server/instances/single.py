@@ -12,13 +12,13 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.drawing import Drawing
 from gym_server.envs.outcomes import checked_info, reward_number
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError
 from gym_server.instances.environment import env_id_of
 from gym_server.instances.episode_statistics import EpisodeStatistics, Statistics
 from gym_server.json_values import plain
-from gym_server.processes.memory import measured
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
@@ -43,11 +43,9 @@ class SingleEnvironment:
         self.observation_space = self.single_observation_space = env.observation_space
         self.draws_when_stepped = draws_when_stepped(env)
         self.draws_on_render_thread = env.render_mode == "rgb_array"
-        self.drawn = self.draws_when_stepped
-        self.grown = 0
+        self.drawing = Drawing(renderer, self.draws_when_stepped)
         self.statistics: Statistics = EpisodeStatistics()
         self.has_ended = False
-        self._renderer = renderer
 
     def check_reset(
         self, seed: object, options: dict | None, mask: np.ndarray | None, was_reset: bool
@@ -141,14 +139,11 @@ class SingleEnvironment:
 
     def draw(self, sub_env: int) -> object:
         """Draw the environment on the render thread."""
-        self.drawn = True
-        frame, grown = self._renderer.run(measured, self.gym_env.render)
-        self.grown += grown
-        return frame
+        return self.drawing.draw(self.gym_env.render)
 
     def close(self) -> None:
         """Close the environment."""
-        self._renderer.close(self.gym_env.close, self.drawn)
+        self.drawing.close(self.gym_env.close)
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Do nothing: this process does not end by itself."""

@@ -58,8 +58,7 @@ class VectorEnvironment:
         self.num_workers = env.num_workers
         self.autoreset_mode: str | None = env.autoreset_mode.value
         self.draws_when_stepped = env.draws_when_stepped
-        # What runs the sub-environments knows it.
-        self.drawn = False
+        self.drawing = env.drawing
         self.draws_on_render_thread = env.render_mode == "rgb_array" and env.draws_in_process
         self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
 
@@ -249,11 +248,6 @@ class VectorEnvironment:
     def decode(self, space: Space, value: object) -> object:
         """Return the members of a space in a list that has one for each sub-environment."""
         return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
-
-    @property
-    def grown(self) -> int:
-        """By how many bytes drawing has made this process grow."""
-        return int(self.gym_env.grown)
 
     @property
     def pids(self) -> Sequence[int]:

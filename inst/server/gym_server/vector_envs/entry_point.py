@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from gym_server.envs.drawing import Drawing
 from gym_server.errors import GymServerError
-from gym_server.processes.memory import measured
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import member_of
 
@@ -38,9 +38,7 @@ class EntryPointEnv:
             renderer: the process's render thread.
         """
         self._env: Any = env
-        self._renderer = renderer
-        self._drawn = False
-        self.grown = 0
+        self.drawing = Drawing(renderer)
         self.num_envs = env.num_envs
         self.autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
         self.ended = np.zeros(env.num_envs, dtype=bool)
@@ -81,9 +79,7 @@ class EntryPointEnv:
                 f"draw are {_MOST_DRAWN_AT_ONCE}",
                 "create the environment with vectorization_mode 'sync'",
             )
-        self._drawn = True
-        frames, grown = self._renderer.run(measured, self._env.render)
-        self.grown += grown
+        frames: Any = self.drawing.draw(self._env.render)
         return frames[sub_env]
 
     def observed(self, sub_env: int, batch: object) -> object:
@@ -95,7 +91,7 @@ class EntryPointEnv:
 
     def close(self) -> None:
         """Close the environment."""
-        self._renderer.close(self._env.close, self._drawn)
+        self.drawing.close(self._env.close)
 
     def kill(self, why: GymServerError | None = None) -> None:
         """Do nothing: it runs in this process."""

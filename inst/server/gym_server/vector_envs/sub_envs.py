@@ -18,6 +18,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from gym_server import spaces
+from gym_server.envs.drawing import Drawing
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, shutting_down
 from gym_server.processes.cores import spread
@@ -86,6 +87,7 @@ class SubEnvs:
         self.ended = np.zeros(num_envs, dtype=bool)
         self.moved: np.ndarray | None = None
         self._renderer = renderer
+        self.drawing = Drawing(renderer)
         self._keeps_processes = keeps_processes
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._is_closed = False
@@ -97,8 +99,9 @@ class SubEnvs:
         self._groups: list[AnyGroup] = []
         if num_workers == 0:
             group = Group(sub_env, groups[0], autoreset_mode)
-            self._groups.append(LocalGroup(group, renderer))
             self._describe(group.envs[0], group.render_mode)
+            self.drawing.drawn = self.draws_when_stepped
+            self._groups.append(LocalGroup(group, self.drawing))
         else:
             self._describe_one(sub_env)
             # An interrupt while the thread talks to the fork server would break that, and with it
@@ -318,11 +321,6 @@ class SubEnvs:
         if not self._is_closed:
             self.kill(why)
             self._on_end(why)
-
-    @property
-    def grown(self) -> int:
-        """By how many bytes drawing them has made this process grow."""
-        return sum(group.grown for group in self._groups if isinstance(group, LocalGroup))
 
     @property
     def pids(self) -> list[int]:

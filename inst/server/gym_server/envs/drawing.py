@@ -1,0 +1,35 @@
+"""How an environment of this process is drawn, and closed in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from gym_server.processes.memory import measured
+from gym_server.rendering.render_thread import RenderThread
+
+
+class Drawing:
+    """Draws an environment on the render thread, and closes it there if it was drawn.
+
+    Attributes:
+        drawn: whether it may have been drawn.
+        grown: by how many bytes drawing it has made this process grow.
+    """
+
+    def __init__(self, renderer: RenderThread, drawn: bool = False) -> None:
+        """Begin with one that draws when it is stepped (``drawn``), or one that was not drawn."""
+        self._renderer = renderer
+        self.drawn = drawn
+        self.grown = 0
+
+    def draw(self, render: Callable, *args: object) -> object:
+        """Return what a function draws."""
+        self.drawn = True
+        frame, grown = self._renderer.run(measured, partial(render, *args))
+        self.grown += grown
+        return frame
+
+    def close(self, close: Callable[[], object]) -> None:
+        """Call the function that closes the environment."""
+        self._renderer.close(close, self.drawn)
