@@ -19,19 +19,22 @@ take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   if (is_server_env(env)) {
     return(step_bare(env, action, which, finals))
   }
-  out <- plain_step(if (is.null(which)) env$step(action) else env$step(action, which = which))
+  out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
   if (!inherits(env, "gym_r_env")) {
+    out <- plain_step(out)
     where <- "`step()` of this environment"
     check_step_parts(out, n, where, NULL, needed = c("observation", "reward", flags))
   }
   out
 }
 
-# What a step returned, with plain numbers where it has an integer64.
+# What a step returned, with plain numbers where it has an integer64. Each step is looked at, so
+# what has no class is left at once.
 plain_step <- function(out) {
   if (is.list(out)) {
-    for (name in intersect(c("observation", "next_observation"), names(out))) {
-      out[name] <- list(narrow_values(out[[name]]))
+    for (name in c("observation", "next_observation")) {
+      value <- out[[name]]
+      if (is.object(value) || is.list(value)) out[name] <- list(narrow_values(value))
     }
     if (is_integer64(out$reward)) out$reward <- plain_numbers(out$reward, "reward", NULL)
   }
