@@ -1,0 +1,137 @@
+# The linear equations of a policy's values, by sweeps where few are enough, else solved.
+
+# Up to so many states equations are solved at once; sweeps would take longer.
+unswept_states <- 100L
+
+#' Prepare to solve `values = rewards + weight %*% values`
+#'
+#' @param weight A square matrix, full or sparse, without negative numbers.
+#' @return A function of rewards, none of which may be negative: so each value is accurate relative
+#'   to its own size, also one that is tiny beside the others.
+#' @noRd
+chain_solver <- function(weight, call) {
+  solver <- NULL
+  function(rewards) {
+    if (all(rewards == 0)) {
+      return(rewards)
+    }
+    swept <- if (length(rewards) > unswept_states) swept_values(weight, rewards)
+    if (!is.null(swept)) {
+      return(swept)
+    }
+    tryCatch({
+      solver <<- solver %||% if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight)
+      solved_values(weight, rewards, solver)
+    }, error = function(e) abort_unsolved(length(rewards), call))
+  }
+}
+
+#' Apply a policy's equations until the values stay
+#'
+#' Where after k sweeps from 0 no value grows by more than a share e of itself, none grows by more
+#' than a share of about 2 k e in the k sweeps that follow, and so on: this is how far off they are
+#' at most. Or the bounds of what is still to come are close to each other, which is often sooner.
+#' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
+#' @noRd
+swept_values <- function(weight, rewards, enough = 1e-15) {
+  most <- 500L
+  every <- 25L
+  bounded <- growth_bounds(weight)
+  ahead <- if (is.matrix(weight)) padded_product(weight) else function(x) as.vector(weight %*% x)
+  values <- rewards
+  before <- Inf
+  for (sweep in seq_len(most)) {
+    new <- rewards + ahead(values)
+    growth <- new - values
+    values <- new
+    share <- max(growth / pmax(values, .Machine$double.xmin))
+    final <- if (share <= enough) values else bounded(values, growth)
+    if (!is.null(final)) {
+      return(final)
+    }
+    if (sweep %% every == 0L) {
+      # How many more sweeps it takes when growth goes down as it did.
+      if (share >= before || every * log(enough / share) / log(share / before) > most - sweep) {
+        return(NULL)
+      }
+      before <- share
+    }
+  }
+}
+
+# A function that multiplies a full matrix by a vector, of which it looks only at the numbers that
+# are not 0, put to the left.
+padded_product <- function(weight) {
+  at <- which(t(weight) > 0, arr.ind = TRUE)
+  from <- at[, 2L]
+  place <- sequence(rle(from)$lengths)
+  shape <- c(nrow(weight), max(place, 1L))
+  column <- array(1L, shape)
+  column[cbind(from, place)] <- at[, 1L]
+  left <- array(0, shape)
+  left[cbind(from, place)] <- weight[at[, 2:1, drop = FALSE]]
+  function(x) .rowSums(left * x[column], shape[[1L]], shape[[2L]])
+}
+
+#' Prepare to judge values by how they grew in a sweep
+#'
+#' What is still to come lies between the least and the greatest growth times the steps that are
+#' still to go (MacQueen 1966, A modified dynamic programming method for Markovian decision
+#' problems).
+#' @return A function of values and their growth that returns the values with the middle of these
+#'   bounds added, or `NULL` where they are too far from each other.
+#' @noRd
+growth_bounds <- function(weight) {
+  goes_on <- range(times(weight, rep(1, nrow(weight))))
+  to_go <- goes_on / (1 - goes_on)
+  rounding <- 8 * .Machine$double.eps / (1 - goes_on[[2L]])
+  if (goes_on[[2L]] >= 1 || rounding >= tie_tolerance) {
+    return(function(values, growth) NULL)
+  }
+  function(values, growth) {
+    to_come <- to_go * range(growth)
+    if (diff(to_come) <= max(sweep_tolerance, rounding) * min(values)) values + mean(to_come)
+  }
+}
+
+solved_values <- function(weight, rewards, solver) {
+  values <- solver(rewards)
+  # What solving left over is solved again, until it is only rounding in every single state.
+  for (round in 1:3) {
+    left <- rewards + times(weight, values) - values
+    if (all(abs(left) <= 8 * .Machine$double.eps * values)) break
+    values <- pmax(values + solver(left), 0)
+  }
+  values
+}
+
+full_solver <- function(weight) {
+  equations <- diag(nrow(weight)) - weight
+  function(rewards) solve(equations, rewards, tol = 0)
+}
+
+sparse_solver <- function(weight) {
+  all <- seq_len(nrow(weight))
+  equations <- Matrix::sparseMatrix(
+    i = c(all, weight@i + 1L), j = c(all, rep(all, diff(weight@p))),
+    x = c(rep(1, length(all)), -weight@x), dims = dim(weight)
+  )
+  # With such a tolerance the pivots are those of the diagonal, which are the accurate ones where
+  # all other numbers are negative, and which leave more zeros.
+  factors <- Matrix::lu(equations, tol = 1e-300)
+  function(rewards) {
+    values <- numeric(length(rewards))
+    half <- Matrix::solve(factors@L, rewards[factors@p + 1L])
+    values[factors@q + 1L] <- as.vector(Matrix::solve(factors@U, half))
+    values
+  }
+}
+
+abort_unsolved <- function(states, call) {
+  gym_abort(
+    c(paste0("The equations of ", count_of(states, "state"), " cannot be solved: either memory ",
+             "does not suffice for so many, or episodes hardly ever end."),
+      i = "Give a lower `discount`, or a `horizon`."),
+    class = "gym_error_argument", argument = "discount", call = call
+  )
+}
