@@ -30,12 +30,12 @@ from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
 from gym_server.manager.tombstones import Tombstones
 from gym_server.processes import memory
+from gym_server.processes.pool import pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt, interrupted_by
 from gym_server.vector_envs import make as vector_make
 from gym_server.vector_envs.num_workers import most_workers
-from gym_server.vector_envs.warm_processes import warm_processes
 
 log = logging.getLogger(__name__)
 
@@ -371,7 +371,7 @@ class InstanceManager:
         self.account.measure()
         if not self.account.is_exceeded or self._evicting.is_set():
             return
-        warm_processes.end()
+        pool.end()
         memory.give_back()
         self.account.measure()
         if not self.account.is_exceeded:
@@ -436,7 +436,7 @@ class InstanceManager:
         for thread in threads:
             thread.join()
         # After them: closing them leaves processes there.
-        warm_processes.end()
+        pool.end()
 
     def _new_id(self) -> str:
         while True:

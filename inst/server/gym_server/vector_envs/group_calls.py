@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gym_server.vector_envs.group_process import GroupProcess
+from gym_server.processes.pool_process import PoolProcess
 from gym_server.vector_envs.local_group import LocalGroup
 
-AnyGroup = LocalGroup | GroupProcess
+AnyGroup = LocalGroup | PoolProcess
 
 
 def call_all(calls: Iterable[tuple[AnyGroup, str, tuple]]) -> list:
     """Begin all calls, wait for all results; then raise the first error.
 
     Args:
-        calls: a group, the name of the method that begins a call of it, and that one's arguments.
+        calls: a group, the name of one of its methods, and the arguments.
     """
     results = []
     begun = []
     failure: BaseException | None = None
     try:
-        for group, begin, arguments in calls:
-            getattr(group, begin)(*arguments)
+        for group, method, arguments in calls:
+            group.begin(method, *arguments)
             begun.append(group)
     except BaseException as refusal:
         failure = refusal

@@ -6,6 +6,7 @@ for a step of all. What comes of it is the same for any number of processes.
 
 from __future__ import annotations
 
+import pickle
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -22,16 +23,17 @@ from gym_server.envs.drawing import Drawing
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, shutting_down
 from gym_server.processes.cores import spread
+from gym_server.processes.pool import pool
+from gym_server.processes.pool_process import PoolProcess
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.threads.interrupt import interrupted_by
+from gym_server.vector_envs import group_worker
 from gym_server.vector_envs.group import Group, Outcome
 from gym_server.vector_envs.group_calls import AnyGroup, call_all
-from gym_server.vector_envs.group_process import GroupProcess
 from gym_server.vector_envs.infos import final_only, gather
 from gym_server.vector_envs.local_group import LocalGroup
 from gym_server.vector_envs.sub_env import SubEnv
-from gym_server.vector_envs.warm_processes import warm_processes
 
 # How long closing may take in a process before that is killed.
 _CLOSE_SECONDS = 3.0
@@ -136,12 +138,13 @@ class SubEnvs:
     def _start(self, sub_env: SubEnv, groups: Sequence[range]) -> None:
         try:
             for _ in groups:
-                self._groups.append(warm_processes.take())
+                self._groups.append(pool.take(group_worker.__name__))
                 # After it is where kill() looks: one of the two finds it.
                 if self._is_closed:
                     raise shutting_down()
+            pickled = _pickled(sub_env)
             call_all(
-                (group, "begin_make", (sub_env, numbers, self.autoreset_mode))
+                (group, "make", (pickled, numbers, self.autoreset_mode))
                 for group, numbers in zip(self._groups, groups, strict=True)
             )
         except GymServerError as refusal:
@@ -287,7 +290,7 @@ class SubEnvs:
                 if first < last or everywhere:
                     rows = slice(first, last)
                     own = None if which is None else (which[rows] - start).tolist()
-                    yield group, "begin", (method, own, *arguments(rows))
+                    yield group, method, (own, *arguments(rows))
 
         return call_all(calls())
 
@@ -313,7 +316,7 @@ class SubEnvs:
         """From now on report when one of its processes ends by itself, or at once if it has."""
         self._on_end = on_end
         for group in self._groups:
-            if isinstance(group, GroupProcess):
+            if isinstance(group, PoolProcess):
                 group.report_end(self._end)
 
     def _end(self, why: GymServerError) -> None:
@@ -325,7 +328,7 @@ class SubEnvs:
     @property
     def pids(self) -> list[int]:
         """The numbers of its processes."""
-        return [group.pid for group in self._groups if isinstance(group, GroupProcess)]
+        return [group.pid for group in self._groups if isinstance(group, PoolProcess)]
 
     def close(self) -> None:
         """Close all sub-environments, and let their processes run others or end."""
@@ -349,7 +352,7 @@ class SubEnvs:
         timer.daemon = True
         timer.start()
         try:
-            call_all((group, "begin", ("close",)) for group in self._groups)
+            call_all((group, "close", ()) for group in self._groups)
         except BaseException:
             self._kill_processes()
             if not is_overdue.is_set():
@@ -359,8 +362,8 @@ class SubEnvs:
         finally:
             timer.cancel()
         for group in self._groups:
-            if isinstance(group, GroupProcess) and self._keeps_processes:
-                warm_processes.put(group)
+            if isinstance(group, PoolProcess) and self._keeps_processes:
+                pool.put(group)
         if not self._keeps_processes:
             self._kill_processes()
 
@@ -371,8 +374,15 @@ class SubEnvs:
 
     def _kill_processes(self, why: GymServerError | None = None) -> None:
         for group in self._groups:
-            if isinstance(group, GroupProcess):
+            if isinstance(group, PoolProcess):
                 group.kill(why)
+
+
+def _pickled(sub_env: SubEnv) -> bytes:
+    try:
+        return pickle.dumps(sub_env, 5)
+    except Exception as failure:
+        raise GymServerError("not_supported", str(failure)) from failure
 
 
 def _bounds(num_envs: int, groups: int) -> list[int]:

@@ -16,11 +16,11 @@ from vector_play import MODES_SLOWLY, actions_of
 
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, call_too_long
+from gym_server.processes.pool import Pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import stack
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
-from gym_server.vector_envs.warm_processes import WarmProcesses
 
 
 @pytest.fixture
@@ -79,9 +79,9 @@ def play(env, steps, seed=7, mode="NextStep", with_infos=True):
 @pytest.fixture(scope="module")
 def kept_processes():
     """Keep the processes of one test for the next."""
-    pool = WarmProcesses(most=5)
+    pool = Pool(most=5)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gym_server.vector_envs.sub_envs.warm_processes", pool)
+        patch.setattr("gym_server.vector_envs.sub_envs.pool", pool)
         yield
     pool.end()
 

@@ -1,4 +1,4 @@
-"""Processes that have no group at the moment and wait for the next one.
+"""The pool of processes that run sub-environments and whole episodes, and wait for the next ones.
 
 To start a process takes 20 ms, and a second on Windows. One that has run environments of foreign
 packages is not kept: who knows what they have left in it. Nor is one that has become large.
@@ -11,17 +11,21 @@ import time
 
 from gym_server.processes.cores import usable_cores
 from gym_server.processes.memory import bytes_of
-from gym_server.vector_envs.group_process import GroupProcess
+from gym_server.processes.pool_process import PoolProcess
 
 # What has drawn with MuJoCo keeps 110 MiB.
 _MOST_BYTES = 128 * 2**20
 
-# After so many seconds without a group a process ends.
+# After so many seconds without work a process ends.
 _IDLE_SECONDS = 600.0
 
 
-class WarmProcesses:
-    """Keeps at most as many processes as there are cores."""
+class Pool:
+    """Keeps at most as many processes as there are cores.
+
+    Attributes:
+        most_mb: how much memory the system lets a process have, in MiB; 0 for no limit.
+    """
 
     def __init__(self, most: int | None = None, idle_seconds: float = _IDLE_SECONDS) -> None:
         """Start with none.
@@ -30,24 +34,39 @@ class WarmProcesses:
             most: how many to keep; None for one a core.
             idle_seconds: how long to keep one.
         """
+        self.most_mb = 0
         self._most = usable_cores() if most is None else most
         self._idle_seconds = idle_seconds
         self._lock = threading.Lock()
         # With the time at which each was put here, the last one last.
-        self._idle: list[tuple[float, GroupProcess]] = []
+        self._idle: list[tuple[float, PoolProcess]] = []
         self._timer: threading.Timer | None = None
 
-    def take(self) -> GroupProcess:
-        """Return a process without a group, started if need be."""
-        with self._lock:
-            while self._idle:
-                process = self._idle.pop()[1]
-                if process.is_alive:
-                    return process
-        return GroupProcess()
+    def take(self, module: str, polite: bool = False) -> PoolProcess:
+        """Return a process that nobody uses, started if need be.
 
-    def put(self, process: GroupProcess) -> None:
-        """Keep a process that has closed its group, or end it if there are enough."""
+        Args:
+            module: the name of the module whose functions it is to run.
+            polite: whether it gives way to other processes from now on, also those that use it
+                later; ordinary ones are given to those who did not ask for that.
+        """
+        process = self._take_idle(polite) or PoolProcess(self.most_mb)
+        process.module = module
+        if polite:
+            process.give_way()
+        return process
+
+    def _take_idle(self, polite: bool) -> PoolProcess | None:
+        with self._lock:
+            for place in reversed(range(len(self._idle))):
+                process = self._idle[place][1]
+                if process.is_alive and (polite or not process.gives_way):
+                    del self._idle[place]
+                    return process
+        return None
+
+    def put(self, process: PoolProcess) -> None:
+        """Keep a process whose work is done, or end it if there are enough."""
         process.release()
         is_small = bytes_of(process.pid, exactly=True) <= _MOST_BYTES
         with self._lock:
@@ -86,5 +105,5 @@ class WarmProcesses:
             process.kill()
 
 
-# The processes of this process's vector environments.
-warm_processes = WarmProcesses()
+# That of this process.
+pool = Pool()

@@ -10,18 +10,21 @@ from gymnasium.vector import AutoresetMode
 from running import is_running
 
 from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.processes.pool import Pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
-from gym_server.vector_envs.warm_processes import WarmProcesses
+
+
+GROUPS = "gym_server.vector_envs.group_worker"
 
 
 @pytest.fixture
 def warm(monkeypatch):
     def warm(**how):
-        made.append(WarmProcesses(**how))
+        made.append(Pool(**how))
         for user in ("vector_envs.sub_envs", "manager.instance_manager"):
-            monkeypatch.setattr(f"gym_server.{user}.warm_processes", made[-1])
+            monkeypatch.setattr(f"gym_server.{user}.pool", made[-1])
         return made[-1]
 
     made = []
@@ -59,7 +62,7 @@ def test_what_has_become_large_is_not_kept(warm, monkeypatch, eventually):
     warm(most=2)
     env = make()
     pids = env.pids
-    monkeypatch.setattr("gym_server.vector_envs.warm_processes._MOST_BYTES", 2**20)
+    monkeypatch.setattr("gym_server.processes.pool._MOST_BYTES", 2**20)
     env.close()
     eventually(lambda: not any(map(is_running, pids)))
 
@@ -112,9 +115,9 @@ class Clock:
 def test_none_waits_longer_because_another_one_came_later(warm, monkeypatch, eventually):
     clock = Clock()
     for module in ("time", "threading"):
-        monkeypatch.setattr(f"gym_server.vector_envs.warm_processes.{module}", clock)
+        monkeypatch.setattr(f"gym_server.processes.pool.{module}", clock)
     pool = warm(most=2, idle_seconds=2.0)
-    first, second = pool.take(), pool.take()
+    first, second = pool.take(GROUPS), pool.take(GROUPS)
     pool.put(first)
     clock.now = 1.5
     pool.put(second)
@@ -130,20 +133,20 @@ def test_none_waits_longer_because_another_one_came_later(warm, monkeypatch, eve
 
 def test_one_that_has_ended_takes_no_place(warm, eventually):
     pool = warm(most=1)
-    first, second = pool.take(), pool.take()
+    first, second = pool.take(GROUPS), pool.take(GROUPS)
     pool.put(first)
     os.kill(first.pid, signal.SIGKILL)
     eventually(lambda: not first.is_alive)
     pool.put(second)
     assert is_running(second.pid)
-    assert pool.take() is second
+    assert pool.take(GROUPS) is second
     second.kill()
 
 
 def test_the_end_of_a_server_ends_them(warm, quick, eventually):
     pool = warm(most=1)
     app = quick()
-    process = pool.take()
+    process = pool.take(GROUPS)
     pool.put(process)
     app.close()
     eventually(lambda: not is_running(process.pid))
