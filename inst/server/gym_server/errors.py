@@ -159,6 +159,11 @@ def invalid_parameter(name: str, value: object, wanted: str) -> GymServerError:
     )
 
 
+def invalid_policy(problem: str, fix: str | None = None) -> GymServerError:
+    """A policy cannot be played: it is malformed, or does not fit the environment's spaces."""
+    return GymServerError("invalid_policy", problem, fix)
+
+
 def wrong_length(name: str, found: int, num_envs: int, what: str) -> GymServerError:
     """The length of a list is not the number of sub-environments."""
     return GymServerError(

@@ -1,0 +1,10 @@
+"""Policies that are data: read one, and act by it, without asking a client for each action.
+
+They act as the policies of the R package do (``R/policy-*.R``): the same actions but for the last
+bits of sums, which NumPy adds in another order.
+"""
+
+from gym_server.policies.acting import Actor, GroupActor, Policy
+from gym_server.policies.read import read_policy
+
+__all__ = ["Actor", "GroupActor", "Policy", "read_policy"]

@@ -1,0 +1,75 @@
+"""Read the fields and tensors of a policy; all of them must be known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gym_server.errors import invalid_policy
+from gym_server.json_values import brief
+
+
+def check_fields(document: Mapping, tensors: Mapping[str, np.ndarray], *known: str) -> None:
+    """Refuse a field or a tensor that a policy of this kind does not have."""
+    for what, given in (("field", document), ("tensor", tensors)):
+        for name in given:
+            if name not in known and name != "kind":
+                raise invalid_policy(
+                    f"A {document['kind']} policy has no {what} {brief(name)}",
+                    f"it may have {', '.join(known) or 'none'}",
+                )
+
+
+def number(
+    document: Mapping, name: str, default: float | None, low: float, high: float, wanted: str
+) -> float | None:
+    """Return a field that is a number from ``low`` to ``high``."""
+    value = document.get(name)
+    if value is None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise invalid_policy(f"The policy's {name} must be {wanted}, not {brief(value)}")
+    return float(value)
+
+
+def epsilon_of(document: Mapping, default: float | None) -> float | None:
+    """Return how often a policy explores."""
+    return number(document, "epsilon", default, 0, 1, "a number from 0 to 1")
+
+
+def temperature_of(document: Mapping) -> float | None:
+    """Return the temperature of the softmax; None for no softmax."""
+    above_zero = math.nextafter(0, 1)
+    largest = math.nextafter(math.inf, 0)
+    return number(document, "temperature", None, above_zero, largest, "a number above 0")
+
+
+def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    """Return a tensor that the policy must have, as float64."""
+    if name not in tensors:
+        raise invalid_policy(f"The policy has no tensor {name}", f"send policy/{name}")
+    tensor = np.asarray(tensors[name])
+    if tensor.dtype.kind not in "fiu":
+        raise invalid_policy(f"The policy's {name} must be numbers, not {tensor.dtype.name}")
+    return tensor.astype(np.float64)
+
+
+def finite_numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    """Return a tensor that the policy must have, without infinities and NaN."""
+    tensor = numbers(tensors, name)
+    if not np.isfinite(tensor).all():
+        wrong = float(tensor[~np.isfinite(tensor)][0])
+        raise invalid_policy(f"The policy's {name} must be finite numbers, not {brief(wrong)}")
+    return tensor
+
+
+def shape_text(shape: tuple[int, ...]) -> str:
+    """Return a shape as a person writes it: 2 x 3."""
+    return " x ".join(map(str, shape)) or "a single number"
+
+
+def count_of(n: int, noun: str) -> str:
+    """Return a number with its noun: 1 input, 2 inputs."""
+    return f"{n:,} {noun}" + ("" if n == 1 else "s")

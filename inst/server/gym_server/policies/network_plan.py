@@ -1,0 +1,66 @@
+"""What the networks of a policy have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from math import prod
+
+import numpy as np
+from gymnasium.spaces import Discrete, Space
+
+from gym_server.policies.activation import HAVE_RANGE
+from gym_server.policies.inputs import Moments
+
+
+@dataclass(frozen=True)
+class NetworkPlan:
+    """All of a network but its weights.
+
+    Attributes:
+        sizes: how many inputs, neurons of each hidden layer, and outputs there are.
+        activation: the activation of each layer after the inputs.
+        bias: whether each neuron has a bias, the last column of its layer's matrix.
+        moments: what inputs are normalised by; None where they come in as they are.
+        output: "greedy", "softmax", "gaussian" or "epsilon-greedy".
+        epsilon: how often "epsilon-greedy" explores.
+        deviation: float64[candidates, outputs], the standard deviations of "gaussian"; otherwise
+            None.
+    """
+
+    sizes: tuple[int, ...]
+    activation: tuple[str, ...]
+    bias: bool = False
+    moments: Moments | None = None
+    output: str = "greedy"
+    epsilon: float = 0.0
+    deviation: np.ndarray | None = None
+
+    @cached_property
+    def shapes(self) -> list[tuple[int, int]]:
+        """The shape of each layer's matrix: a row a neuron, a column what it takes."""
+        return [
+            (neurons, taken + self.bias)
+            for taken, neurons in zip(self.sizes[:-1], self.sizes[1:], strict=True)
+        ]
+
+    @cached_property
+    def ends(self) -> list[int]:
+        """Where each layer's weights end; the last one is how many there are."""
+        return list(accumulate(prod(shape) for shape in self.shapes))
+
+    @property
+    def stretched_from(self) -> str | None:
+        """The activation whose range is stretched to the bounds of a Box; None where it has none.
+
+        With noise the outputs are the numbers of the action themselves.
+        """
+        last = self.activation[-1]
+        return last if last in HAVE_RANGE and self.output == "greedy" else None
+
+    def is_single(self, action_space: Space) -> bool:
+        """Tell whether a single output chooses between two actions."""
+        return (
+            self.sizes[-1] == 1 and isinstance(action_space, Discrete) and int(action_space.n) == 2
+        )

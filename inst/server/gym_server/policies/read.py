@@ -1,0 +1,130 @@
+"""Read a policy of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from gymnasium.spaces import Space
+
+from gym_server.errors import GymServerError, invalid_policy
+from gym_server.json_values import brief
+from gym_server.policies.acting import Policy
+from gym_server.policies.candidates import PolicyList
+from gym_server.policies.fields import check_fields, count_of
+from gym_server.policies.random import read_random
+from gym_server.policies.read_network import read_network
+from gym_server.policies.table import read_table
+
+_MOST_NUMBERS = 1_000_000
+_MOST_POLICIES = 10_000
+
+_Reader = Callable[[Mapping, Mapping[str, np.ndarray], Space, Space], Policy]
+
+_READERS: dict[str, _Reader] = {
+    "random": read_random,
+    "network": read_network,
+    "table": read_table,
+}
+
+
+def read_policy(
+    document: dict,
+    tensors: Mapping[str, np.ndarray],
+    observation_space: Space,
+    action_space: Space,
+) -> Policy:
+    """Read a policy, and bind it to an environment's spaces.
+
+    Args:
+        document: what the policy is, ``{"kind": ...}``.
+        tensors: its numbers by name: "weights", "mean", "q"; of a list "0/weights" and so on.
+        observation_space: what it observes.
+        action_space: what it chooses from.
+
+    Raises:
+        GymServerError: ``invalid_policy`` for one that is malformed or does not fit the spaces,
+            ``not_supported`` where no policy of its kind can play.
+    """
+    total = sum(tensor.size for tensor in tensors.values())
+    if total > _MOST_NUMBERS:
+        raise invalid_policy(
+            f"The policy has {total:,} numbers, and at most {_MOST_NUMBERS:,} are possible",
+            "ask for fewer candidates at a time",
+        )
+    if isinstance(document, Mapping) and document.get("kind") == "list":
+        return _read_list(document, tensors, observation_space, action_space)
+    return _read_one(document, tensors, observation_space, action_space)
+
+
+def _read_one(
+    document: object,
+    tensors: Mapping[str, np.ndarray],
+    observation_space: Space,
+    action_space: Space,
+) -> Policy:
+    kind = document.get("kind") if isinstance(document, Mapping) else None
+    if not isinstance(document, Mapping) or not isinstance(kind, str) or kind not in _READERS:
+        raise invalid_policy(
+            f"The policy must be an object whose kind is one of {', '.join(_READERS)} or list, "
+            f"not {brief(document)}",
+            "in a list each policy is of another kind than list",
+        )
+    return _READERS[kind](document, tensors, observation_space, action_space)
+
+
+def _read_list(
+    document: Mapping,
+    tensors: Mapping[str, np.ndarray],
+    observation_space: Space,
+    action_space: Space,
+) -> PolicyList:
+    documents = document.get("policies")
+    if not isinstance(documents, list) or not 1 <= len(documents) <= _MOST_POLICIES:
+        found = count_of(len(documents), "policy") if isinstance(documents, list) else documents
+        raise invalid_policy(
+            f"The policies of a list must be from 1 to {_MOST_POLICIES:,}, not {brief(found)}"
+        )
+    check_fields(document, {}, "policies")
+    parts = _by_policy(tensors, len(documents))
+    return PolicyList(
+        [
+            _read_numbered(index, own, parts[index], observation_space, action_space)
+            for index, own in enumerate(documents)
+        ]
+    )
+
+
+def _by_policy(tensors: Mapping[str, np.ndarray], n: int) -> list[dict[str, np.ndarray]]:
+    parts: list[dict[str, np.ndarray]] = [{} for _ in range(n)]
+    numbers = {str(index): index for index in range(n)}
+    for name, tensor in tensors.items():
+        first, _, rest = name.partition("/")
+        if first not in numbers:
+            raise invalid_policy(
+                f"The tensor {brief(name)} belongs to no policy of the list, which has "
+                f"{n:,}, numbered from 0"
+            )
+        parts[numbers[first]][rest] = tensor
+    return parts
+
+
+def _read_numbered(
+    index: int,
+    document: object,
+    tensors: Mapping[str, np.ndarray],
+    observation_space: Space,
+    action_space: Space,
+) -> Policy:
+    try:
+        policy = _read_one(document, tensors, observation_space, action_space)
+    except GymServerError as error:
+        raise GymServerError(
+            error.code, f"Policy {index + 1} of the list: {error.message}", error.hint
+        ) from None
+    if policy.candidates not in (1, None):
+        raise invalid_policy(
+            f"Policy {index + 1} of the list has {policy.candidates} candidates, and each of a "
+            "list must be one"
+        )
+    return policy
