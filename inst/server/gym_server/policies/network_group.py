@@ -23,7 +23,7 @@ from gym_server.policies.network_plan import NetworkPlan
 
 # With so many weights a row's own matrices are multiplied number by number; with more, all rows are
 # multiplied by the matrices of each candidate.
-_FEW_WEIGHTS = 128
+_FEW_WEIGHTS = 512
 
 
 def network_group(

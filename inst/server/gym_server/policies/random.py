@@ -83,7 +83,8 @@ def _draws(space: Space) -> Draws:
     # Only these kinds: of numbers below 32 bits Gymnasium draws several at once from one of 32.
     if type(space) is Discrete and space.dtype.itemsize >= 4:
         return Draws(_discrete_block(space))
-    if type(space) is Box and space.dtype.kind == "f" and _has_finite_range(space):
+    # A block of single numbers falls apart into scalars, and not into arrays without axes.
+    if type(space) is Box and space.shape and space.dtype.kind == "f" and _has_finite_range(space):
         return Draws(_box_block(space), most=max(1, min(256, 4096 // max(1, space.low.size))))
     return _one_by_one(space)
 
