@@ -27,6 +27,7 @@ _STATUS = {
     "monitors_full": 429,
     "too_many_instances": 429,
     "too_many_keys": 429,
+    "too_many_rollouts": 429,
     "too_many_sub_envs": 429,
     "too_many_processes": 429,
     "too_many_watchers": 429,
@@ -42,6 +43,7 @@ _STATUS = {
 _HEADERS = {
     "busy_receiving": (("Retry-After", "5"),),
     "too_many_keys": (("Retry-After", "60"),),
+    "too_many_rollouts": (("Retry-After", "1"),),
     "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
 }
 
@@ -117,6 +119,17 @@ def memory_closed(instance_id: str, env_id: str, megabytes: float) -> GymServerE
         f"memory than they may, and this one had grown most, by {megabytes:,.0f} MiB",
         "draw fewer sub-environments, or smaller pictures; the server's option --max-memory-mb "
         "sets the limit",
+    )
+
+
+def rollout_memory_closed(megabytes: float) -> GymServerError:
+    """The server has killed a process that played episodes, for its memory."""
+    return GymServerError(
+        "too_much_memory",
+        f"The process of these episodes was ended: all environments together held more memory than "
+        f"they may, and it had {megabytes:,.0f} MiB",
+        "ask for fewer episodes whose steps are kept; the server's option --max-memory-mb sets the "
+        "limit",
     )
 
 

@@ -30,8 +30,11 @@ from gym_server.errors import (
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits, Watchers
+from gym_server.manager.rollouts import Rollouts
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.processes.pool import pool
+from gym_server.processes.set_up import OWN_MB
 from gym_server.protocol import answers
 from gym_server.protocol.answers import Answer
 from gym_server.rendering.render_thread import RenderThread
@@ -101,8 +104,11 @@ class GymApp(Flask):
         )
         watch_keys = WatchKeys()
         self._guard = Guard(config.access, watch_keys)
+        pool.most_mb = config.limits.max_memory_mb + OWN_MB
+        self._rollouts = Rollouts(config.limits.rollout_processes)
         services = Services(
             self._instances,
+            self._rollouts,
             self._monitor_root,
             config.stop if config.client_stop else _refuse_to_stop,
             Watchers(config.limits.max_watchers),
@@ -126,7 +132,11 @@ class GymApp(Flask):
         self.register_error_handler(Exception, lambda error: _response(failure(error, None)))
         self.answer_for = lambda *_: None
         self._watchdog = Watchdog(
-            self._instances, config.limits, self._abandon, exactly_once.forget_in_time
+            self._instances,
+            self._rollouts,
+            config.limits,
+            self._abandon,
+            exactly_once.forget_in_time,
         )
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
@@ -175,12 +185,14 @@ class GymApp(Flask):
         self.answer_for(thread, *_wsgi(answer or failure(why, None)))
 
     def end_watching(self) -> None:
-        """Answer all watchers, who would otherwise wait for longer than the stop may take."""
+        """Answer those who would otherwise wait for longer than the stop may take."""
         self._instances.end_watching()
+        self._rollouts.end()
 
     def close(self) -> None:
         """Close every environment and monitor."""
         self._watchdog.stop()
+        self._rollouts.end()
         self._instances.close_all()
         self._renderer.stop()
         self._monitor_root.close()

@@ -11,8 +11,12 @@ from gym_server.api.watch_keys import WatchKeys
 from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Watchers
+from gym_server.manager.rollouts import Rollouts
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
+
+# Where the server puts a function in WSGI's environment that tells whether a client still waits.
+IS_CONNECTED = "gym_server.is_connected"
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,7 @@ class Services:
 
     Attributes:
         instances: the environments.
+        rollouts: plays whole episodes.
         monitor_root: where monitors may write.
         stop: asks the server to stop once the requests under way are answered.
         watchers: counts those who wait for a frame.
@@ -29,6 +34,7 @@ class Services:
     """
 
     instances: InstanceManager
+    rollouts: Rollouts
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers
@@ -47,6 +53,7 @@ class Call(NamedTuple):
         form: how the client wants tensors, where the route has them.
         url: the path as it was asked for.
         accept: what the client says it takes.
+        is_connected: whether the client still waits for its answer.
     """
 
     services: Services
@@ -56,6 +63,7 @@ class Call(NamedTuple):
     form: AnswerForm = JSON_FORM
     url: str = ""
     accept: str = ""
+    is_connected: Callable[[], bool] = lambda: True
 
     @property
     def instance(self) -> Instance:

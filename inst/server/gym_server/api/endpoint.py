@@ -10,7 +10,7 @@ from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 from werkzeug.wrappers import Request
 
-from gym_server.api.calls import Call, Services
+from gym_server.api.calls import IS_CONNECTED, Call, Services
 from gym_server.api.exactly_once import ExactlyOnce, Outcome
 from gym_server.api.routing import Match, Route
 from gym_server.errors import GymServerError, answer_to, body_too_large
@@ -18,6 +18,11 @@ from gym_server.protocol import answers, bodies
 from gym_server.protocol.answers import JSON, JSON_FORM, Answer, AnswerForm
 from gym_server.protocol.fields import REQUEST, RequestId, read
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
+
+
+def _always() -> bool:
+    return True
+
 
 # A longer body is kept as a digest, which takes 40 us for one of this size.
 _KEPT_BYTES = 2**16
@@ -62,11 +67,9 @@ class Endpoint:
         route = self._route
         raw = self._body(environ)
         accept = environ.get("HTTP_ACCEPT", "")
-        sends_tensors = route.tensor_body and TENSORS in environ.get("CONTENT_TYPE", "")
-        if route.method == "GET":
-            body = _query(environ)
-        else:
-            body = bodies.loads_tensors(raw) if sends_tensors else bodies.loads(raw)
+        read_tensors = route.tensor_body if TENSORS in environ.get("CONTENT_TYPE", "") else None
+        read_body = read_tensors or bodies.loads
+        body = _query(environ) if route.method == "GET" else read_body(raw)
         form = _wanted_form(accept, route.content_type) if route.tensors else JSON_FORM
         request_id = read(body, (REQUEST,))["request"] if route.once else None
         instance_id = match.variables.get("instance_id")
@@ -84,6 +87,7 @@ class Endpoint:
                     form,
                     match.path,
                     accept,
+                    environ.get(IS_CONNECTED, _always),
                 )
                 result = route.handler(call)
                 answer = answers.answer(result, request_id)
@@ -100,7 +104,7 @@ class Endpoint:
         # A request that ends an instance is kept with those that create one, so that it is never
         # refused because the instance has seen too many keys.
         used_id = None if route.ends_instance else instance_id
-        content = (match.path, _fingerprint(raw), sends_tensors, form)
+        content = (match.path, _fingerprint(raw), read_tensors is not None, form)
         try:
             return self._exactly_once.answer(request_id, used_id, content, perform)
         except Exception as error:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from gym_server import __version__
 from gym_server.api.routing import Route
 from gym_server.protocol.answers import HTML, JSON
+from gym_server.protocol.bodies import loads_file, loads_tensors
 from gym_server.protocol.fields import REQUEST, Field
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
@@ -145,12 +146,21 @@ def _request_body(route: Route, fields: Iterable[Field]) -> dict:
     }
     if route.tensor_body:
         body["content"][TENSORS] = {}
-        body["description"] = (
-            "As tensors: one safetensors file of the tensors 'action' (parts of nested ones by "
-            "JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so "
-            "are 'texts', an object of those by name."
-        )
+        body["description"] = _TENSOR_BODIES[route.tensor_body]
     return body
+
+
+_TENSOR_BODIES: dict[Callable, str] = {
+    loads_tensors: "As tensors: one safetensors file of the tensors 'action' (parts of nested ones "
+    "by JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so are "
+    "'texts', an object of those by name.",
+    loads_file: "As tensors: one safetensors file. The tensor 'seed' (integers) has the seed of "
+    "each episode, 'candidate' (integers from 0) which candidate plays it; where an environment is "
+    "played in groups, 'row' is the episode's place in its group (the description's 'group'). "
+    "'policy/weights' is float64 with a row for each candidate, 'policy/mean' and 'policy/scale' "
+    "normalize observations, 'policy/q' is a table of states by actions, 'policy/deviation' has "
+    "standard deviations. The other fields are JSON in its metadata.",
+}
 
 
 def _body(fields: Iterable[Field]) -> dict:

@@ -10,14 +10,14 @@ import gymnasium
 import numpy
 
 from gym_server import __version__
-from gym_server.api import fields, model_routes, openapi, schemas, watch_routes
+from gym_server.api import fields, model_routes, openapi, rollout_routes, schemas, watch_routes
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Table
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
 from gym_server.protocol.answers import HTML, Content, Ready, frame_tensor
-from gym_server.protocol.bodies import parse_path_value
+from gym_server.protocol.bodies import loads_tensors, parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.rendering.png import png
 
@@ -167,7 +167,7 @@ def env_reset(call: Call) -> dict | Ready:
     "reset at once",
     once=True,
     tensors=True,
-    tensor_body=True,
+    tensor_body=loads_tensors,
     schema=schemas.json_object(
         {
             "observation": schemas.ANYTHING,
@@ -371,13 +371,14 @@ def env_registry(call: Call) -> dict:
 @ROUTES.declare(
     "GET",
     "/v1/health/",
-    answer="status, instances, versions, pid",
+    answer="status, instances, versions, pid, rollouts (true: it plays whole episodes)",
     schema=schemas.json_object(
         {
             "status": {"const": "ok"},
             "instances": schemas.COUNT,
             "versions": {"type": "object", "additionalProperties": schemas.TEXT},
             "pid": schemas.COUNT,
+            "rollouts": {"const": True},
         }
     ),
 )
@@ -393,6 +394,7 @@ def health(call: Call) -> dict:
             "python": platform.python_version(),
         },
         "pid": os.getpid(),
+        "rollouts": True,
     }
 
 
@@ -402,4 +404,4 @@ def openapi_document(call: Call) -> dict:
     return openapi.document(call.services.routes)
 
 
-ROUTES.extend([*model_routes.ROUTES, *watch_routes.ROUTES])
+ROUTES.extend([*model_routes.ROUTES, *rollout_routes.ROUTES, *watch_routes.ROUTES])

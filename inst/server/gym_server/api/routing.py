@@ -46,7 +46,7 @@ class Route:
         content_type: what an ordinary answer is.
         tensors: whether the answer may also be tensors, when the client accepts them.
         html: whether the answer may also be HTML, when the client asks for that.
-        tensor_body: whether the body may also be tensors.
+        tensor_body: reads the body where that is tensors; None where it may not be.
         refusal_page: makes the page, of a path and a status, that people get in place of an error
             in JSON when they may not call the route; None where there is no such page.
     """
@@ -64,7 +64,7 @@ class Route:
     content_type: str = JSON
     tensors: bool = False
     html: bool = False
-    tensor_body: bool = False
+    tensor_body: Callable[[bytes], dict] | None = None
     refusal_page: Callable[[str, int], Content] | None = None
 
     @property

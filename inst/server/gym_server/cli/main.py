@@ -89,6 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 options.max_num_envs,
                 options.max_total_sub_envs,
                 options.max_processes,
+                options.max_rollout_processes,
                 options.max_memory_mb,
                 options.max_monitor_mb,
                 options.max_watchers,

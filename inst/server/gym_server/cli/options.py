@@ -99,6 +99,12 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "environments that have one of their own (%(default)s)",
     )
     limits.add_argument(
+        "--max-rollout-processes",
+        type=_number(1, 1_000),
+        default=Limits.max_rollout_processes,
+        help="processes that play whole episodes, beside these (one for each core)",
+    )
+    limits.add_argument(
         "--max-memory-mb",
         type=_number(1, 2**24),
         default=Limits.max_memory_mb,

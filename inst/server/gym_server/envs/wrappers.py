@@ -18,7 +18,6 @@ from gym_server.envs.memory_estimate import answer_bytes, wrapper_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.json_values import parse_nonfinite
-from gym_server.rendering.render_thread import RenderThread
 
 # Wrappers whose arguments are numbers, texts and lists, and which keep one environment one
 # environment and write no files.  Not among them: Autoreset, whose resets no client would see;
@@ -118,7 +117,7 @@ def check(wrappers: Sequence[Wrapper]) -> None:
 def wrap(
     env: gymnasium.Env,
     wrappers: Sequence[Wrapper],
-    renderer: RenderThread,
+    renderer: Any,
     memory: MemoryReservation | None = None,
 ) -> gymnasium.Env:
     """Put wrappers around an environment, the first one innermost; see ``check()``.
@@ -126,7 +125,7 @@ def wrap(
     Args:
         env: the environment.
         wrappers: what is put around it.
-        renderer: where wrappers that draw are made.
+        renderer: where wrappers that draw are made; a ``RenderThread``, or what stands for it.
         memory: what reserves the memory of the wrappers; None where it has been reserved.
 
     Raises:

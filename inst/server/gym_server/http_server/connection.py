@@ -308,7 +308,22 @@ class Connection:
             "CONTENT_LENGTH": str(len(body)),
             "wsgi.input": io.BytesIO(body),
             "wsgi.errors": sys.stderr,
+            "gym_server.is_connected": self._is_connected,
         }
+
+    def _is_connected(self) -> bool:
+        """Tell whether the client has not closed its end; the serving thread may ask."""
+        seconds = self._socket.gettimeout()
+        try:
+            self._socket.settimeout(0)
+            return self._socket.recv(1, socket.MSG_PEEK) != b""
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        finally:
+            with contextlib.suppress(OSError):
+                self._socket.settimeout(seconds)
 
     def eviction_rank(self, now: float) -> tuple[int, float] | None:
         """Return what is the smaller, the sooner it is to be evicted; None if it is not to be now.

@@ -35,15 +35,12 @@ from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
 from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
-from gym_server.processes.set_up import set_up_process
+from gym_server.processes.set_up import OWN_MB, set_up_process
 from gym_server.protocol import answers
 from gym_server.protocol.answers import AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
 
 log = logging.getLogger(__name__)
-
-# What a process may have beside its environment: modules, and pictures by OpenGL.
-_OWN_MB = 512
 
 # Its imports take longer than the start of a process.
 start.preload(__name__)
@@ -72,7 +69,7 @@ class WorkerSettings:
     @property
     def most_mb(self) -> int:
         """How much memory the system lets the process have, in MiB; 0 for no limit."""
-        left = int(self.memory / 2**20) + _OWN_MB if math.isfinite(self.memory) else 0
+        left = int(self.memory / 2**20) + OWN_MB if math.isfinite(self.memory) else 0
         return self.max_mb or left
 
 

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from gym_server.budget import Budget
 from gym_server.envs import registry, wrappers
@@ -20,6 +21,7 @@ from gym_server.errors import (
     call_too_long,
     idle_closed,
     memory_closed,
+    rollout_memory_closed,
     shutting_down,
 )
 from gym_server.instances.factory import make_instance
@@ -28,16 +30,20 @@ from gym_server.isolation.policy import Isolation
 from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
+from gym_server.manager.rollouts import Rollouts
 from gym_server.manager.tombstones import Tombstones
 from gym_server.processes import memory
 from gym_server.processes.pool import pool
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.rollouts.task import Task
 from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt, interrupted_by
 from gym_server.vector_envs import make as vector_make
 from gym_server.vector_envs.num_workers import most_workers
 
 log = logging.getLogger(__name__)
+
+_MB = 2**20
 
 
 @dataclass
@@ -101,7 +107,7 @@ class InstanceManager:
         # Whether an environment has gone since garbage was last collected; the watchdog, which
         # collects it, sets this back.
         self.left_garbage = False
-        self._budget = Budget(self._limits.max_memory_mb * 2**20)
+        self._budget = Budget(self._limits.max_memory_mb * _MB)
         self.account = Account(self._budget.limit)
         # While an instance that took too much is being closed.
         self._evicting = threading.Event()
@@ -230,6 +236,22 @@ class InstanceManager:
                 search, self._allowed_modules, self._limits.max_call_seconds
             )
         return registry.search(search, self._allowed_modules)
+
+    def rollout_task(self, config: EnvConfig, **what: Any) -> tuple[Task, bool]:
+        """Return what processes are told of a rollout, and whether its environment is trusted.
+
+        Args:
+            config: the environment.
+            **what: the further arguments of ``Task``.
+
+        Raises:
+            GymServerError: for what a client may not name.
+        """
+        self._allowed_paths.check(config)
+        wrappers.check(config.wrappers)
+        is_trusted = not self._isolation.wants(config.env_id, self._allowed_modules)
+        settings = self._isolation.settings(config.env_id, self._allowed_modules, 0)
+        return Task(config, settings.allowed_modules, self._budget.limit, **what), is_trusted
 
     def get(self, instance_id: str) -> Instance:
         """Return an instance.
@@ -363,10 +385,11 @@ class InstanceManager:
         self._closing.pop(instance_id, None)
         self._release(instance_id)
 
-    def evict_largest(self) -> None:
+    def evict_largest(self, rollouts: Rollouts) -> None:
         """Close the instance that has grown most, if all together hold too much.
 
-        What nobody uses at the moment goes first.
+        What nobody uses at the moment goes first. Where a process of rollouts has grown more, that
+        one is killed.
         """
         self.account.measure()
         if not self.account.is_exceeded or self._evicting.is_set():
@@ -380,9 +403,15 @@ class InstanceManager:
             instances = list(self._instances.values())
         sizes = {one: one.grown + self.account.of(one.pids) for one in instances}
         instance = max(sizes, key=sizes.__getitem__, default=None)
-        if instance is None or sizes[instance] <= 0:
+        playing = {pid: self.account.of([pid]) for pid in rollouts.pids()}
+        largest = max(playing, key=playing.__getitem__, default=None)
+        grown = sizes[instance] if instance is not None else 0
+        if largest is not None and playing[largest] > grown:
+            rollouts.kill(largest, rollout_memory_closed(playing[largest] / _MB))
             return
-        why = memory_closed(instance.instance_id, instance.env_id, sizes[instance] / 2**20)
+        if instance is None or grown <= 0:
+            return
+        why = memory_closed(instance.instance_id, instance.env_id, grown / _MB)
         if self._unlist(instance.instance_id, why) is not None:
             log.warning("%s", why.message)
             self._evicting.set()

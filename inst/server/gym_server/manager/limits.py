@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gym_server.errors import GymServerError
+from gym_server.processes.cores import usable_cores
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Limits:
             there are, each takes 7 MB of its own when it is created and 20 MB in use, two threads
             and 15 files, whether it is used or not; this is a class in which everybody has some
             isolated ones, or sub-environments in processes.
+        max_rollout_processes: how many processes play whole episodes, beside these; None for one a
+            core. None do where there may be no processes at all.
         max_memory_mb: how much memory all of them may take together, in MiB, as it is estimated
             beforehand (``memory_estimate``) and measured afterwards (``Account``). Half of what a
             small machine has.
@@ -57,11 +60,18 @@ class Limits:
     max_num_envs: int = 16384
     max_total_sub_envs: int | None = None
     max_processes: int = 128
+    max_rollout_processes: int | None = None
     max_memory_mb: int = 4096
     max_monitor_mb: float = 4096
     max_watchers: int = 100
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0
+
+    @property
+    def rollout_processes(self) -> int:
+        """How many processes play whole episodes."""
+        wanted = self.max_rollout_processes
+        return min(usable_cores() if wanted is None else wanted, self.max_processes)
 
     def check_room(self, instances: int, taken: Room, more: Room) -> None:
         """Refuse an environment for which there is no room.

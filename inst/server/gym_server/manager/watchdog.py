@@ -14,6 +14,7 @@ from collections.abc import Callable
 from gym_server.errors import GymServerError
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
+from gym_server.manager.rollouts import Rollouts
 from gym_server.processes import memory
 
 log = logging.getLogger(__name__)
@@ -36,6 +37,7 @@ class Watchdog:
     def __init__(
         self,
         instances: InstanceManager,
+        rollouts: Rollouts,
         limits: Limits,
         answer_for: Callable[[int, GymServerError], None],
         forget: Callable[[], None],
@@ -44,11 +46,13 @@ class Watchdog:
 
         Args:
             instances: those to watch.
+            rollouts: the episodes to watch.
             limits: how long things may take.
             answer_for: answers for a thread that cannot any more.
             forget: drops answers that nobody will ask for again.
         """
         self._instances = instances
+        self._rollouts = rollouts
         self._limits = limits
         self._answer_for = answer_for
         self._forget = forget
@@ -71,12 +75,13 @@ class Watchdog:
                 log.exception("A fault of the server's own")
 
     def _check(self) -> None:
+        self._rollouts.kill_overdue(self._limits.max_call_seconds)
         if self._limits.max_call_seconds:
             self._instances.evict_overdue(self._limits.max_call_seconds, self._answer_for)
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
         if time.monotonic() > self._measured + _MEASURE_SECONDS:
-            self._instances.evict_largest()
+            self._instances.evict_largest(self._rollouts)
             self._measured = time.monotonic()
         self._forget()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:

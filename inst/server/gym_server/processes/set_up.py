@@ -10,6 +10,9 @@ import signal
 from gym_server import logs
 from gym_server.processes import start
 
+# What a process may have beside its environments: modules, and pictures by OpenGL.
+OWN_MB = 512
+
 
 def set_up_process(log_level: int, max_mb: int = 0) -> None:
     """Become a process that ends with the server, logs as it does, and has a memory limit.

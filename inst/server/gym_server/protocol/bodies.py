@@ -81,9 +81,26 @@ def _parse_tensors(raw: bytes) -> dict:
     return body
 
 
+def loads_file(raw: bytes) -> dict:
+    """Return the fields in a body that is a safetensors file, and its tensors as ``tensors``.
+
+    Raises:
+        GymServerError: ``malformed_tensors``.
+    """
+    file = read_tensors(raw)
+    body: dict = {}
+    for name, text in file.metadata.items():
+        # Writers such as safetensors' own add texts of theirs.
+        if name != "format":
+            body[name] = _json_text(name, text)
+    return {**body, "tensors": file.tensors}
+
+
 def _json_metadata(name: str, text: str) -> object:
-    if name not in _JSON_METADATA:
-        return None
+    return _json_text(name, text) if name in _JSON_METADATA else None
+
+
+def _json_text(name: str, text: str) -> object:
     try:
         return _decode(text)
     except (ValueError, RecursionError) as error:

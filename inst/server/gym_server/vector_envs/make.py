@@ -6,7 +6,7 @@ import copy
 import logging
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -51,14 +51,11 @@ def make_vector_env(
         GymServerError: as for ``make.make_env()``; ``too_many_sub_envs``, ``too_much_memory``,
             ``not_supported``.
     """
-    kwargs = config.kwargs or {}
-    num_envs = cast(int, config.num_envs)
-    make.check_kwargs(kwargs)
+    make.check_kwargs(config.kwargs or {})
     spec = make.find_spec(config.env_id, allowed_modules)
-    _check(config, num_envs, max_num_envs)
-    argument_limits.check_environment(spec, kwargs, config.wrappers, num_envs)
+    _check(config, cast(int, config.num_envs), max_num_envs)
+    request = _request(spec, config, renderer, memory)
     with make.naming_extra(spec):
-        request = _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
         match config.vectorization_mode:
             case None:
                 env = _try_entry_point(request) if _is_the_same_task(request) else None
@@ -71,6 +68,30 @@ def make_vector_env(
         return EntryPointEnv(env, renderer), "vector_entry_point"
 
 
+def make_own_implementation(
+    config: EnvConfig,
+    allowed_modules: Collection[str],
+    renderer: Any,
+    memory: MemoryReservation,
+) -> VectorEnv | None:
+    """Make an environment's own vector implementation; see ``make_vector_env()``.
+
+    Returns:
+        None where it has none that is known to play as the single environment does.
+    """
+    make.check_kwargs(config.kwargs or {})
+    request = _request(make.find_spec(config.env_id, allowed_modules), config, renderer, memory)
+    return _try_entry_point(request) if _is_the_same_task(request) else None
+
+
+def _request(
+    spec: EnvSpec, config: EnvConfig, renderer: Any, memory: MemoryReservation
+) -> _Request:
+    kwargs, num_envs = config.kwargs or {}, cast(int, config.num_envs)
+    argument_limits.check_environment(spec, kwargs, config.wrappers, num_envs)
+    return _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
+
+
 @dataclass(frozen=True)
 class _Request:
     """What all functions below need to make a vector environment."""
@@ -79,7 +100,7 @@ class _Request:
     config: EnvConfig
     kwargs: dict
     num_envs: int
-    renderer: RenderThread
+    renderer: Any
     memory: MemoryReservation
 
     @property

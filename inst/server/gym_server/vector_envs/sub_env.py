@@ -46,7 +46,7 @@ class SubEnv:
 
     def __getstate__(self) -> dict:
         """Leave out the render thread and the reservation, which stay in the server's process."""
-        return {**self.__dict__, "_renderer": _ThisThread(), "_memory": None}
+        return {**self.__dict__, "_renderer": ThisThread(), "_memory": None}
 
     def prepare(self) -> None:
         """Import what makes it; once in each process, before the first one is made."""
@@ -67,11 +67,12 @@ class SubEnv:
             yield copy_new(first) if copies else self()
 
 
-class _ThisThread:
+class ThisThread:
     """Stands for the render thread in a process with a single thread.
 
     It has the one method that wrappers call.
     """
 
-    def run(self, draw: Callable, *args: object) -> object:
+    def run(self, draw: Callable, *args: object) -> Any:
+        """Call a function."""
         return draw(*args)

@@ -74,8 +74,8 @@ def test_tensors_stand_where_they_are_taken_and_given():
         for operation in methods.values()
         if tensors in operation.get("requestBody", {}).get("content", {})
     }
-    assert given == {"env_reset", "env_step", "env_render"}
-    assert taken == {"env_step"}
+    assert given == {"env_reset", "env_step", "env_render", "rollouts"}
+    assert taken == {"env_step", "rollouts"}
 
 
 def test_the_query_of_a_get_is_no_body():

@@ -15,7 +15,6 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
-
 GROUPS = "gym_server.vector_envs.group_worker"
 
 

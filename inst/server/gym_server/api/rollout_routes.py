@@ -1,0 +1,153 @@
+"""The route that plays whole episodes beside the environment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gym_server.api import fields, schemas
+from gym_server.api.calls import Call
+from gym_server.api.routing import Table
+from gym_server.envs.config import EnvConfig
+from gym_server.errors import GymServerError, answer_to, invalid_parameter
+from gym_server.protocol.answers import Content, dumps
+from gym_server.protocol.bodies import loads_file
+from gym_server.protocol.fields import OBJECT, Field, Kind, integer
+from gym_server.protocol.safetensors import Tensor
+from gym_server.rollouts.environment import GROUP
+from gym_server.rollouts.task import Keep, Unit
+from gym_server.rollouts.tensors import content
+
+ROUTES = Table()
+
+_KEPT = ("moments", "steps", "next_observation")
+
+
+def _keep(value: object) -> Keep:
+    if not isinstance(value, list) or not all(name in _KEPT for name in value):
+        raise ValueError
+    return Keep(**dict.fromkeys(value, True))
+
+
+def _max_steps(value: object) -> int:
+    number = integer(value)
+    if number < 1:
+        raise ValueError
+    return number
+
+
+_KEEP = Kind(
+    {"type": "array", "items": {"enum": list(_KEPT)}},
+    f"a list of some of {', '.join(_KEPT)}",
+    _keep,
+)
+_MAX_STEPS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _max_steps)
+
+
+@ROUTES.declare(
+    "POST",
+    "/v1/rollouts/",
+    Field("env_id", fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
+    Field("kwargs", OBJECT, "Handed to the environment."),
+    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field(
+        "policy",
+        OBJECT,
+        'What plays, such as {"kind": "random"} or {"kind": "network", "sizes": [4, 2, 1], '
+        '"activation": ["tanh", "logistic"]}; its numbers are the tensors policy/weights and so '
+        "on.",
+    ),
+    Field(
+        "max_steps",
+        _MAX_STEPS,
+        "After how many steps an episode is cut short; required where the environment has no time "
+        "limit.",
+    ),
+    Field("keep", _KEEP, "What is kept beside returns, lengths and flags; absent for nothing."),
+    answer="without the tensor 'seed' the environment's description, else the first episodes, in "
+    "their order: return, length, terminated, truncated, moments/..., observation, action, "
+    "step/...",
+    grows=True,
+    tensors=True,
+    tensor_body=loads_file,
+    schema=schemas.json_object({"env_id": schemas.TEXT, "processes": schemas.COUNT}),
+)
+def rollouts(call: Call) -> dict | Content:
+    """Play whole episodes with a policy that is data."""
+    given = call.fields
+    config = EnvConfig(
+        env_id=given["env_id"], kwargs=given["kwargs"], wrappers=given["wrappers"] or ()
+    )
+    tensors: Mapping[str, Tensor] = call.body.get("tensors") or {}
+    task, is_trusted = call.services.instances.rollout_task(
+        config,
+        policy=given["policy"] or {},
+        tensors=_policy_tensors(tensors),
+        max_steps=given["max_steps"],
+        keep=given["keep"] or Keep(),
+    )
+    if "seed" not in tensors:
+        return call.services.rollouts.describe(task, is_trusted)
+    if given["policy"] is None:
+        raise GymServerError("missing_parameter", "Episodes need the parameter 'policy'")
+    units = _units(tensors)
+    played = call.services.rollouts.play(task, units, is_trusted, call.is_connected)
+    metadata = {}
+    if played.error is not None:
+        status, body = answer_to(played.error)
+        metadata["error"] = dumps({"status": status, "body": body}).decode("ascii")
+    return content(played.tensors, metadata, call.form.by_column)
+
+
+def _policy_tensors(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
+    prefix = "policy/"
+    return {
+        name.removeprefix(prefix): tensor.array()
+        for name, tensor in tensors.items()
+        if name.startswith(prefix)
+    }
+
+
+def _units(tensors: Mapping[str, Tensor]) -> list[Unit]:
+    """Return what is played together: single episodes, or groups."""
+    seeds = _integers(tensors, "seed", 2**53)
+    count = len(seeds)
+    if count == 0:
+        raise GymServerError("invalid_parameter", "The tensor 'seed' has no episodes")
+    candidates = _integers(tensors, "candidate", 2**31 - 1, count)
+    if "row" not in tensors:
+        return [Unit(seed, (one,)) for seed, one in zip(seeds, candidates, strict=True)]
+    rows = _integers(tensors, "row", GROUP - 1, count)
+    units = []
+    first = 0
+    for episode in range(1, count + 1):
+        if episode == count or seeds[episode] != seeds[first] or rows[episode] <= rows[episode - 1]:
+            own = slice(first, episode)
+            units.append(Unit(seeds[first], tuple(candidates[own]), tuple(rows[own])))
+            first = episode
+    return units
+
+
+def _integers(
+    tensors: Mapping[str, Tensor], name: str, most: int, count: int | None = None
+) -> list[int]:
+    """Return a tensor of one dimension; without it zeros, where it is known how many."""
+    if name not in tensors and count is not None:
+        return [0] * count
+    array: Any = tensors[name].array()
+    wanted = f"a tensor of {'integers' if count is None else f'{count} integers'} from 0 to {most}"
+    if (
+        array.ndim != 1
+        or array.dtype.kind not in "iu"
+        or (count is not None and len(array) != count)
+    ):
+        found = json.dumps([tensors[name].dtype, list(tensors[name].shape)])
+        raise invalid_parameter(name, found, wanted)
+    wrong = array[(array < 0) | (array > most)]
+    if len(wrong):
+        raise invalid_parameter(name, int(wrong[0]), wanted)
+    values: list[int] = array.tolist()
+    return values

@@ -1,0 +1,496 @@
+"""Plays the episodes of all clients in processes of the pool.
+
+Each process is a player's, a thread that waits for it. A player takes some of a request's episodes,
+lets its process play them for some milliseconds, hands back what was not reached, and turns to the
+next request. When there has been nothing to play for a second, it puts its process back.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from gym_server.errors import GymServerError, call_too_long, environment_error, shutting_down
+from gym_server.processes.pool import pool
+from gym_server.processes.pool_process import PoolProcess
+from gym_server.protocol import safetensors
+from gym_server.protocol.safetensors import Tensor
+from gym_server.rollouts.task import Task, Unit
+from gym_server.rollouts.tensors import concatenated
+
+log = logging.getLogger(__name__)
+
+# Requests that wait or are played; each has a thread, and a body of up to 16 MiB.
+_MOST_REQUESTS = 64
+
+# So many seconds of units a player takes at once, when it is known how long they take. Its process
+# stops earlier, and gives the rest back.
+_SECONDS_TAKEN = 0.03
+_FIRST_TAKEN = 4
+_MOST_TAKEN = 2000
+
+# A process that has nothing to play is put back after so many seconds.
+_IDLE_SECONDS = 1.0
+
+# How often a client that waits is looked for, and how long an episode that nobody waits for goes on
+# before its process is killed.
+_LOOK_SECONDS = 0.25
+_UNWANTED_SECONDS = 2.0
+
+# An episode with which a process has died so often is not played again.
+_MOST_DEATHS = 3
+
+# A larger answer is cut after whole episodes.
+_MOST_BYTES = 64 * 2**20
+
+# What a process knows of is forgotten there in the same order; see ``rollouts.worker``.
+_MOST_KNOWN = 8
+
+_PARTS_OF_ERRORS = ("code", "message", "hint", "extra")
+
+_WORKER = "gym_server.rollouts.worker"
+
+# Processes know tasks by number, and are used by one server of this process after the other.
+_numbers = itertools.count(1)
+
+
+@dataclass
+class Played:
+    """What came of a request.
+
+    Attributes:
+        tensors: of its first episodes, by name.
+        error: why there are no more; None if there are all, or if there was no room for more.
+    """
+
+    tensors: dict[str, Tensor]
+    error: GymServerError | None
+
+
+@dataclass(eq=False)
+class _Request:
+    """Units that a client waits for.
+
+    Attributes:
+        number: by which processes know its task.
+        task: what all have in common.
+        function: what is called in the process: "play", or "describe".
+        key: what a process may have played before that plays it; see ``_Player``.
+        units: all of them.
+        waiting: the ranges of units that nobody plays at the moment, the first one first.
+        playing: how many ranges are being played.
+        results: what came of ranges of units, by their first: how many units, and their tensors.
+        size: bytes of all results.
+        seconds: how long a unit has taken, or None.
+        deaths: how often a process has died with a unit.
+        failed: the first unit that has failed, and the error.
+        unwanted_since: since when nobody waits for it, in the clock's seconds.
+        over: set when it is done.
+    """
+
+    number: int
+    task: Task
+    function: str
+    key: str | None
+    units: Sequence[Unit]
+    waiting: deque[range] = field(default_factory=deque)
+    playing: int = 0
+    results: dict[int, tuple[int, Any]] = field(default_factory=dict)
+    size: int = 0
+    seconds: float | None = None
+    deaths: dict[int, int] = field(default_factory=dict)
+    failed: tuple[int, GymServerError] | None = None
+    unwanted_since: float | None = None
+    over: threading.Event = field(default_factory=threading.Event)
+
+    def take(self, players: int) -> range | None:
+        """Take some units to play; None where there are none."""
+        if not self.has_work:
+            return None
+        first = self.waiting[0]
+        count = _FIRST_TAKEN if self.seconds is None else int(_SECONDS_TAKEN / self.seconds)
+        share = -(-sum(map(len, self.waiting)) // players)
+        count = max(1, min(count, share, _MOST_TAKEN, len(first)))
+        taken = first[:count]
+        if count < len(first):
+            self.waiting[0] = first[count:]
+        else:
+            self.waiting.popleft()
+        self.playing += 1
+        return taken
+
+    def give_back(self, units: range) -> None:
+        """Let somebody else play some units."""
+        if units:
+            self.waiting.appendleft(units)
+            self.waiting = deque(sorted(self.waiting, key=lambda one: one.start))
+
+    def fail(self, unit: int, error: GymServerError) -> None:
+        """Note that a unit has failed."""
+        if self.failed is None or unit < self.failed[0]:
+            self.failed = (unit, error)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is played, and nothing will be."""
+        return self.playing == 0 and not self.has_work
+
+    @property
+    def has_work(self) -> bool:
+        """Whether there are units that somebody should play."""
+        if not self.waiting or self.unwanted_since is not None or self.size > _MOST_BYTES:
+            return False
+        return self.failed is None or self.waiting[0].start < self.failed[0]
+
+    def beginning(self) -> tuple[list[Any], int]:
+        """Return the results of the first units, without a gap, and how many units these are."""
+        results = []
+        end = 0
+        while end in self.results:
+            done, tensors = self.results[end]
+            results.append(tensors)
+            end += done
+        return results, end
+
+
+@dataclass(eq=False)
+class _Player:
+    """A thread with a process.
+
+    Attributes:
+        key: None for a process that plays whatever is trusted; else the one environment that its
+            process may play.
+        process: the process; None while it is started.
+        request: what it plays, or None.
+        units: the units of it.
+        steps, steps_since: how many steps the process had taken when it was last looked at, and
+            since when it has not taken another one.
+        known: the numbers of the requests whose task the process has, the latest last.
+    """
+
+    key: str | None
+    process: PoolProcess | None = None
+    request: _Request | None = None
+    units: range = range(0)
+    steps: int = -1
+    steps_since: float = 0.0
+    known: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_KNOWN))
+
+
+class Rollouts:
+    """Plays episodes for all clients.
+
+    Attributes:
+        most_processes: how many processes play at the same time.
+    """
+
+    def __init__(self, most_processes: int) -> None:
+        """Start without any process.
+
+        Args:
+            most_processes: as above.
+        """
+        self.most_processes = most_processes
+        self._changed = threading.Condition()
+        self._requests: deque[_Request] = deque()
+        self._players: list[_Player] = []
+        self._stopping = False
+
+    def describe(self, task: Task, trusted: bool) -> dict:
+        """Return the description of an environment; see ``RolloutEnv.describe()``.
+
+        Raises:
+            GymServerError: see ``play()``.
+        """
+        request = self._request(task, "describe", trusted, [Unit(0, ())])
+        self._wait(request, lambda: True)
+        if request.failed is not None:
+            raise request.failed[1]
+        description: dict = request.results[0][1]
+        return {**description, "processes": self.most_processes}
+
+    def play(
+        self, task: Task, units: Sequence[Unit], trusted: bool, is_wanted: Callable[[], bool]
+    ) -> Played:
+        """Play episodes.
+
+        Args:
+            task: what they have in common.
+            units: the episodes.
+            trusted: whether the environment's code is Gymnasium's own, or ale_py's.
+            is_wanted: whether the client still waits for them.
+
+        Raises:
+            GymServerError: ``too_many_rollouts``, ``too_many_processes``, ``shutting_down``; and
+                what the first episode failed with.
+        """
+        request = self._request(task, "play", trusted, units)
+        self._wait(request, is_wanted)
+        if self._stopping:
+            raise shutting_down()
+        results, end = request.beginning()
+        error = None
+        if request.failed is not None and request.failed[0] == end:
+            error = request.failed[1]
+            if end == 0:
+                raise error
+        return Played(concatenated(results), error)
+
+    def _request(self, task: Task, function: str, trusted: bool, units: Sequence[Unit]) -> _Request:
+        key = None if trusted else task.env_key
+        request = _Request(next(_numbers), task, function, key, units)
+        request.waiting.append(range(len(units)))
+        with self._changed:
+            if self._stopping:
+                raise shutting_down()
+            if self.most_processes < 1:
+                raise GymServerError(
+                    "too_many_processes",
+                    "Episodes are played in processes, and this server may have none",
+                    "the server's option --max-processes sets the limit",
+                )
+            if len(self._requests) >= _MOST_REQUESTS:
+                raise GymServerError(
+                    "too_many_rollouts",
+                    f"This server has {_MOST_REQUESTS} requests for rollouts to answer, and takes "
+                    "no more at the moment",
+                    "send it again in a second",
+                )
+            self._requests.append(request)
+            self._start_players()
+            self._changed.notify_all()
+        return request
+
+    def _wait(self, request: _Request, is_wanted: Callable[[], bool]) -> None:
+        while not request.over.wait(_LOOK_SECONDS):
+            if not is_wanted():
+                with self._changed:
+                    request.unwanted_since = time.monotonic()
+                    self._end_if_over(request)
+                raise GymServerError("call_too_long", "The client does not wait any more")
+
+    def _end_if_over(self, request: _Request) -> None:
+        if request.is_over:
+            request.over.set()
+            if request in self._requests:
+                self._requests.remove(request)
+
+    # Players --------------------------------------------------------------------------------
+
+    def _start_players(self) -> None:
+        """Start as many as there is work for, and as there may be."""
+        # Those that no process may play yet come first.
+        keys = [player.key for player in self._players]
+        for request in sorted(self._requests, key=lambda one: one.key in keys):
+            own = [player for player in self._players if player.key == request.key]
+            busy = sum(player.request is not None for player in own)
+            left = sum(map(len, request.waiting)) if request.has_work else 0
+            while len(own) - busy < left and len(self._players) < self.most_processes:
+                player = _Player(request.key)
+                own.append(player)
+                self._players.append(player)
+                threading.Thread(
+                    target=self._run, args=(player,), name="rollouts", daemon=True
+                ).start()
+
+    def _run(self, player: _Player) -> None:
+        try:
+            while self._take_turn(player):
+                self._play(player)
+        except Exception:
+            log.exception("A fault of the server's own")
+        finally:
+            with self._changed:
+                self._players.remove(player)
+                process, player.process = player.process, None
+                self._start_players()
+            if process is not None and player.key is None:
+                pool.put(process)
+            elif process is not None:
+                process.kill()
+
+    def _take_turn(self, player: _Player) -> bool:
+        """Find the player something to play; return whether there is any."""
+        due = time.monotonic() + _IDLE_SECONDS
+        with self._changed:
+            while not self._stopping:
+                for _ in range(len(self._requests)):
+                    request = self._requests[0]
+                    # The others come first the next time.
+                    self._requests.rotate(-1)
+                    if request.key != player.key:
+                        if self._needs_room(request):
+                            return False
+                        continue
+                    units = request.take(len(self._players))
+                    if units is not None:
+                        player.request, player.units = request, units
+                        return True
+                left = due - time.monotonic()
+                if left <= 0:
+                    return False
+                self._changed.wait(left)
+        return False
+
+    def _needs_room(self, request: _Request) -> bool:
+        """Whether a request waits for a process that may play it, and there may be no more."""
+        return (
+            len(self._players) >= self.most_processes
+            and request.has_work
+            and all(one.key != request.key for one in self._players)
+        )
+
+    def _play(self, player: _Player) -> None:
+        """Let the process play some units, and enter what came of them."""
+        request, units = player.request, player.units
+        assert request is not None
+        began = time.monotonic()
+        done: int = 0
+        result: Any = None
+        error: GymServerError | None = None
+        try:
+            done, result, error = self._call(player, request, units)
+        except GymServerError as failure:
+            error = failure
+        with self._changed:
+            player.request = None
+            request.playing -= 1
+            if done:
+                request.results[units.start] = (done, result)
+                if request.function == "play":
+                    request.size += sum(len(tensor.data) for tensor in result.values())
+                    request.seconds = (time.monotonic() - began) / done
+            if error is not None:
+                self._enter_error(player, request, units[done:], error)
+            else:
+                request.give_back(units[done:])
+            self._end_if_over(request)
+            self._start_players()
+            self._changed.notify_all()
+
+    def _call(
+        self, player: _Player, request: _Request, units: range
+    ) -> tuple[int, Any, GymServerError | None]:
+        """Return how many units were played, what came of them, and why no more."""
+        process = player.process
+        if process is None:
+            process = pool.take(_WORKER, polite=True) if player.key is None else _untrusted()
+            process.report_end(lambda why: None)
+            player.known.clear()
+        process.progress[1] = 0
+        player.steps, player.steps_since = -1, time.monotonic()
+        player.process = process
+        if request.function == "describe":
+            process.begin("describe", request.task)
+            return 1, process.finish(), None
+        task = None if request.number in player.known else request.task
+        process.begin("play", request.number, task, [request.units[unit] for unit in units])
+        body = process.finish().body
+        if task is not None:
+            player.known.append(request.number)
+        return _read(body)
+
+    def _enter_error(
+        self, player: _Player, request: _Request, units: range, error: GymServerError
+    ) -> None:
+        process = player.process
+        if process is None or process.is_alive:
+            # The process says so itself, of the first of the units.
+            request.fail(units.start, error)
+            return
+        # The process is gone, and with it what came of the units before the one at fault.
+        player.process = None
+        at_fault = units[min(process.progress[1], len(units) - 1)]
+        request.deaths[at_fault] = request.deaths.get(at_fault, 0) + 1
+        was_killed = error.code != "environment_died"
+        if was_killed or request.deaths[at_fault] == _MOST_DEATHS:
+            seed = request.units[at_fault].seed
+            message = error.message if was_killed else f"{error.message} (episode of seed {seed})"
+            request.fail(at_fault, GymServerError(error.code, message, error.hint))
+        request.give_back(units)
+
+    # Limits ---------------------------------------------------------------------------------
+
+    def kill_overdue(self, seconds: float) -> None:
+        """Kill the processes that have taken no step for too long, or play what nobody wants.
+
+        Args:
+            seconds: how long a step may take; 0 for as long as it takes.
+        """
+        now = time.monotonic()
+        with self._changed:
+            for player in self._players:
+                request, process = player.request, player.process
+                if request is None or process is None:
+                    continue
+                steps = process.progress[0]
+                if steps != player.steps:
+                    player.steps, player.steps_since = steps, now
+                since = request.unwanted_since
+                if since is not None and now > since + _UNWANTED_SECONDS:
+                    process.kill(shutting_down())
+                elif seconds and now > player.steps_since + seconds:
+                    units = player.units
+                    unit = request.units[units[min(process.progress[1], len(units) - 1)]]
+                    why = call_too_long(
+                        f"A step of {request.task.config.env_id}, in the episode of seed "
+                        f"{unit.seed},",
+                        seconds,
+                        "its process is gone",
+                    )
+                    log.warning("%s", why.message)
+                    process.kill(why)
+
+    def pids(self) -> list[int]:
+        """Return the numbers of the processes."""
+        with self._changed:
+            return [player.process.pid for player in self._players if player.process is not None]
+
+    def kill(self, pid: int, why: GymServerError) -> None:
+        """Kill a process; the request that it plays fails."""
+        with self._changed:
+            for player in self._players:
+                if player.process is not None and player.process.pid == pid:
+                    log.warning("%s", why.message)
+                    player.process.kill(why)
+
+    def end(self) -> None:
+        """Answer all requests with an error, and end all processes."""
+        with self._changed:
+            self._stopping = True
+            for request in list(self._requests):
+                request.fail(0, shutting_down())
+                request.over.set()
+            for player in self._players:
+                if player.process is not None and player.request is not None:
+                    player.process.kill()
+            self._changed.notify_all()
+
+
+def _untrusted() -> PoolProcess:
+    process = PoolProcess(pool.most_mb, trusted=False)
+    process.module = _WORKER
+    process.give_way()
+    return process
+
+
+def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:
+    """Return what a process has sent, which a foreign environment may have made up."""
+    try:
+        tensors, metadata = safetensors.read(body)
+        error = None
+        if "error" in metadata:
+            told = json.loads(metadata["error"])
+            error = GymServerError(*[told.get(name) for name in _PARTS_OF_ERRORS])
+            error.is_logged = True
+        return int(metadata["done"]), tensors, error
+    except (AttributeError, KeyError, TypeError, ValueError, GymServerError) as fault:
+        who = "What the environment's process has sent cannot be read: it"
+        raise environment_error(fault, who) from fault

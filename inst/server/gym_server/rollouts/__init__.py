@@ -1,0 +1,1 @@
+"""Whole episodes, played by policies that are data, in processes of the pool."""

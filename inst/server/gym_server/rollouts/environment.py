@@ -1,0 +1,163 @@
+"""An environment in which episodes are played one after the other, in a process of the pool."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Space
+from gymnasium.vector import VectorEnv
+
+from gym_server import spaces
+from gym_server.budget import Budget
+from gym_server.envs import make, registry, wrappers
+from gym_server.envs.drawing_on_demand import save_drawing
+from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.errors import GymServerError
+from gym_server.json_values import plain
+from gym_server.rollouts.task import Task
+from gym_server.vector_envs.make import make_own_implementation
+from gym_server.vector_envs.sub_env import ThisThread
+
+# How many episodes an environment's own vector implementation plays in lockstep: always as many,
+# because all of them have one generator. R knows the number from the description.
+GROUP = 256
+
+# An episode that is not the first of an environment is another one there than in a new one: the
+# world of Box2D remembers. Found by playing every registered environment both ways.
+_MADE_ANEW = ("gymnasium.envs.box2d.bipedal_walker",)
+
+# Without a time limit, and yet each episode ends, whatever is done.
+_ENDING = ("gymnasium.envs.toy_text.blackjack",)
+
+# Wrappers that carry something from one episode into the next.
+_REMEMBERING = ("NormalizeObservation", "NormalizeReward")
+
+
+class RolloutEnv:
+    """Makes the environment of a task when it is needed, and keeps it where that changes nothing.
+
+    Attributes:
+        group: how many episodes are played in lockstep; None where each is played by itself.
+        observation_space, action_space: of one episode.
+    """
+
+    def __init__(self, task: Task) -> None:
+        """Make it.
+
+        Raises:
+            GymServerError: see ``make.make_env()`` and ``make_vector_env()``.
+        """
+        self._task = task
+        self._own = self._make_own()
+        self._env = None if self._own is not None else self._make()
+        self.group = None if self._own is None else GROUP
+        described: Any = self._own or self._env
+        prefix = "" if self._own is None else "single_"
+        self.observation_space: Space = getattr(described, f"{prefix}observation_space")
+        self.action_space: Space = getattr(described, f"{prefix}action_space")
+        self._used = False
+
+    def _make_own(self) -> VectorEnv | None:
+        config = dataclasses.replace(self._task.config, num_envs=GROUP)
+        reservation = MemoryReservation(Budget(self._task.memory), GROUP)
+        return make_own_implementation(
+            config, self._task.allowed_modules, ThisThread(), reservation
+        )
+
+    def _make(self) -> gymnasium.Env:
+        task, config = self._task, self._task.config
+        reservation = MemoryReservation(Budget(task.memory))
+        env = make.make_env(
+            config.env_id,
+            None,
+            config.kwargs or {},
+            task.allowed_modules,
+            config.wrappers,
+            reservation,
+        )
+        env = make.ask(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
+        # Some work for drawing in each step.
+        save_drawing(env)
+        return env
+
+    @cached_property
+    def is_made_anew(self) -> bool:
+        """Whether each episode needs a new one."""
+        module = registry.module_of(self._spec)
+        known = module.partition(".")[0] in registry.KNOWN_PACKAGES
+        return not known or module.startswith(_MADE_ANEW)
+
+    def for_an_episode(self) -> Any:
+        """Return an environment that plays as a new one does."""
+        if self._env is None:
+            raise GymServerError("not_supported", "It is played in groups")
+        if self._used and self.is_made_anew:
+            self._env.close()
+            self._env = self._make()
+        self._used = True
+        return self._env
+
+    @property
+    def for_a_group(self) -> Any:
+        """The environment's own vector implementation."""
+        return self._own
+
+    def close(self) -> None:
+        """Close it."""
+        close: Callable[[], object] = (self._own or self._env).close  # type: ignore[union-attr]
+        close()
+
+    # What is known of it --------------------------------------------------------------------
+
+    @property
+    def _spec(self) -> Any:
+        return (self._own or self._env).spec  # type: ignore[union-attr]
+
+    @property
+    def time_limit(self) -> int | None:
+        """After how many steps it ends an episode itself."""
+        if self._env is None:
+            limit: int | None = self._spec.max_episode_steps
+            return limit
+        return wrappers.time_limit(self._env)
+
+    @property
+    def needs_max_steps(self) -> bool:
+        """Whether an episode may go on forever."""
+        return self.time_limit is None and not registry.module_of(self._spec).startswith(_ENDING)
+
+    @property
+    def remembers(self) -> list[str]:
+        """The names of the client's wrappers that remember something over episodes."""
+        return [one.name for one in self._task.config.wrappers if one.name in _REMEMBERING]
+
+    def describe(self) -> dict:
+        """Return what a client must know to fit a policy to it."""
+        config, spec = self._task.config, self._spec
+        metadata = (self._own or self._env).metadata or {}  # type: ignore[union-attr]
+        module, colon, name = str(config.env_id).rpartition(":")
+        env_id = f"{module}{colon}{spec.id if spec else name}"
+        return {
+            "env_id": env_id,
+            "observation_space": spaces.describe(self.observation_space),
+            "action_space": spaces.describe(self.action_space),
+            "spec": {
+                "id": env_id,
+                "kwargs": config.kwargs or {},
+                "wrappers": [wrapper._asdict() for wrapper in config.wrappers],
+                "max_episode_steps": self.time_limit,
+                "reward_threshold": spec.reward_threshold if spec else None,
+                "render_fps": plain(metadata.get("render_fps")),
+            },
+            "remembers": self.remembers,
+            "needs_max_steps": self.needs_max_steps,
+            "group": self.group,
+            "versions": {"gymnasium": gymnasium.__version__, "numpy": np.__version__},
+            "processor": platform.processor() or platform.machine(),
+        }

@@ -1,0 +1,61 @@
+"""Play one episode in an environment of its own."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from gym_server.envs.outcomes import reward_number
+from gym_server.processes import pool_process
+from gym_server.rollouts.recording import Recorder
+
+
+class Played(NamedTuple):
+    """What came of an episode.
+
+    Attributes:
+        earned: its return, the sum of its rewards.
+        length: how many steps it has.
+        terminated: whether the environment ended it by its own rules.
+        truncated: whether a limit of steps ended it, the environment's or ``max_steps``.
+    """
+
+    earned: float
+    length: int
+    terminated: bool
+    truncated: bool
+
+
+def play_episode(
+    env: Any, actor: Any, seed: int, max_steps: int | None, recorder: Recorder | None
+) -> Played:
+    """Play one episode from its beginning to its end.
+
+    Args:
+        env: as new.
+        actor: the policy; see ``policies``.
+        seed: of the environment, and of what the policy draws.
+        max_steps: after how many steps it is cut short.
+        recorder: is told of each step; None where nothing is kept of them.
+    """
+    progress = pool_process.progress
+    actor.begin(seed)
+    observation, _ = env.reset(seed=seed)
+    act, step = actor.act, env.step
+    earned = 0.0
+    length = 0
+    terminated = truncated = False
+    while not (terminated or truncated or length == max_steps):
+        action = act(observation)
+        if recorder is not None:
+            recorder.before(observation, action)
+        observation, reward, terminated, truncated, _ = step(action)
+        try:
+            reward = float(reward)
+        except TypeError:
+            reward = reward_number(reward)
+        earned += reward
+        length += 1
+        progress[0] += 1
+        if recorder is not None:
+            recorder.after(observation, reward, terminated, truncated)
+    return Played(earned, length, bool(terminated), bool(truncated or not terminated))

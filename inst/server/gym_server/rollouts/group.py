@@ -1,0 +1,113 @@
+"""Play a group of episodes in lockstep, where an environment has a vector implementation.
+
+All sub-environments have one generator, so what the first episode of each is depends on the seed
+and on how many there are: always as many. Episodes that follow, which the implementation begins by
+itself, are not looked at.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Space
+
+from gym_server.processes import pool_process
+from gym_server.protocol.safetensors import Tensor
+from gym_server.rollouts.recording import Moments, moment_tensors, step_tensors
+from gym_server.rollouts.task import Keep, Unit
+
+
+class PlayedGroup:
+    """What came of a group.
+
+    Attributes:
+        earned, length, terminated, truncated: arrays, as for ``Played``.
+        tensors: what was kept of the steps, episode after episode.
+    """
+
+    def __init__(self, num_envs: int) -> None:
+        """Begin with nothing."""
+        self.earned = np.zeros(num_envs)
+        self.length = np.zeros(num_envs, dtype=np.int64)
+        self.terminated = np.zeros(num_envs, dtype=bool)
+        self.truncated = np.zeros(num_envs, dtype=bool)
+        self.tensors: dict[str, Tensor] = {}
+
+
+def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Keep) -> PlayedGroup:
+    """Play the first episode of some sub-environments to its end.
+
+    Args:
+        env: the implementation, with as many sub-environments as a group has.
+        actor: the policy of all rows; see ``policies``.
+        unit: the seed, and which rows are wanted.
+        max_steps: after how many steps an episode is cut short.
+        keep: what is kept of the steps.
+    """
+    progress = pool_process.progress
+    rows = np.array(unit.rows)
+    played = PlayedGroup(env.num_envs)
+    running = np.zeros(env.num_envs, dtype=bool)
+    running[rows] = True
+    steps: list[tuple] = []
+    keeps = keep.moments or keep.steps
+    actor.begin(unit.seed)
+    observation, _ = env.reset(seed=unit.seed)
+    act, step = actor.act, env.step
+    taken = 0
+    left = len(rows)
+    while left:
+        action = act(observation)
+        before = observation
+        observation, reward, terminated, truncated, _ = step(action)
+        taken += 1
+        progress[0] += 1
+        np.add(played.earned, reward, out=played.earned, where=running)
+        if keeps:
+            after = np.array(observation) if keep.next_observation else None
+            kept = [np.array(value) for value in (before, action, reward, terminated, truncated)]
+            steps.append((*kept, after))
+        ended = running & (terminated | truncated)
+        if taken == max_steps:
+            ended = running
+        if ended.any():
+            played.length[ended] = taken
+            played.terminated[ended] = terminated[ended]
+            played.truncated[ended] = truncated[ended] | ~terminated[ended]
+            running = running & ~ended
+            left = int(running.sum())
+    if keeps:
+        played.tensors = _kept(env, steps, rows, played.length[rows], keep)
+    return played
+
+
+def _kept(
+    env: Any, steps: list[tuple], rows: np.ndarray, lengths: np.ndarray, keep: Keep
+) -> dict[str, Tensor]:
+    """Return the steps of each row, one row's after the other's."""
+    row = np.repeat(rows, lengths)
+    time = np.concatenate([np.arange(length) for length in lengths])
+    before = [step[:5] for step in steps]
+    columns = [np.stack(column)[time, row] for column in zip(*before, strict=True)]
+    observed: Space = env.single_observation_space
+    acted: Space = env.single_action_space
+    tensors: dict[str, Tensor] = {}
+    if keep.moments:
+        values = np.split(columns[0].reshape(len(row), -1).astype(np.float64), np.cumsum(lengths))
+        tensors.update(moment_tensors([_moments(observed, own) for own in values[:-1]]))
+    if keep.steps:
+        batches = {"observation": columns[0], "action": columns[1]}
+        if keep.next_observation:
+            batches["next_observation"] = np.stack([step[5] for step in steps])[time, row]
+        reward, terminated, truncated = columns[2:]
+        tensors.update(
+            step_tensors(batches, observed, acted, reward.astype(np.float64), terminated, truncated)
+        )
+    return tensors
+
+
+def _moments(space: Space, values: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+    moments = Moments(space)
+    moments.add_rows(values)
+    return moments.result()

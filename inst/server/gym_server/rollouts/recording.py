@@ -1,0 +1,188 @@
+"""What is kept of the steps of episodes: all of them, or the moments of what was observed."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Dict, Space, Tuple
+
+from gym_server.errors import GymServerError
+from gym_server.protocol.safetensors import Tensor
+from gym_server.rollouts.task import Keep
+from gym_server.spaces import batch_tensor_writer, stack
+from gym_server.spaces.stacking import ARRAYS
+
+# Of observations with so many numbers together the moments are computed at once, and then merged:
+# a rule of the observation's size alone, so that moments do not depend on anything else.
+_NUMBERS_AT_ONCE = 2**20
+
+
+def check_keep(keep: Keep, observation_space: Space, action_space: Space) -> None:
+    """Refuse to keep what has no arrays.
+
+    Raises:
+        GymServerError: ``not_supported``.
+    """
+    if keep.moments and not isinstance(observation_space, ARRAYS):
+        raise GymServerError("not_supported", "Observations that are no arrays have no moments")
+    if keep.steps and not (_has_arrays(observation_space) and _has_arrays(action_space)):
+        raise GymServerError(
+            "not_supported",
+            "Steps are kept where observations and actions are arrays, or Tuples or Dicts of them",
+            "reset and step an instance to get the others",
+        )
+
+
+def _has_arrays(space: Space) -> bool:
+    match space:
+        case Tuple():
+            return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces))
+        case Dict():
+            return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces.values()))
+        case _:
+            return isinstance(space, ARRAYS)
+
+
+class Moments:
+    """The number, the mean and the sums of squared deviations of an episode's observations."""
+
+    def __init__(self, observation_space: Space) -> None:
+        """Begin without any."""
+        size = int(np.prod(observation_space.shape or ()))
+        self._at_once = max(1, _NUMBERS_AT_ONCE // max(1, size))
+        self._waiting: list[np.ndarray] = []
+        self._count = 0
+        self._mean = np.zeros(size)
+        self._squares = np.zeros(size)
+
+    def add(self, observation: Any) -> None:
+        """Add an observation."""
+        self._waiting.append(np.array(observation, dtype=np.float64).reshape(-1))
+        if len(self._waiting) == self._at_once:
+            self._merge()
+
+    def _merge(self) -> None:
+        """Merge those that wait, as Chan, Golub and LeVeque do (1979)."""
+        if not self._waiting:
+            return
+        self.add_rows(np.stack(self._waiting))
+        self._waiting = []
+
+    def add_rows(self, values: np.ndarray) -> None:
+        """Add observations in the rows of a matrix, at most as many as are merged at once."""
+        new = len(values)
+        mean = values.mean(axis=0)
+        deviations = values - mean
+        squares = (deviations * deviations).sum(axis=0)
+        before, self._count = self._count, self._count + new
+        apart = mean - self._mean
+        self._mean = self._mean + apart * (new / self._count)
+        self._squares = self._squares + squares + apart * apart * (before * (new / self._count))
+
+    def result(self) -> tuple[int, np.ndarray, np.ndarray]:
+        """Return all three."""
+        self._merge()
+        return self._count, self._mean, self._squares
+
+
+class Recorder:
+    """Is told of each step of single episodes, one after the other."""
+
+    def __init__(self, keep: Keep, observation_space: Space, action_space: Space) -> None:
+        """Begin without episodes."""
+        self._keep = keep
+        self._observation_space = observation_space
+        self._action_space = action_space
+        self._copy_observation = _copier(observation_space)
+        self._copy_action = _copier(action_space)
+        self._moments: list[tuple[int, np.ndarray, np.ndarray]] = []
+        self._of_episode: Moments | None = None
+        self._observations: list = []
+        self._actions: list = []
+        self._next_observations: list = []
+        self._rewards: list[float] = []
+        self._flags: list[tuple[bool, bool]] = []
+        self._complete = 0
+
+    def begin(self) -> None:
+        """An episode begins."""
+        if self._keep.moments:
+            self._of_episode = Moments(self._observation_space)
+
+    def before(self, observation: Any, action: Any) -> None:
+        """Keep what was observed, and what is done."""
+        if self._of_episode is not None:
+            self._of_episode.add(observation)
+        if self._keep.steps:
+            self._observations.append(self._copy_observation(observation))
+            self._actions.append(self._copy_action(action))
+
+    def after(self, observation: Any, reward: float, terminated: bool, truncated: bool) -> None:
+        """Keep what came of it."""
+        if self._keep.steps:
+            self._rewards.append(reward)
+            self._flags.append((bool(terminated), bool(truncated)))
+            if self._keep.next_observation:
+                self._next_observations.append(self._copy_observation(observation))
+
+    def end(self) -> None:
+        """The episode has come to its end."""
+        if self._of_episode is not None:
+            self._moments.append(self._of_episode.result())
+        self._complete = len(self._rewards)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return what was kept of the episodes that have come to their end."""
+        tensors: dict[str, Tensor] = {}
+        if self._keep.moments:
+            tensors.update(moment_tensors(self._moments))
+        if self._keep.steps:
+            most = self._complete
+            observed, acted = self._observation_space, self._action_space
+            flags = np.array(self._flags[:most], dtype=bool).reshape(most, 2)
+            steps = {
+                "observation": stack(observed, self._observations[:most]),
+                "action": stack(acted, self._actions[:most]),
+            }
+            if self._keep.next_observation:
+                steps["next_observation"] = stack(observed, self._next_observations[:most])
+            rewards = np.array(self._rewards[:most], dtype=np.float64)
+            tensors.update(step_tensors(steps, observed, acted, rewards, flags[:, 0], flags[:, 1]))
+        return tensors
+
+
+def moment_tensors(moments: list[tuple[int, np.ndarray, np.ndarray]]) -> dict[str, Tensor]:
+    """Return the moments of episodes as tensors."""
+    counts, means, squares = zip(*moments, strict=True) if moments else ((), (), ())
+    return {
+        "moments/count": Tensor.of(np.array(counts, dtype=np.float64)),
+        "moments/mean": Tensor.of(np.array(means, dtype=np.float64)),
+        "moments/squares": Tensor.of(np.array(squares, dtype=np.float64)),
+    }
+
+
+def step_tensors(
+    steps: dict[str, Any],
+    observation_space: Space,
+    action_space: Space,
+    reward: np.ndarray,
+    terminated: np.ndarray,
+    truncated: np.ndarray,
+) -> dict[str, Tensor]:
+    """Return steps, which are batches by name, as tensors with a row for each step."""
+    tensors: dict[str, Tensor] = {}
+    for name, batch in steps.items():
+        space = action_space if name == "action" else observation_space
+        tensors.update(batch_tensor_writer(space, name)(batch, False).tensors)
+    tensors["step/reward"] = Tensor.of(reward)
+    tensors["step/terminated"] = Tensor.of(terminated)
+    tensors["step/truncated"] = Tensor.of(truncated)
+    return tensors
+
+
+def _copier(space: Space) -> Callable[[Any], Any]:
+    """Return what keeps a value as it is now; an environment may change it in place later."""
+    return np.array if isinstance(space, ARRAYS) else copy.deepcopy

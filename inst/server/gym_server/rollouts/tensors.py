@@ -1,0 +1,41 @@
+"""Tensors with a row for each episode, or for each step, put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gym_server.protocol.answers import Content
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor, native_dtype, write
+
+
+def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
+    """Return tensors of the same names one below the other."""
+    if len(files) == 1:
+        return files[0]
+    tensors = {}
+    for name in files[0] if files else ():
+        parts = [file[name] for file in files]
+        # Those of no rows may not know their width.
+        rows = [part for part in parts if part.shape[0]] or parts[:1]
+        first = rows[0]
+        shape = (sum(part.shape[0] for part in rows), *first.shape[1:])
+        tensors[name] = Tensor(first.dtype, shape, b"".join([part.data for part in rows]))
+    return tensors
+
+
+def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Content:
+    """Return tensors as the body of an answer."""
+    if by_column:
+        tensors = {name: _by_column(tensor) for name, tensor in tensors.items()}
+    file = write(tensors, metadata)
+    return Content(file, COLUMN_TENSORS if by_column else TENSORS)
+
+
+def _by_column(tensor: Tensor) -> Tensor:
+    if len(tensor.shape) < 2:
+        return tensor
+    stored, _ = native_dtype(tensor.dtype)
+    array = np.frombuffer(tensor.data, stored).reshape(tensor.shape)
+    return Tensor.of(array, by_column=True)

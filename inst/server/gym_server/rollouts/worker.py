@@ -1,0 +1,216 @@
+"""What a process of the pool does for rollouts: it describes an environment, and plays episodes."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gym_server.envs.make import ask
+from gym_server.errors import GymServerError, answer_to, environment_error
+from gym_server.policies import read_policy
+from gym_server.processes import pool_process, start
+from gym_server.processes.messages import Result
+from gym_server.protocol.answers import Ready, dumps
+from gym_server.protocol.safetensors import TENSORS, Tensor, write
+from gym_server.rollouts.environment import RolloutEnv
+from gym_server.rollouts.episode import Played, play_episode
+from gym_server.rollouts.group import play_group
+from gym_server.rollouts.recording import Recorder, check_keep
+from gym_server.rollouts.task import Task, Unit
+from gym_server.rollouts.tensors import concatenated
+
+# Its imports take longer than the start of a process.
+start.preload(__name__)
+
+# How long it plays before it tells what came of it, and others get their turn.
+_SECONDS = 0.015
+
+# Environments and tasks that are kept; two clients at a time need no more.
+_MOST_ENVIRONMENTS = 4
+_MOST_TASKS = 8
+
+_environments: OrderedDict[str, RolloutEnv] = OrderedDict()
+_tasks: OrderedDict[int, _Playing] = OrderedDict()
+
+
+def describe(task: Task) -> Result:
+    """Return the description of a task's environment; see ``RolloutEnv.describe()``."""
+    return Result(_environment(task).describe(), None)
+
+
+def play(number: int, task: Task | None, units: Sequence[Unit]) -> Ready:
+    """Play for some milliseconds.
+
+    Args:
+        number: the task's.
+        task: itself, where this process has not seen it; else None.
+        units: what is to be played, in this order.
+
+    Returns:
+        A safetensors file: what came of the first of them. Its metadata is how many units these
+            are (``done``), and the error that the next one ended with, if it did (``error``).
+
+    Raises:
+        GymServerError: for an environment that cannot be made, or a policy that does not fit.
+    """
+    playing = _tasks.get(number)
+    if playing is None:
+        if task is None:
+            raise GymServerError("internal_error", "A task was played that is not known here")
+        playing = _tasks[number] = _Playing(task)
+        while len(_tasks) > _MOST_TASKS:
+            _tasks.popitem(last=False)
+    _tasks.move_to_end(number)
+    return playing.play(units)
+
+
+def _environment(task: Task) -> RolloutEnv:
+    env = _environments.get(task.env_key)
+    if env is None:
+        env = _environments[task.env_key] = ask(RolloutEnv, task)
+        while len(_environments) > _MOST_ENVIRONMENTS:
+            _environments.popitem(last=False)[1].close()
+    _environments.move_to_end(task.env_key)
+    return env
+
+
+class _Playing:
+    """A task, prepared."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        env = self._env
+        if env.remembers:
+            raise GymServerError(
+                "not_supported",
+                f"{env.remembers[0]} remembers earlier episodes, so that none of them can be "
+                "played by itself",
+                "reset and step an instance instead",
+            )
+        if task.max_steps is None and env.needs_max_steps:
+            raise GymServerError(
+                "invalid_parameter",
+                f"{task.config.env_id} has no time limit, so the parameter 'max_steps' must be "
+                "given",
+            )
+        check_keep(task.keep, env.observation_space, env.action_space)
+        self._policy = read_policy(
+            task.policy, task.tensors, env.observation_space, env.action_space
+        )
+        self._actors: dict[int, Any] = {}
+
+    @property
+    def _env(self) -> RolloutEnv:
+        return _environment(self._task)
+
+    def play(self, units: Sequence[Unit]) -> Ready:
+        self._check_rows(units[0])
+        due = time.monotonic() + _SECONDS
+        play = self._play_episodes if self._env.group is None else self._play_groups
+        done, columns, tensors, error = play(units, due)
+        metadata = {"done": str(done)}
+        if error is not None:
+            metadata["error"] = dumps(answer_to(error)[1]).decode("ascii")
+        tensors.update({name: Tensor.of(column) for name, column in columns.items()})
+        return Ready(write(tensors, metadata), TENSORS)
+
+    def _check_rows(self, unit: Unit) -> None:
+        group, env_id = self._env.group, self._task.config.env_id
+        if group is None and unit.rows is not None:
+            raise GymServerError(
+                "invalid_parameter",
+                f"Each episode of {env_id} is played by itself, so the tensor 'row' must be absent",
+            )
+        if group is not None and unit.rows is None:
+            raise GymServerError(
+                "missing_parameter",
+                f"{env_id} is played in groups of {group}, so the tensor 'row' must have the place "
+                "of each episode in its group",
+            )
+
+    def _play_episodes(self, units: Sequence[Unit], due: float) -> tuple:
+        task, env = self._task, self._env
+        keeps = task.keep.moments or task.keep.steps
+        recorder = Recorder(task.keep, env.observation_space, env.action_space) if keeps else None
+        played: list[Played] = []
+        error = None
+        for place, unit in enumerate(units):
+            pool_process.progress[1] = place
+            try:
+                actor = self._actor(unit.candidates[0])
+                if recorder is not None:
+                    recorder.begin()
+                one = play_episode(env.for_an_episode(), actor, unit.seed, task.max_steps, recorder)
+            except BaseException as failure:
+                error = _named(failure, unit.seed)
+                break
+            if recorder is not None:
+                recorder.end()
+            played.append(one)
+            if time.monotonic() >= due:
+                break
+        columns = _columns(*(zip(*played, strict=True) if played else ((), (), (), ())))
+        return len(played), columns, recorder.tensors() if recorder is not None else {}, error
+
+    def _play_groups(self, units: Sequence[Unit], due: float) -> tuple:
+        env = self._env
+        results: list[dict[str, Tensor]] = []
+        error = None
+        for place, unit in enumerate(units):
+            pool_process.progress[1] = place
+            try:
+                results.append(self._play_group(env, unit))
+            except BaseException as failure:
+                error = _named(failure, unit.seed)
+                break
+            if time.monotonic() >= due:
+                break
+        return len(results), {}, concatenated(results), error
+
+    def _play_group(self, env: RolloutEnv, unit: Unit) -> dict[str, Tensor]:
+        group = env.for_a_group
+        rows = np.array(unit.rows)
+        # Rows that nobody asked for are played by the last candidate.
+        candidates = np.full(group.num_envs, unit.candidates[-1])
+        candidates[rows] = unit.candidates
+        actor = self._policy.group_actor(candidates, group.num_envs)
+        played = play_group(group, actor, unit, self._task.max_steps, self._task.keep)
+        columns = _columns(
+            played.earned[rows],
+            played.length[rows],
+            played.terminated[rows],
+            played.truncated[rows],
+        )
+        tensors = {name: Tensor.of(column) for name, column in columns.items()}
+        return {**tensors, **played.tensors}
+
+    def _actor(self, candidate: int) -> Any:
+        actor = self._actors.get(candidate)
+        if actor is None:
+            # One candidate's episodes follow one another.
+            self._actors.clear()
+            actor = self._actors[candidate] = self._policy.actor(candidate)
+        return actor
+
+
+def _columns(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, np.ndarray]:
+    return {
+        "return": np.array(earned, dtype=np.float64),
+        "length": np.array(length, dtype=np.int32),
+        "terminated": np.array(terminated, dtype=bool),
+        "truncated": np.array(truncated, dtype=bool),
+    }
+
+
+def _named(failure: BaseException, seed: int) -> GymServerError:
+    """Name the seed of the episode that has failed."""
+    if not isinstance(failure, GymServerError):
+        failure = environment_error(failure)
+    failure = failure.again()
+    return GymServerError(
+        failure.code, f"{failure.message} (episode of seed {seed})", failure.hint, failure.extra
+    )

@@ -1,0 +1,199 @@
+"""Rollouts whose processes, clients or environments fail."""
+
+import contextlib
+import os
+import signal
+import threading
+import time
+
+import pytest
+from rollout_requests import RANDOM, read_answer, refused, request_body, roll_out
+from running import descendants, is_running
+
+from gym_server.protocol.safetensors import TENSORS
+
+LAKE = {"env_id": "FrozenLake-v1"}
+
+
+def in_background(call):
+    """Call a function in a thread; return a function that waits for its result."""
+    results = []
+    thread = threading.Thread(target=lambda: results.append(call()))
+    thread.start()
+
+    def wait():
+        thread.join(30)
+        return results[0]
+
+    return wait
+
+
+def asked(server, seeds, **how):
+    """Ask a real server for episodes; return the arrays of its answer."""
+    with contextlib.closing(server.connect()) as connection:
+        body = request_body(seeds, **how)
+        connection.request("POST", "/v1/rollouts/", body, {"Content-Type": TENSORS})
+        return read_answer(connection.getresponse().read())[0]
+
+
+def test_an_episode_that_hangs_is_ended_and_named(quick):
+    client = quick(max_call_seconds=0.5, max_rollout_processes=1).test_client()
+    how = {"env_id": "faulty_envs:Hanging-v0", "max_steps": 5}
+    refusal = refused(client, [4, 5], **how)
+    assert refusal["code"] == "call_too_long"
+    assert "seed 4" in refusal["message"]
+    assert len(roll_out(client, range(9), **LAKE)[0]["return"]) == 9
+
+
+def test_steps_that_go_on_are_no_hang(quick):
+    client = quick(max_call_seconds=0.3, max_rollout_processes=1).test_client()
+    how = {"env_id": "faulty_envs:Counting-v0", "kwargs": {"seconds": 0.05, "length": 30}}
+    arrays, _ = roll_out(client, [1], max_steps=30, **how)
+    assert arrays["length"].tolist() == [30]
+
+
+def test_an_episode_that_ends_its_process_each_time_is_refused(client):
+    how = {"env_id": "faulty_envs:Rogue-v0", "kwargs": {"does": "exits"}, "max_steps": 5}
+    refusal = refused(client, [4, 5], **how)
+    assert refusal["code"] == "environment_died"
+    assert "seed 4" in refusal["message"]
+    assert "exit status 7" in refusal["message"]
+    assert len(roll_out(client, range(9), **LAKE)[0]["return"]) == 9
+
+
+@pytest.mark.parametrize("does", ["interrupts", "leaves", "ends_a_generator"])
+def test_what_would_end_a_thread_ends_an_episode(client, does):
+    how = {"env_id": "faulty_envs:Rogue-v0", "kwargs": {"does": does}, "max_steps": 5}
+    assert refused(client, [4, 5], **how)["code"] == "environment_error"
+
+
+def test_a_process_that_is_killed_changes_no_result(quick, eventually):
+    app = quick(max_rollout_processes=2)
+    client = app.test_client()
+    how = {"env_id": "LunarLander-v3", "max_steps": 200}
+    expected, _ = roll_out(client, range(100), **how)
+    rollouts = app._rollouts
+    answer = in_background(lambda: roll_out(app.test_client(), range(100), **how))
+    for _ in range(2):
+        eventually(
+            lambda: any(one.process and one.process.progress[0] for one in rollouts._players)
+        )
+        pids = rollouts.pids()
+        os.kill(pids[0], signal.SIGKILL)
+        eventually(lambda killed=pids[0]: killed not in rollouts.pids())
+    arrays, metadata = answer()
+    assert metadata == {}
+    assert arrays["return"].tolist() == expected["return"].tolist()
+
+
+def test_a_queue_that_is_full_asks_to_come_again(quick, tmp_path, eventually, monkeypatch):
+    monkeypatch.setattr("gym_server.manager.rollouts._MOST_REQUESTS", 1)
+    app = quick(max_rollout_processes=1)
+    how = {"env_id": "faulty_envs:Gated-v0", "kwargs": {"directory": str(tmp_path)}}
+    first = in_background(lambda: roll_out(app.test_client(), [1], max_steps=2, **how))
+    eventually((tmp_path / "begun").exists)
+    answer = app.test_client().post(
+        "/v1/rollouts/", data=request_body([1], **LAKE), content_type=TENSORS
+    )
+    assert answer.status_code == 429
+    assert answer.json["code"] == "too_many_rollouts"
+    assert answer.headers["Retry-After"] == "1"
+    (tmp_path / "open").touch()
+    assert first()[0]["length"].tolist() == [2]
+
+
+def test_a_long_request_does_not_keep_others_waiting(quick):
+    app = quick(max_rollout_processes=1)
+    # Started, and known.
+    roll_out(app.test_client(), [1], env_id="LunarLander-v3")
+    over = []
+    long = in_background(
+        lambda: [roll_out(app.test_client(), range(500), env_id="LunarLander-v3"), over.append(1)]
+    )
+    while not app._rollouts._requests:
+        time.sleep(0.001)
+    roll_out(app.test_client(), [1, 2, 3], **LAKE)
+    assert not over
+    long()
+
+
+def test_episodes_of_a_client_that_leaves_are_not_played(serve):
+    server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs")
+    body = request_body(range(100_000), env_id="LunarLander-v3")
+    head = f"POST /v1/rollouts/ HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+    head += f"Content-Type: {TENSORS}\r\nContent-Length: {len(body)}\r\n\r\n"
+    client = server.socket()
+    client.sendall(head.encode() + body)
+    time.sleep(0.5)
+    client.close()
+    began = time.monotonic()
+    assert len(asked(server, [1, 2], **LAKE)["return"]) == 2
+    # Long before the others could have been played.
+    assert time.monotonic() - began < 20
+
+
+def test_a_step_that_nobody_waits_for_is_ended(serve):
+    limits = {"gym_server.manager.rollouts._UNWANTED_SECONDS": 0.1}
+    server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs", limits=limits)
+    body = request_body([1], env_id="faulty_envs:Hanging-v0", max_steps=3)
+    head = f"POST /v1/rollouts/ HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+    head += f"Content-Type: {TENSORS}\r\nContent-Length: {len(body)}\r\n\r\n"
+    client = server.socket()
+    client.sendall(head.encode() + body)
+    time.sleep(1)
+    client.close()
+    assert len(asked(server, [1], **LAKE)["return"]) == 1
+
+
+def test_a_process_of_a_foreign_environment_plays_nothing_else(quick):
+    app = quick(isolate="foreign", max_rollout_processes=1)
+    client = app.test_client()
+    how = {"env_id": "faulty_envs:Counting-v0", "max_steps": 2}
+    roll_out(client, [1], **LAKE)
+    trusted = app._rollouts.pids()
+    roll_out(client, [1], **how)
+    foreign = app._rollouts.pids()
+    roll_out(client, [1], **how)
+    assert app._rollouts.pids() == foreign
+    roll_out(client, [1], **LAKE)
+    again = app._rollouts.pids()
+    assert len({*trusted, *foreign}) == 2
+    assert not {*foreign} & {*again}
+
+
+def test_a_foreign_process_cannot_send_objects(quick):
+    app = quick(isolate="foreign")
+    how = {"env_id": "faulty_envs:Rogue-v0", "max_steps": 5}
+    kwargs = {"does": "closes_all_files"}
+    assert refused(app.test_client(), [1], kwargs=kwargs, **how)["code"] == "environment_died"
+
+
+def test_processes_are_used_again_by_the_next_rollout(quick, monkeypatch, eventually):
+    monkeypatch.setattr("gym_server.manager.rollouts._IDLE_SECONDS", 0.05)
+    app = quick(max_rollout_processes=1)
+    roll_out(app.test_client(), [1], **LAKE)
+    pids = app._rollouts.pids()
+    eventually(lambda: not app._rollouts.pids())
+    roll_out(app.test_client(), [1], **LAKE)
+    assert app._rollouts.pids() == pids
+
+
+def test_the_end_of_a_server_ends_rollouts(serve, eventually):
+    server = serve()
+    connection = server.connect()
+    body = request_body(range(100_000), env_id="LunarLander-v3")
+    connection.request("POST", "/v1/rollouts/", body, {"Content-Type": TENSORS})
+    eventually(lambda: len(descendants(server.process.pid)) > 2)
+    pids = descendants(server.process.pid)
+    server.process.terminate()
+    with contextlib.closing(connection):
+        answer = connection.getresponse()
+        assert (answer.status, b"shutting_down" in answer.read()) == (503, True)
+    server.process.wait(20)
+    eventually(lambda: not any(map(is_running, pids)))
+
+
+def test_a_server_without_processes_says_so(quick):
+    client = quick(max_processes=0).test_client()
+    refusal = refused(client, [1], policy=RANDOM, **LAKE)
+    assert refusal["code"] == "too_many_processes"
