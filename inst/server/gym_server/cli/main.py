@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 import threading
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -54,8 +53,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     logs.set_up(options.log_level.upper())
-    # RecordVideo warns of every folder that exists. The monitor itself looks after its folder.
-    warnings.filterwarnings("ignore", message=".*Overwriting existing videos")
     try:
         token = _find_token(options)
     except BadTokenError as fault:

@@ -249,7 +249,8 @@ class LocalBackend:
     @property
     def pids(self) -> Sequence[int]:
         """The processes that run it, beside this one."""
-        return self.env.pids
+        monitor = self._monitor
+        return (*self.env.pids, *(monitor.pids if monitor is not None else ()))
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """From now on report when a process of sub-environments ends by itself."""
@@ -273,7 +274,6 @@ class LocalBackend:
                 f"Instance {instance_id} is already monitored",
                 "close that monitor first",
             )
-        self.env.drawing.drawn = self.env.drawing.drawn or video_every > 0
         self._monitor = Monitor.start(
             self.env.gym_env,
             root,
@@ -282,7 +282,7 @@ class LocalBackend:
             force,
             resume,
             video_every,
-            self._renderer,
+            lambda: self.env.draw(0),
         )
 
     def close_monitor(self) -> None:

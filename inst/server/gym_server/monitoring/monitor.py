@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import logging
 import time
-from typing import Any
+from collections.abc import Callable
 
 import gymnasium
 
@@ -13,7 +13,7 @@ from gym_server.envs.outcomes import reward_number
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.monitoring.monitor_files import MonitorFiles, refuse
-from gym_server.rendering.render_thread import RenderThread
+from gym_server.monitoring.video import Video
 
 log = logging.getLogger(__name__)
 
@@ -35,15 +35,16 @@ class Monitor:
         self,
         env: gymnasium.Env,
         files: MonitorFiles,
-        recorder: Any,
-        renderer: RenderThread,
+        video_every: int,
+        draw: Callable[[], object],
     ) -> None:
-        """Take over files after their ``take()``, and a RecordVideo or None; see ``start()``."""
+        """Take over files after their ``take()``; see ``start()``."""
         self._env = env
         self._files = files
         self._rows = csv.writer(files.table, lineterminator="\n")
-        self._recorder = recorder
-        self._renderer = renderer
+        self._video_every = video_every
+        self._draw = draw
+        self._video: Video | None = None
         self._episode: int | None = None
         self._episodes = 0
         self._failure: Exception | None = None
@@ -58,7 +59,7 @@ class Monitor:
         force: bool,
         resume: bool,
         video_every: int,
-        renderer: RenderThread,
+        draw: Callable[[], object],
     ) -> Monitor:
         """Start to record the episodes that begin from now on.
 
@@ -70,7 +71,7 @@ class Monitor:
             force: first delete what monitors left there that are gone.
             resume: go on counting where the earlier monitor ended.
             video_every: record a video of each episode whose number this divides; 0 for none.
-            renderer: the thread that draws.
+            draw: draws the environment.
 
         Raises:
             GymServerError: ``video_unavailable`` or ``monitor_directory``; nothing is changed.
@@ -79,7 +80,6 @@ class Monitor:
             _require_video(env)
         files = root.claim(directory, instance_id, force, resume)
         try:
-            recorder = _recorder(env, files, video_every) if video_every else None
             files.begin(COLUMNS)
         except OSError as error:
             files.leave()
@@ -87,17 +87,16 @@ class Monitor:
         except BaseException:
             files.leave()
             raise
-        return cls(env, files, recorder, renderer)
+        return cls(env, files, video_every, draw)
 
     def reset(self, *, seed: int | None, options: dict | None) -> tuple:
         """Reset the environment and start to record an episode."""
         self._finish_video()
         self._episode = None
         number = self._files.next_episode
-        if self._recorder is None:
-            result = self._env.reset(seed=seed, options=options)
-        else:
-            result = self._reset_recorder(number, seed, options)
+        result = self._env.reset(seed=seed, options=options)
+        if self._video_every and number % self._video_every == 0:
+            self._record(self._start_video, number)
         self._files.next_episode = number + 1
         self._episode = number
         self._return = 0.0
@@ -107,11 +106,9 @@ class Monitor:
 
     def step(self, action: object) -> tuple:
         """Take a step; write the episode's row when it is done."""
-        result: tuple
-        if self._recorder is not None and self._recorder.recording:
-            result = self._renderer.run(self._recorder.step, action)
-        else:
-            result = self._env.step(action)
+        result: tuple = self._env.step(action)
+        if self._video is not None:
+            self._record(self._video.add)
         if self._episode is not None:
             _, reward, terminated, truncated, _ = result
             self._return += reward_number(reward)
@@ -137,6 +134,12 @@ class Monitor:
                 f"What was recorded in {self._files.path} is incomplete: {self._failure}",
             ) from self._failure
 
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """The process that encodes a video, if one is being recorded."""
+        video = self._video
+        return (video.pid,) if video is not None else ()
+
     def about(self) -> dict:
         """Return where the monitor writes, and how many episodes it has written."""
         return {
@@ -158,28 +161,29 @@ class Monitor:
             self._remember(error)
         self._finish_video()
 
-    def _reset_recorder(self, number: int, seed: int | None, options: dict | None) -> tuple:
-        recorder = self._recorder
-        # RecordVideo has a count of its own; it must agree with the table's, also after a reset
-        # that failed and after resuming.
-        recorder.episode_id = number - 1
-        if recorder.episode_trigger(number):
-            try:
-                self._files.add(self._files.video_name(number))
-            except OSError as error:
-                self._remember(error)
-        return self._renderer.run(lambda: recorder.reset(seed=seed, options=options))
+    def _start_video(self, number: int, frame: object) -> None:
+        name = self._files.video_name(number)
+        self._files.add(name)
+        fps = self._env.metadata.get("render_fps", 30)
+        self._video = Video(self._files.path / name, fps, frame)
+        self._video.add(frame)
 
-    def _finish_video(self) -> None:
-        if self._recorder is None or not self._recorder.recording:
-            return
+    def _record(self, add: Callable[..., None], *args: object) -> None:
+        frame = self._draw()
+        # Not on the render thread: encoding draws nothing, and others may need the thread.
         try:
-            # Not on the render thread: encoding draws nothing, and others may need the thread.
-            self._recorder.stop_recording()
+            add(*args, frame)
         except Exception as error:
             self._remember(error)
-            self._recorder.recording = False
-            self._recorder.recorded_frames = []
+            self._finish_video()
+
+    def _finish_video(self) -> None:
+        video, self._video = self._video, None
+        try:
+            if video is not None:
+                video.close()
+        except Exception as error:
+            self._remember(error)
 
     def _remember(self, error: Exception) -> None:
         # The step or reset that ends an episode was taken and must be answered; close() raises.
@@ -203,18 +207,3 @@ def _require_video(env: gymnasium.Env) -> None:
             "install gym-server[video], or leave video_callable out",
             "video",
         ) from error
-
-
-def _recorder(
-    env: gymnasium.Env, files: MonitorFiles, video_every: int
-) -> gymnasium.wrappers.RecordVideo:
-    recorder = gymnasium.wrappers.RecordVideo(
-        env,
-        str(files.path),
-        episode_trigger=lambda number: number % video_every == 0,
-        name_prefix=files.video_prefix,
-    )
-    # A garbage collection after each video would stop every other environment.  (Not an
-    # argument in Gymnasium 1.0.)
-    recorder.gc_trigger = None
-    return recorder

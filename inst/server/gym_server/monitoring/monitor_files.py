@@ -62,7 +62,7 @@ class MonitorFiles:
         return self._manifest.exists()
 
     def video_name(self, episode: int) -> str:
-        """Return the name that RecordVideo gives the video of an episode."""
+        """Return the name of an episode's video, as Gymnasium's RecordVideo has it."""
         return f"{self.video_prefix}-episode-{episode}.mp4"
 
     # Taking and leaving ---------------------------------------------------------------------

@@ -1,10 +1,13 @@
 import csv
 import shutil
 import sys
+import weakref
 
 import pytest
 
 pytest.importorskip("moviepy")
+# Moviepy depends on it.
+count_frames_and_secs = pytest.importorskip("imageio_ffmpeg").count_frames_and_secs
 
 
 def rows(directory):
@@ -139,6 +142,48 @@ def test_videos_are_made_of_every_nth_episode(client, create, monitor_dir):
     assert (monitor_dir / "run" / "rl-video-episode-0.mp4").stat().st_size > 1000
 
 
+def test_a_video_has_all_frames_and_none_is_kept(app, client, faulty, monitor_dir, monkeypatch):
+    url = faulty("Drawing", length=50)
+    env = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.unwrapped
+    drawn = []
+
+    def render(draw=env.render):
+        frame = draw()
+        drawn.append(weakref.ref(frame))
+        return frame
+
+    monkeypatch.setattr(env, "render", render)
+    start(client, url, video_callable=True)
+    client.post(f"{url}/reset/")
+    for _ in range(49):
+        client.post(f"{url}/step/", json={"action": 0})
+    assert len(drawn) == 50
+    assert sum(frame() is not None for frame in drawn) <= 1
+    client.post(f"{url}/step/", json={"action": 0})
+    frames, seconds = count_frames_and_secs(str(monitor_dir / "run" / "rl-video-episode-0.mp4"))
+    assert (frames, round(seconds, 2)) == (51, 1.7)
+
+
+def test_an_encoder_that_fails_is_told_of(client, create, monitor_dir):
+    url = create()
+    start(client, url, video_callable=True)
+    (monitor_dir / "run" / "rl-video-episode-0.mp4").mkdir()
+    assert episode(client, url)[1] > 0
+    answer = client.post(f"{url}/monitor/close/")
+    assert (answer.status_code, answer.json["code"]) == (400, "monitor_directory")
+
+
+def test_an_encoder_counts_as_its_environments_process(app, client, create):
+    url = create()
+    instance = app._instances.get(url.rsplit("/", 1)[1])
+    start(client, url, video_callable=True)
+    assert instance.pids == ()
+    client.post(f"{url}/reset/")
+    assert len(instance.pids) == 1
+    stop(client, url)
+    assert instance.pids == ()
+
+
 @pytest.mark.parametrize("fields", [{}, {"video_callable": False}, {"video_callable": None}])
 def test_without_being_asked_no_video_is_made(client, create, monitor_dir, fields):
     url = create()
@@ -218,16 +263,18 @@ def test_a_directory_that_vanishes_does_not_stop_the_environment(client, create,
     assert start(client, url) == 204
 
 
-def test_a_video_that_cannot_be_written_does_not_lose_the_step(client, create, monkeypatch):
-    from gymnasium.wrappers import RecordVideo
+@pytest.mark.parametrize("method", ["add", "close"])
+def test_a_video_that_cannot_be_written_does_not_lose_the_step(client, create, monkeypatch, method):
+    from gym_server.monitoring.video import Video
 
     url = create()
     start(client, url, video_callable=True)
 
-    def fail(self):
+    def fail(self, *args, call=getattr(Video, method)):
+        call(self, *args)
         raise OSError("no space left")
 
-    monkeypatch.setattr(RecordVideo, "stop_recording", fail)
+    monkeypatch.setattr(Video, method, fail)
     assert episode(client, url)[1] > 0
     answer = client.post(f"{url}/monitor/close/")
     assert (answer.status_code, answer.json["code"]) == (400, "monitor_directory")
