@@ -32,7 +32,9 @@ class Video:
 
         height, width, _ = self._shape = picture(frame).shape
         self._name = path.name
-        self._writer = FFMPEG_VideoWriter(str(path), (width, height), fps)
+        # By default 40 frames, which are kept until then.
+        ahead = ["-x264-params", "rc-lookahead=10"]
+        self._writer = FFMPEG_VideoWriter(str(path), (width, height), fps, ffmpeg_params=ahead)
         self._process = self._writer.proc
         self.pid: int = self._process.pid
 

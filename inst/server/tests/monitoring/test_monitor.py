@@ -270,7 +270,9 @@ def test_a_video_that_cannot_be_written_does_not_lose_the_step(client, create, m
     url = create()
     start(client, url, video_callable=True)
 
-    def fail(self, *args, call=getattr(Video, method)):
+    call = getattr(Video, method)
+
+    def fail(self, *args):
         call(self, *args)
         raise OSError("no space left")
 
