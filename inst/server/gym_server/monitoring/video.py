@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +36,10 @@ class Video:
 
         height, width, _ = self._shape = picture(frame).shape
         self._name = path.name
-        # By default 40 frames, which are kept until then.
+        # x264 looks 40 frames ahead by default, and keeps them meanwhile.
         ahead = ["-x264-params", "rc-lookahead=10"]
-        self._writer = FFMPEG_VideoWriter(str(path), (width, height), fps, ffmpeg_params=ahead)
+        with _signals_held():
+            self._writer = FFMPEG_VideoWriter(str(path), (width, height), fps, ffmpeg_params=ahead)
         self._process = self._writer.proc
         self.pid: int = self._process.pid
 
@@ -61,3 +66,19 @@ class Video:
         if self._process.returncode != 0:
             status = self._process.returncode
             raise OSError(f"the encoder of {self._name} ended with status {status}")
+
+
+@contextlib.contextmanager
+def _signals_held() -> Iterator[None]:
+    """Let a process that is started meanwhile live on when all of the server's are asked to stop.
+
+    Ctrl-C and systemd reach it as well, and the server finishes its video when it stops.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

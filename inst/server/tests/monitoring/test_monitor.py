@@ -1,6 +1,9 @@
 import csv
+import os
 import shutil
+import signal
 import sys
+import time
 import weakref
 
 import pytest
@@ -182,6 +185,20 @@ def test_an_encoder_counts_as_its_environments_process(app, client, create):
     assert len(instance.pids) == 1
     stop(client, url)
     assert instance.pids == ()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_signal_to_all_processes_of_the_server_cuts_no_video(app, client, create, monitor_dir):
+    url = create()
+    start(client, url, video_callable=True)
+    client.post(f"{url}/reset/")
+    for name in (signal.SIGINT, signal.SIGTERM):
+        os.kill(app._instances.get(url.rsplit("/", 1)[1]).pids[0], name)
+        time.sleep(0.2)
+        assert client.post(f"{url}/step/", json={"action": 0}).status_code == 200
+    stop(client, url)
+    path = monitor_dir / "run" / "rl-video-episode-0.mp4"
+    assert count_frames_and_secs(str(path))[0] == 3
 
 
 @pytest.mark.parametrize("fields", [{}, {"video_callable": False}, {"video_callable": None}])
