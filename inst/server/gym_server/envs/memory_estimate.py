@@ -21,6 +21,7 @@ from gym_server.envs.registry import module_of
 _KB, _MB = 2**10, 2**20
 
 _TOY_TEXT = "gymnasium.envs.toy_text"
+_MUJOCO = "gymnasium.envs.mujoco"
 
 # By the beginning of the module's name, the more particular one before the more general one;
 # environments of all others are small.
@@ -29,10 +30,15 @@ _ENVIRONMENT_BYTES = {
     _TOY_TEXT: 128 * _KB,
     "gymnasium.envs.box2d.car_racing": 5 * _MB,
     "gymnasium.envs.box2d": 512 * _KB,
-    "gymnasium.envs.mujoco": 2 * _MB,
+    _MUJOCO: 2 * _MB,
     "ale_py": 2 * _MB,
 }
 _OTHER_ENVIRONMENT_BYTES = 16 * _KB
+
+# What MuJoCo takes for each pixel when it draws a picture larger than usual: the figures above are
+# of environments that nobody draws, and what drawing takes is measured afterwards (``Account``).
+_PIXEL_BYTES = 72
+_USUAL_PIXELS = 480 * 480
 
 # A map of FrozenLake becomes a table of transitions, and each of its letters takes this much there.
 # The figures above include arguments that are no longer than _FREE_ARGUMENT_LETTERS.
@@ -64,8 +70,14 @@ def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
     letters = len(json.dumps(kwargs, default=str))
     for beginning, size in _ENVIRONMENT_BYTES.items():
         if module.startswith(beginning):
-            return size + _ARGUMENT_LETTER_BYTES * max(0, letters - _FREE_ARGUMENT_LETTERS)
+            more = _ARGUMENT_LETTER_BYTES * max(0, letters - _FREE_ARGUMENT_LETTERS)
+            return size + more + (_picture_bytes(kwargs) if beginning == _MUJOCO else 0)
     return _OTHER_ENVIRONMENT_BYTES + _WRAPPER_LETTER_BYTES * letters
+
+
+def _picture_bytes(kwargs: dict) -> float:
+    pixels = math.prod(_number(kwargs.get(side, 480)) for side in ("width", "height"))
+    return _PIXEL_BYTES * max(0, pixels - _USUAL_PIXELS)
 
 
 def model_bytes(env: gymnasium.Env) -> float:

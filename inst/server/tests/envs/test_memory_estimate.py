@@ -120,6 +120,16 @@ def test_atari_stacks_of_its_own_are_estimated(limited):
     assert refused(create(limited(), "ALE/Pong-v5", kwargs=kwargs, **how))
 
 
+@pytest.mark.parametrize("how", [{}, {"num_envs": 1, "vectorization_mode": "sync"}])
+def test_a_picture_that_cannot_fit_is_refused_before_it_is_drawn(limited, how):
+    client = limited(max_memory_mb=256)
+    # Drawing it takes 1.1 GiB.
+    large = create(client, "HalfCheetah-v5", kwargs={"width": 4096, "height": 4096}, **how)
+    assert refused(large), large.json
+    usual = create(client, "HalfCheetah-v5", **how)
+    assert usual.status_code == 200 or usual.json["code"] == "missing_dependency"
+
+
 def test_sub_environments_count(limited):
     client = limited()
     # 600 x 400 x 3 bytes, of which small integers are sent.
