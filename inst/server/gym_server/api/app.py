@@ -57,7 +57,8 @@ class Config:
         max_body_bytes: the size of the largest request.
         limits: of all clients together.
         isolate: which environments get a process of their own: "none", "foreign" (those of
-            other modules than Gymnasium's and ale_py's) or "all".
+            other modules than Gymnasium's and ale_py's, and those that may take much memory) or
+            "all".
         max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
         stop: asks the server to stop once the requests under way are answered.
         access: which requests the server lets pass.

@@ -153,7 +153,8 @@ def _add_isolation(options: argparse.ArgumentParser) -> None:
         default="foreign",
         choices=MODES,
         help="which environments get a process of their own, so that one that crashes takes no "
-        "other along: those of other modules than Gymnasium's (foreign), none or all (%(default)s)",
+        "other along: those of other modules than Gymnasium's, and on Linux those that may take "
+        "much memory at once (foreign), none or all (%(default)s)",
     )
     options.add_argument(
         "--max-worker-mb",

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 from gym_server.budget import Budget
 from gym_server.errors import GymServerError
 
 _MB = 2**20
+
+
+class TooLargeHereError(GymServerError):
+    """What is being created is too large for this process, and is to be made in another one."""
 
 
 class MemoryReservation:
@@ -15,15 +21,19 @@ class MemoryReservation:
         taken: how many bytes that are.
     """
 
-    def __init__(self, budget: Budget | None = None, num_envs: int = 1) -> None:
+    def __init__(
+        self, budget: Budget | None = None, num_envs: int = 1, most_here: float = math.inf
+    ) -> None:
         """Start with nothing taken.
 
         Args:
             budget: what it takes from; None for one without a limit.
             num_envs: how many sub-environments ``reserve()`` reserves for.
+            most_here: how many bytes one of them may take, to be made in this process.
         """
         self._budget = budget or Budget()
         self._num_envs = num_envs
+        self._most_here = most_here
         self.taken = 0.0
 
     def reserve(self, size: float, what: str, later: float = 0.0) -> None:
@@ -36,8 +46,11 @@ class MemoryReservation:
 
         Raises:
             GymServerError: ``too_much_memory``.
+            TooLargeHereError: there is room for it, but not in this process.
         """
         self.take((size + later) * self._num_envs, what)
+        if self.taken > self._most_here * self._num_envs:
+            raise TooLargeHereError("too_much_memory", f"{what} is too large for this process")
         self.taken -= later * self._num_envs
         self._budget.give_back(later * self._num_envs)
 

@@ -6,6 +6,10 @@ in the server's process they are faster and need no memory of their own; an envi
 operator allowed by ``--allow-module`` may be anybody's first one. Hence "foreign". One process
 for several of them would save the memory, and let the second one die with the first.
 
+One that may take much memory at once gets a process on Linux, where the system limits what it has:
+an estimate may be wrong, and to make, reset or draw such an environment, or to write what is
+observed as JSON, holds the interpreter for seconds.
+
 Measured on two noisy cores that others used, too (Python 3.11, Gymnasium 1.4, CartPole):
 
 =====================================  ==============  =====================  ================
@@ -29,6 +33,7 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import threading
 from collections.abc import Collection
 from typing import cast
@@ -43,6 +48,11 @@ from gym_server.processes.worker_process import WorkerProcess
 log = logging.getLogger(__name__)
 
 MODES = ("none", "foreign", "all")
+
+# What one environment, or one sub-environment, may be estimated to take in the server's process:
+# more than the usual ones (MuJoCo 2 MiB, pictures as observations 50). What is observed of one so
+# large has a million numbers, which as JSON stop everybody for half a second.
+_MOST_BYTES_HERE = 64 * 2**20
 
 
 class Isolation:
@@ -86,6 +96,11 @@ class Isolation:
         # Making Atari's own vector environment holds the interpreter, for 88 ms a sub-environment.
         holds = vectorization_mode == "vector_entry_point" and home.startswith("ale_py")
         return self.mode == "all" or holds or _is_foreign(home)
+
+    @property
+    def most_bytes_here(self) -> float:
+        """How large an environment may be without a process of its own."""
+        return _MOST_BYTES_HERE if self.mode == "foreign" and sys.platform == "linux" else math.inf
 
     def settings(
         self,

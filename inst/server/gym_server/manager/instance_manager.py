@@ -15,7 +15,7 @@ from gym_server.budget import Budget
 from gym_server.envs import registry, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.memory_reservation import MemoryReservation, TooLargeHereError
 from gym_server.errors import (
     GymServerError,
     call_too_long,
@@ -135,6 +135,12 @@ class InstanceManager:
         isolated = self._isolation.wants(
             config.env_id, self._allowed_modules, config.vectorization_mode
         )
+        try:
+            return self._create(config, isolated)
+        except TooLargeHereError:
+            return self._create(config, isolated=True)
+
+    def _create(self, config: EnvConfig, isolated: bool) -> str:
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
@@ -165,7 +171,8 @@ class InstanceManager:
         """Keep room for an environment while it is created."""
         # An isolated environment has a process already.
         workers = most_workers(config) if config.wants_workers or not isolated else 0
-        reservation = MemoryReservation(self._budget, config.num_envs or 1)
+        most_here = self._isolation.most_bytes_here
+        reservation = MemoryReservation(self._budget, config.num_envs or 1, most_here)
         with self._lock:
             taken = sum((one.room for one in list(self._shares.values())), Room(0))
             if not config.wants_workers:

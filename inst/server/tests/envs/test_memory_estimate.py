@@ -1,5 +1,6 @@
 """Memory is estimated before it is taken, for all environments together."""
 
+import sys
 import tracemalloc
 
 import gymnasium
@@ -128,6 +129,22 @@ def test_a_picture_that_cannot_fit_is_refused_before_it_is_drawn(limited, how):
     assert refused(large), large.json
     usual = create(client, "HalfCheetah-v5", **how)
     assert usual.status_code == 200 or usual.json["code"] == "missing_dependency"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process's memory is limited on Linux")
+@pytest.mark.parametrize("num_envs", [None, 2])
+def test_what_may_take_much_at_once_is_made_in_a_process(limited, num_envs):
+    client = limited(isolate="foreign")
+    pictures = [{"name": "AddRenderObservation"}]
+    for wrappers, isolated in [(pictures, False), ([*pictures, *stacks(2)], True)]:
+        created = create(client, wrappers=wrappers, num_envs=num_envs)
+        assert created.status_code == 200, created.json
+        url = f"/v1/envs/{created.json['instance_id']}"
+        assert client.get(url).json["isolated"] is isolated
+        assert client.post(f"{url}/close/").status_code == 204
+    assert client.application._instances._budget.left == 4096 * MB
+    # What fits nowhere is refused, and not made in a process to find out.
+    assert refused(create(client, wrappers=[*pictures, *stacks(1000)], num_envs=num_envs))
 
 
 def test_sub_environments_count(limited):
