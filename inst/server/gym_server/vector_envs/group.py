@@ -131,8 +131,10 @@ class Group:
         """
         infos = []
         for index, seed, seeds_later in zip(which, seeds, later, strict=True):
+            # An environment may change them.
+            own = copy.deepcopy(options)
             with self._naming(index):
-                self._last[index], info = self.envs[index].reset(seed=seed, options=options)
+                self._last[index], info = self.envs[index].reset(seed=seed, options=own)
             infos.append(Info(checked_info(info)))
             self._ended[index] = self._rests[index] = False
             self._seeds[index] = None if seeds_later is None else list(reversed(seeds_later))

@@ -43,6 +43,13 @@ def test_a_failure_names_the_sub_environment_whose_action_it_was(group):
         group.step(None, [0, 7, 0], True)
 
 
+def test_each_sub_environment_has_options_of_its_own():
+    group = group_of("Counting-v0", [0, 1], AutoresetMode.NEXT_STEP)
+    _, infos = group.reset([0, 1], [1, 2], [None] * 2, {"starts": [1]})
+    infos[0].info["options"]["starts"].clear()
+    assert infos[1].info["options"] == {"starts": [1]}
+
+
 def test_what_an_episode_ended_with_stays_when_the_next_one_changes_it_in_place():
     group = group_of("KeepsItsArrays-v0", [0, 1], AutoresetMode.SAME_STEP)
     group.reset([0, 1], [1, 2], [None] * 2, None)
