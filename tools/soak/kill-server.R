@@ -15,7 +15,7 @@ play <- function(server, ...) {
 }
 
 figures <- function(search) {
-  search[setdiff(names(search), c("elapsed", "client", "env", "template"))]
+  search[setdiff(names(search), c("elapsed", "client", "env", "template", "provenance"))]
 }
 
 kill_after <- function(server, seconds) {
@@ -29,7 +29,7 @@ kill_after <- function(server, seconds) {
 # How many episodes the file has.
 episodes_kept <- function() {
   if (!file.exists(path)) return(0L)
-  length(gym:::read_checkpoint(path, NULL)$history$returns)
+  sum(vapply(gym:::read_checkpoint(path, NULL)$training$episodes, NROW, 0L))
 }
 
 server <- gym_server_start()
