@@ -2,24 +2,24 @@
 
 # The columns of progress.csv, as Stable-Baselines3 names them
 # (https://stable-baselines3.readthedocs.io/en/master/common/logger.html).
+log_columns <- c(
+  "time/iterations", "time/total_timesteps", "time/time_elapsed", "time/fps",
+  "rollout/ep_rew_mean", "rollout/ep_rew_min", "rollout/ep_rew_median", "rollout/ep_rew_max",
+  "rollout/ep_len_mean", "eval/mean_reward", "eval/mean_ep_length"
+)
+
 log_row <- function(state) {
   row <- state$history[[state$iteration]]
   evaluated <- Filter(function(one) one$iteration == state$iteration, state$evaluations)
   last <- if (length(evaluated)) evaluated[[length(evaluated)]]
-  data.frame(
-    `time/iterations` = row$iteration,
-    `time/total_timesteps` = row$steps,
-    `time/time_elapsed` = round(row$elapsed, 3),
-    `time/fps` = round(row$steps / max(row$elapsed, 1e-3)),
-    `rollout/ep_rew_mean` = row$mean_return,
-    `rollout/ep_rew_min` = row$min_return,
-    `rollout/ep_rew_median` = row$median_return,
-    `rollout/ep_rew_max` = row$max_return,
-    `rollout/ep_len_mean` = row$mean_length,
-    `eval/mean_reward` = if (is.null(last)) NA else last$mean_return,
-    `eval/mean_ep_length` = if (is.null(last) || is_exact(last)) NA else last$steps / last$episodes,
-    check.names = FALSE
+  values <- data.frame(
+    row$iteration, row$steps, round(row$elapsed, 3), round(row$steps / max(row$elapsed, 1e-3)),
+    row$mean_return, row$min_return, row$median_return, row$max_return,
+    row$mean_length,
+    if (is.null(last)) NA else last$mean_return,
+    if (is.null(last) || is_exact(last)) NA else last$steps / last$episodes
   )
+  rlang::set_names(values, log_columns)
 }
 
 #' Prepare to log a training
@@ -128,10 +128,10 @@ keep_iterations <- function(table, iteration) {
   }
   lines <- readLines(table, warn = FALSE, skipNul = TRUE)
   complete <- are_complete(table, lines)
-  # The first column counts iterations; the first line has the columns' names.
+  # The first column counts iterations, and has no number in the first line.
   of_lines <- suppressWarnings(as.numeric(sub(",.*", "", lines)))
-  kept <- complete & (is.na(of_lines) | of_lines <= iteration)
-  if (any(kept)) replace_content(table, as_lines(lines[kept])) else unlink(table)
+  kept <- complete & !is.na(of_lines) & of_lines <= iteration
+  replace_content(table, as_lines(c(paste(log_columns, collapse = ","), lines[kept])))
   looked_for <- if (!all(complete) && is.finite(iteration)) seq_len(iteration)
   length(setdiff(looked_for, of_lines[kept]))
 }
@@ -141,7 +141,7 @@ are_complete <- function(table, lines) {
   commas <- nchar(gsub("[^,]", "", lines, useBytes = TRUE))
   bytes <- readBin(table, "raw", file.size(table))
   ends <- identical(utils::tail(bytes, 1L), charToRaw("\n"))
-  commas == commas[1L] & (ends | seq_along(lines) < length(lines))
+  commas == length(log_columns) - 1L & (ends | seq_along(lines) < length(lines))
 }
 
 # "progress-1.csv" for "progress.csv", or the first such name that is free.

@@ -292,6 +292,12 @@ test_that("a line of the log that a full disk cut is left out, with a warning wh
   cat("4,12,0.5,5,6\n", file = table, append = TRUE)
   expect_no_warning(play(3, local_checkpoint(kept$list[[3]])))
   expect_identical(iterations(), 1:3)
+  # The first write: the table's head was cut, and later lines were written behind it.
+  lines <- readLines(table)
+  writeLines(c(paste0(substr(lines[[1]], 1, 30), lines[[2]]), lines[3:4]), table)
+  expect_warning(play(4, local_checkpoint(kept$list[[3]])), "1 iteration",
+                 class = "gym_warning_log")
+  expect_identical(iterations(), 2:4)
 })
 
 test_that("the log goes on with a whole line after one that could not be written", {
