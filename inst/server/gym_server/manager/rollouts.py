@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gym_server.errors import GymServerError, call_too_long, environment_error, shutting_down
+from gym_server.manager.rollout_request import Request
 from gym_server.processes.pool import pool
 from gym_server.processes.pool_process import PoolProcess
 from gym_server.protocol import safetensors
@@ -30,12 +31,6 @@ log = logging.getLogger(__name__)
 # Requests that wait or are played; each has a thread, and a body of up to 16 MiB.
 _MOST_REQUESTS = 64
 
-# So many seconds of units a player takes at once, when it is known how long they take. Its process
-# stops earlier, and gives the rest back.
-_SECONDS_TAKEN = 0.03
-_FIRST_TAKEN = 4
-_MOST_TAKEN = 2000
-
 # A process that has nothing to play is put back after so many seconds.
 _IDLE_SECONDS = 1.0
 
@@ -46,9 +41,6 @@ _UNWANTED_SECONDS = 2.0
 
 # An episode with which a process has died so often is not played again.
 _MOST_DEATHS = 3
-
-# A larger answer is cut after whole episodes.
-_MOST_BYTES = 64 * 2**20
 
 # What a process knows of is forgotten there in the same order; see ``rollouts.worker``.
 _MOST_KNOWN = 8
@@ -75,92 +67,6 @@ class Played:
 
 
 @dataclass(eq=False)
-class _Request:
-    """Units that a client waits for.
-
-    Attributes:
-        number: by which processes know its task.
-        task: what all have in common.
-        function: what is called in the process: "play", or "describe".
-        key: what a process may have played before that plays it; see ``_Player``.
-        units: all of them.
-        waiting: the ranges of units that nobody plays at the moment, the first one first.
-        playing: how many ranges are being played.
-        results: what came of ranges of units, by their first: how many units, and their tensors.
-        size: bytes of all results.
-        seconds: how long a unit has taken, or None.
-        deaths: how often a process has died with a unit.
-        failed: the first unit that has failed, and the error.
-        unwanted_since: since when nobody waits for it, in the clock's seconds.
-        over: set when it is done.
-    """
-
-    number: int
-    task: Task
-    function: str
-    key: str | None
-    units: Sequence[Unit]
-    waiting: deque[range] = field(default_factory=deque)
-    playing: int = 0
-    results: dict[int, tuple[int, Any]] = field(default_factory=dict)
-    size: int = 0
-    seconds: float | None = None
-    deaths: dict[int, int] = field(default_factory=dict)
-    failed: tuple[int, GymServerError] | None = None
-    unwanted_since: float | None = None
-    over: threading.Event = field(default_factory=threading.Event)
-
-    def take(self, players: int) -> range | None:
-        """Take some units to play; None where there are none."""
-        if not self.has_work:
-            return None
-        first = self.waiting[0]
-        count = _FIRST_TAKEN if self.seconds is None else int(_SECONDS_TAKEN / self.seconds)
-        share = -(-sum(map(len, self.waiting)) // players)
-        count = max(1, min(count, share, _MOST_TAKEN, len(first)))
-        taken = first[:count]
-        if count < len(first):
-            self.waiting[0] = first[count:]
-        else:
-            self.waiting.popleft()
-        self.playing += 1
-        return taken
-
-    def give_back(self, units: range) -> None:
-        """Let somebody else play some units."""
-        if units:
-            self.waiting.appendleft(units)
-            self.waiting = deque(sorted(self.waiting, key=lambda one: one.start))
-
-    def fail(self, unit: int, error: GymServerError) -> None:
-        """Note that a unit has failed."""
-        if self.failed is None or unit < self.failed[0]:
-            self.failed = (unit, error)
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing is played, and nothing will be."""
-        return self.playing == 0 and not self.has_work
-
-    @property
-    def has_work(self) -> bool:
-        """Whether there are units that somebody should play."""
-        if not self.waiting or self.unwanted_since is not None or self.size > _MOST_BYTES:
-            return False
-        return self.failed is None or self.waiting[0].start < self.failed[0]
-
-    def beginning(self) -> tuple[list[Any], int]:
-        """Return the results of the first units, without a gap, and how many units these are."""
-        results = []
-        end = 0
-        while end in self.results:
-            done, tensors = self.results[end]
-            results.append(tensors)
-            end += done
-        return results, end
-
-
-@dataclass(eq=False)
 class _Player:
     """A thread with a process.
 
@@ -177,7 +83,7 @@ class _Player:
 
     key: str | None
     process: PoolProcess | None = None
-    request: _Request | None = None
+    request: Request | None = None
     units: range = range(0)
     steps: int = -1
     steps_since: float = 0.0
@@ -199,7 +105,7 @@ class Rollouts:
         """
         self.most_processes = most_processes
         self._changed = threading.Condition()
-        self._requests: deque[_Request] = deque()
+        self._requests: deque[Request] = deque()
         self._players: list[_Player] = []
         self._stopping = False
 
@@ -243,9 +149,9 @@ class Rollouts:
                 raise error
         return Played(concatenated(results), error)
 
-    def _request(self, task: Task, function: str, trusted: bool, units: Sequence[Unit]) -> _Request:
+    def _request(self, task: Task, function: str, trusted: bool, units: Sequence[Unit]) -> Request:
         key = None if trusted else task.env_key
-        request = _Request(next(_numbers), task, function, key, units)
+        request = Request(next(_numbers), task, function, key, units)
         request.waiting.append(range(len(units)))
         with self._changed:
             if self._stopping:
@@ -268,7 +174,7 @@ class Rollouts:
             self._changed.notify_all()
         return request
 
-    def _wait(self, request: _Request, is_wanted: Callable[[], bool]) -> None:
+    def _wait(self, request: Request, is_wanted: Callable[[], bool]) -> None:
         while not request.over.wait(_LOOK_SECONDS):
             if not is_wanted():
                 with self._changed:
@@ -276,7 +182,7 @@ class Rollouts:
                     self._end_if_over(request)
                 raise GymServerError("call_too_long", "The client does not wait any more")
 
-    def _end_if_over(self, request: _Request) -> None:
+    def _end_if_over(self, request: Request) -> None:
         if request.is_over:
             request.over.set()
             if request in self._requests:
@@ -339,7 +245,7 @@ class Rollouts:
                 self._changed.wait(left)
         return False
 
-    def _needs_room(self, request: _Request) -> bool:
+    def _needs_room(self, request: Request) -> bool:
         """Whether a request waits for a process that may play it, and there may be no more."""
         return (
             len(self._players) >= self.most_processes
@@ -376,7 +282,7 @@ class Rollouts:
             self._changed.notify_all()
 
     def _call(
-        self, player: _Player, request: _Request, units: range
+        self, player: _Player, request: Request, units: range
     ) -> tuple[int, Any, GymServerError | None]:
         """Return how many units were played, what came of them, and why no more."""
         process = player.process
@@ -398,7 +304,7 @@ class Rollouts:
         return _read(body)
 
     def _enter_error(
-        self, player: _Player, request: _Request, units: range, error: GymServerError
+        self, player: _Player, request: Request, units: range, error: GymServerError
     ) -> None:
         process = player.process
         if process is None or process.is_alive:

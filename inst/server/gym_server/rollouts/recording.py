@@ -11,7 +11,7 @@ from gymnasium.spaces import Dict, Space, Tuple
 
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import Tensor
-from gym_server.rollouts.task import Keep
+from gym_server.rollouts.task import MOST_BYTES, Keep
 from gym_server.spaces import batch_tensor_writer, stack
 from gym_server.spaces.stacking import ARRAYS
 
@@ -44,6 +44,17 @@ def _has_arrays(space: Space) -> bool:
             return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces.values()))
         case _:
             return isinstance(space, ARRAYS)
+
+
+def _bytes_of(space: Space) -> int:
+    """Return how much a value of a space of arrays takes."""
+    match space:
+        case Tuple():
+            return sum(map(_bytes_of, space.spaces))
+        case Dict():
+            return sum(map(_bytes_of, space.spaces.values()))
+        case _:
+            return int(np.prod(space.shape or ())) * np.dtype(space.dtype).itemsize
 
 
 class Moments:
@@ -106,6 +117,9 @@ class Recorder:
         self._rewards: list[float] = []
         self._flags: list[tuple[bool, bool]] = []
         self._complete = 0
+        observations = 2 if keep.next_observation else 1
+        size = observations * _bytes_of(observation_space) + _bytes_of(action_space)
+        self._most_steps = MOST_BYTES // max(1, size)
 
     def begin(self) -> None:
         """An episode begins."""
@@ -127,6 +141,13 @@ class Recorder:
             self._flags.append((bool(terminated), bool(truncated)))
             if self._keep.next_observation:
                 self._next_observations.append(self._copy_observation(observation))
+            if len(self._rewards) - self._complete > self._most_steps:
+                raise GymServerError(
+                    "too_much_memory",
+                    f"The steps of an episode may take {MOST_BYTES // 2**20} MiB, which are "
+                    f"{self._most_steps:,} of these, and this one goes on",
+                    "a smaller max_steps cuts it short",
+                )
 
     def end(self) -> None:
         """The episode has come to its end."""

@@ -12,6 +12,9 @@ import numpy as np
 
 from gym_server.envs.config import EnvConfig
 
+# A larger answer is cut after whole episodes, and an episode whose steps take more is refused.
+MOST_BYTES = 64 * 2**20
+
 
 @dataclass(frozen=True)
 class Keep:

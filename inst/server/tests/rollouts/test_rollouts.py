@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from rollout_requests import RANDOM, played_by_hand, refused, request_body, roll_out
 
+from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 SEEDS = [3, 2**40, 3, 0]
@@ -268,7 +269,7 @@ def test_health_says_that_there_are_rollouts(client):
 
 
 def test_an_answer_has_no_more_than_so_many_bytes(client, monkeypatch):
-    monkeypatch.setattr("gym_server.manager.rollouts._MOST_BYTES", 20_000)
+    monkeypatch.setattr("gym_server.manager.rollout_request.MOST_BYTES", 20_000)
     how = {"env_id": "Pendulum-v1", "max_steps": 100, "keep": ["steps"]}
     arrays, metadata = roll_out(client, range(100), **how)
     finished = len(arrays["return"])
@@ -277,6 +278,21 @@ def test_an_answer_has_no_more_than_so_many_bytes(client, monkeypatch):
     assert len(arrays["observation"]) == 100 * finished
     whole = roll_out(client, [finished - 1], **how)[0]
     assert whole["return"][0] == arrays["return"][-1]
+
+
+def test_the_steps_of_an_episode_have_no_more_than_so_many_bytes(monkeypatch):
+    from gym_server.rollouts import recording
+    from gym_server.rollouts.task import Keep
+
+    monkeypatch.setattr(recording, "MOST_BYTES", 100)
+    box = gymnasium.spaces.Box(-1, 1, (3,))
+    recorder = recording.Recorder(Keep(steps=True), box, box)
+    for _ in range(4):
+        recorder.before(np.zeros(3), np.zeros(3))
+        recorder.after(np.zeros(3), 1.0, False, False)
+    recorder.before(np.zeros(3), np.zeros(3))
+    with pytest.raises(GymServerError, match="goes on"):
+        recorder.after(np.zeros(3), 1.0, False, False)
 
 
 def test_the_body_says_what_is_asked(client):
