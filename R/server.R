@@ -33,7 +33,8 @@ is_running <- function(base) {
 #'   `allow_module = c("a", "b")` names Python modules whose environments may be
 #'   made. Limits for all clients together are `max_instances` (environments, 1,000),
 #'   `max_num_envs` (sub-environments of one, 16,384), `max_total_sub_envs` (four times as many),
-#'   `max_processes` (of their own that environments have, 128), `max_memory_mb` (of all
+#'   `max_processes` (of their own that environments have, 128), `max_rollout_processes` (that play
+#'   whole episodes, one a core), `max_memory_mb` (of all
 #'   environments, estimated before they are made, 4,096), `max_monitor_mb` (that all monitors
 #'   together may write on the disk, 4,096), `max_watchers` (100),
 #'   `max_body_mb` (of a request, 16), `max_call_seconds` (that a call may take before its
