@@ -102,18 +102,6 @@ make_seeded <- function(make, n, traits, num_workers = NULL) {
   )
 }
 
-# How many a landscape gets: with so many playing takes seconds.
-landscape_sub_envs <- 128L
-
-# Each sub-environment has a seed of its own, so that all networks can play the same episodes.
-make_seeded_sub_envs <- function(env_id, episodes, client) {
-  n <- as.integer(min(episodes, landscape_sub_envs))
-  make <- env_maker(env_id, list(), client, rlang::caller_env())
-  traits <- sub_env_traits(make)
-  seeded <- if (!is.null(traits)) if_supported(make_seeded(make, n, traits))
-  seeded %||% make(NULL)
-}
-
 # Fewer sub-environments are tried where the server refuses so many.
 counts_to_try <- function(n) {
   unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))
@@ -129,11 +117,20 @@ first_supported <- function(make, counts) {
 }
 
 # Does the server choose the environment's own vector implementation where it may choose, and how
-# large is an observation? The question is asked once, with one sub-environment, because making many
-# takes long. NULL where the server cannot make that one.
+# large is an observation? A server that has described the environment has said it; an older one is
+# asked once, with one sub-environment, because making many takes long. NULL where the server cannot
+# make that one.
 sub_env_traits <- function(make) {
   known <- attr(make, "known")
   if (is.null(known$traits)) {
+    described <- known$described[[1L]]
+    if (!is.null(described)) {
+      known$traits <- list(
+        own_implementation = described$one_seed,
+        observation_bytes = observation_bytes(described$observation_space)
+      )
+      return(known$traits)
+    }
     sub_env <- if_supported(make(1L))
     if (is.null(sub_env)) {
       return(NULL)

@@ -75,7 +75,8 @@ tensors_answer <- function(bytes, layouts, key = NULL, by_column = FALSE) {
     texts = field("texts"),
     info = if (identical(file$metadata$info, "{}")) empty_object else field("info"),
     final_sub_envs = field("final_sub_envs"),
-    request = field("request")
+    request = field("request"),
+    error = field("error")
   )
 }
 

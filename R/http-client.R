@@ -51,7 +51,8 @@ client_state <- function(client) {
       state$instances <- new.env(parent = emptyenv())
       state$creation_keys <- new_idempotency_keys()
       state$to_close <- character()
-      state$versions <- NULL
+      state$health <- NULL
+      state$several <- NULL
       state$layouts <- new.env(parent = emptyenv())
       state$pid <- Sys.getpid()
       state$session <- the_session
@@ -60,16 +61,27 @@ client_state <- function(client) {
   state
 }
 
-# The versions of the server, its Python and its Gymnasium, a named list; `NULL` where it has no
-# such route, or there is no client. They are asked for once.
-server_versions <- function(client) {
+# What the server says of itself, a named list; `NULL` where it has no such route, or there is no
+# client. It is asked for once.
+server_health <- function(client, call = rlang::caller_env()) {
   if (is.null(client)) {
     return(NULL)
   }
   state <- client_state(client)
-  if (is.null(state$versions)) {
-    health <- tryCatch(get_answer(client, "/v1/health/"), gym_error = function(cnd) NULL)
-    state$versions <- list(health$versions)
+  if (is.null(state$health)) {
+    state$health <- list(tryCatch(
+      get_answer(client, "/v1/health/", call = call), gym_error_http = function(cnd) NULL
+    ))
   }
-  state$versions[[1L]]
+  state$health[[1L]]
+}
+
+# The versions of the server, its Python and its Gymnasium, a named list or `NULL`.
+server_versions <- function(client) {
+  tryCatch(server_health(client)$versions, gym_error = function(cnd) NULL)
+}
+
+# Whether the server plays whole episodes by itself. Older ones do not.
+plays_rollouts <- function(client, call = rlang::caller_env()) {
+  isTRUE(server_health(client, call)$rollouts)
 }

@@ -2,8 +2,6 @@
 # environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
 # played again, and it does not matter in which order batches are played, and by whom.
 #
-# A batch is played in slices (play-slices.R): all of them side by side here, or one by a worker.
-#
 # Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. Which of them
 # plays an episode is written down before the first step. If the next one were given to whichever
 # ends first, and playing stopped at the number of episodes asked for, short episodes would be
@@ -17,8 +15,7 @@
 #' @param policy The policy, bound to the environment: one, or several candidates.
 #' @param episodes A list of vectors with an element for each episode: `candidate` (which of the
 #'   policies plays it), `episode` (its number among those of the candidate) and `seed`.
-#' @param streams The streams that the policy draws from, one for each slice.
-#' @param slice The slice of each sub-environment that plays, as [slice_sub_envs()] returns it.
+#' @param stream The stream that the policy draws from.
 #' @param max_steps After how many steps an episode is cut short.
 #' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
 #'   none; `each`, how many episodes a candidate plays.
@@ -29,11 +26,11 @@
 #'   to, see [agent_observe()].
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
-#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`,
-#'   those of each slice.
+#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`, of
+#'   which there is one.
 #'   Candidates after one that has reached the target are left out.
 #' @noRd
-play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps = Inf, target = NULL,
+play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
                        each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
                        learner = NULL, report = function(ended) NULL) {
   # Products of matrices by R itself: a row of them is the same, to the last bit, whatever rows are
@@ -41,7 +38,7 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
   matprod <- options(matprod = "internal")
   on.exit(options(matprod))
   n <- length(episodes$episode)
-  at_once <- if (vector_env$one_seed) vector_env$num_envs else length(slice)
+  at_once <- if (vector_env$one_seed) vector_env$num_envs else min(n, vector_env$num_envs)
   batch <- rlang::env(
     candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
@@ -50,9 +47,8 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
     target = if (!keep_moments) target, each = each,
     steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
-    keep_next = keep_next, learner = learner, at_once = at_once, slice = slice, streams = streams,
-    draws = length(streams) > 1L && inherits(policy, "gym_policy_random"),
-    moments = if (keep_moments) no_slice_moments(length(streams)), noted = list()
+    keep_next = keep_next, learner = learner, at_once = at_once,
+    moments = if (keep_moments) no_moments(), noted = list()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
@@ -63,11 +59,11 @@ play_batch <- function(vector_env, policy, episodes, streams, slice, max_steps =
       }
     }
   }
-  with_generator(new_generator(stream = streams[[1L]]), naming_call(play(), vector_env))
+  with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
   kept <- mget(c("steps", "frames"), batch)
-  kept["moments"] <- list(if (keep_moments) split_slice_moments(batch$moments))
+  kept["moments"] <- list(if (keep_moments) list(batch$moments))
   episodes <- lapply(mget(columns, batch), utils::head, batch$needed)
   c(if (keep_moments) without_needless(episodes, each, target) else episodes, kept)
 }
@@ -105,7 +101,9 @@ play_episodes <- function(batch, first, last) {
   step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
     action <- if (is.null(batch$learner)) {
-      act_in_slices(batch, playing)
+      act_batch(
+        playing$acting, playing$observation, length(playing$rows$sub_env), vector_env
+      )
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
     }
@@ -275,5 +273,39 @@ drop_needless_candidates <- function(batch, candidates) {
           isTRUE(mean(batch$return[own]) >= batch$target)) {
       batch$needed <- min(batch$needed, sum(batch$candidate <= candidate))
     }
+  }
+}
+
+# Candidates after one that has reached the target.
+without_needless <- function(episodes, each, target) {
+  if (is.null(target)) {
+    return(episodes)
+  }
+  returns <- split(episodes$return, episodes$candidate)
+  reached <- vapply(returns, function(own) length(own) == each && isTRUE(mean(own) >= target), NA)
+  if (!any(reached)) {
+    return(episodes)
+  }
+  first <- as.integer(names(returns))[which(reached)[[1L]]]
+  lapply(episodes, `[`, episodes$candidate <= first)
+}
+
+# Moments of observations ------------------------------------------------------------------
+
+# How many steps are noted before their observations are added to the moments: adding takes R as
+# long for a few rows as for hundreds. The number depends on the size of an observation alone.
+steps_together <- function(numbers) max(1L, min(64L, 8192L %/% numbers))
+
+# Notes the observations that a step was taken from.
+note_observations <- function(batch, playing) {
+  values <- number_rows(playing$observation)
+  batch$noted[[length(batch$noted) + 1L]] <- values
+  if (playing$taken %% steps_together(ncol(values)) == 0L) add_noted(batch)
+}
+
+add_noted <- function(batch) {
+  if (length(batch$noted)) {
+    batch$moments <- merge_moments(batch$moments, moments_of(do.call(rbind, batch$noted)))
+    batch$noted <- list()
   }
 }

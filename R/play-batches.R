@@ -1,4 +1,5 @@
-# How many episodes of many candidates are cut into batches, and played batch after batch.
+# Episodes of many candidates: those that the server plays by itself are all asked for together
+# (play-beside.R), others are cut into batches and played from R, batch after batch.
 #
 # The rule: episodes are taken candidate after candidate. A batch has as many whole candidates as
 # there is room for, and at least one; a candidate with more episodes than that is cut into batches
@@ -66,10 +67,20 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #'   that plays it; `candidate` then counts from 1 in this policy.
 #' @param report A function that is called with how many episodes have ended in the present batch.
 #' @param ... Further arguments of [play_batch()].
+#' @param learner As for [play_batch()].
 #' @noRd
 play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...,
                          learner = NULL, max_steps = Inf) {
   check_has_end(vector_env, max_steps)
+  vector_env <- if (is.null(learner)) {
+    keep_steps <- isTRUE(list(...)$keep_steps)
+    env_for_policy(vector_env, policy_of(seq_len(history$candidates)), max_steps, keep_steps)
+  } else {
+    stepped(vector_env)
+  }
+  if (!is.null(vector_env$description)) {
+    return(play_beside(vector_env, history, policy_of, report, ..., max_steps = max_steps))
+  }
   if (plays_on_workers(vector_env, policy_of, learner)) {
     return(play_in_futures(
       vector_env, history, policy_of, report, ..., max_steps = max_steps
@@ -100,8 +111,7 @@ check_has_end <- function(vector_env, max_steps) {
 #' What comes of a batch depends on this alone, so that batches can be played in any order, as long
 #' as they are drawn and entered in theirs.
 #' @return A list: `episodes`, as [play_batch()] takes them, with the candidates' own numbers,
-#'   `each`, how many a candidate plays, and `slice` and `streams`; `NULL` when there is no further
-#'   batch.
+#'   `each`, how many a candidate plays, and `stream`; `NULL` when there is no further batch.
 #' @noRd
 next_batch <- function(vector_env, history) {
   batch_size <- if (length(vector_env$remembers)) Inf else vector_env$batch_size
@@ -112,9 +122,7 @@ next_batch <- function(vector_env, history) {
   }
   history$drawn_batches <- history$drawn_batches + 1
   episodes$seed <- draw_episode_seeds(vector_env, history, episodes)
-  slice <- slice_sub_envs(vector_env, length(episodes$episode), history$episodes)
-  streams <- slice_streams(take_stream(history$streams), max(slice))
-  list(episodes = episodes, each = history$episodes, slice = slice, streams = streams)
+  list(episodes = episodes, each = history$episodes, stream = take_stream(history$streams))
 }
 
 # Plays a batch. Its policy has its candidates alone.
@@ -123,8 +131,8 @@ play_drawn_batch <- function(vector_env, batch, policy_of, report = function(end
   candidates <- unique(episodes$candidate)
   episodes$candidate <- match(episodes$candidate, candidates)
   played <- play_batch(
-    vector_env, policy_of(candidates), episodes, batch$streams, batch$slice, each = batch$each,
-    report = report, ...
+    vector_env, policy_of(candidates), episodes, batch$stream, each = batch$each, report = report,
+    ...
   )
   played$candidate <- candidates[played$candidate]
   played
@@ -134,6 +142,10 @@ enter_batch <- function(history, played) {
   history$batches[[length(history$batches) + 1L]] <- played
   history$played_episodes <- history$played_episodes + length(played$episode)
 }
+
+# Whether candidates can play the same episodes: not where R steps sub-environments that share a
+# seed.
+has_common_seeds <- function(vector_env) !vector_env$one_seed || !is.null(vector_env$description)
 
 # Where one generator serves all sub-environments, those that begin together share a seed.
 draw_episode_seeds <- function(vector_env, history, episodes) {

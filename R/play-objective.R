@@ -79,11 +79,12 @@ same_episodes <- function(seed, episodes, max_steps) {
     colMeans(matrix(returns, episodes))
   }
   function(vector_env, candidates, count) {
-    # Where all sub-environments share a seed, a candidate beside others would play other episodes.
-    if (vector_env$one_seed) {
-      vapply(seq_len(count), function(one) play(vector_env, candidates, one), 0)
-    } else {
+    # Where R steps sub-environments that share a seed, a candidate beside others would play other
+    # episodes.
+    if (has_common_seeds(env_for_policy(vector_env, candidates, max_steps %||% Inf))) {
       play(vector_env, candidates, seq_len(count))
+    } else {
+      vapply(seq_len(count), function(one) play(vector_env, candidates, one), 0)
     }
   }
 }

@@ -11,11 +11,13 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
       system = paste(system[["sysname"]], system[["release"]]),
       BLAS = extSoftVersion()[["BLAS"]],
       LAPACK = La_library(),
-      server = server_versions(vector_env$client),
+      server = played_versions(vector_env),
+      processor = vector_env$description$processor,
+      way = if (is.null(vector_env$description)) "step by step" else "beside the environment",
       env_id = environment_label(vector_env),
       kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
       wrappers = as.character(vector_env$spec$wrappers),
-      num_envs = vector_env$num_envs,
+      num_envs = if (is.null(vector_env$description)) vector_env$num_envs,
       seed = settings$seed,
       preset = settings$agent$preset,
       started = started,
@@ -25,15 +27,23 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
   )
 }
 
+# The server's versions; NumPy calculates what policies do that play there.
+played_versions <- function(vector_env) {
+  versions <- server_versions(vector_env$client)
+  described <- vector_env$description$versions
+  c(versions, described[setdiff(names(described), names(versions))])
+}
+
 #' @export
 format.gym_provenance <- function(x, ...) {
   named <- function(values) paste(names(values), vapply(values, short_text, ""), collapse = ", ")
   lines <- c(
     gym = x$gym, R = x$R, platform = x$platform, system = x$system, BLAS = x$BLAS,
     LAPACK = x$LAPACK, server = if (length(x$server)) named(x$server),
+    processor = x$processor, played = x$way,
     environment = x$env_id, arguments = if (length(x$kwargs)) named(x$kwargs),
     wrappers = if (length(x$wrappers)) paste(x$wrappers, collapse = ", "),
-    `sub-environments` = as.character(x$num_envs),
+    `sub-environments` = if (length(x$num_envs)) as.character(x$num_envs),
     seed = if (length(x$seed)) paste(format(x$seed, scientific = FALSE, trim = TRUE),
                                      collapse = ", "),
     preset = if (!is.null(x$preset)) x$preset$origin,

@@ -200,6 +200,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
     check_fits_arrays(vector_env)
   }
   policy <- policy_bind(policy, vector_env, call = vector_env$call)
+  vector_env <- env_for_policy(vector_env, policy, max_steps %||% Inf, !isFALSE(steps))
   history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
   origin <- new_provenance(vector_env, list(seed = seed), started = NULL)
   result <- function(interrupted = FALSE) {

@@ -110,10 +110,8 @@ with_own_server <- function(code) {
 run_task <- function(task) UseMethod("run_task")
 
 #' @exportS3Method
-run_task.gym_task_slices <- function(task) {
-  vector_env <- kept_vector_env(task)
-  play <- function(...) play_batch(vector_env, task$policy, ...)
-  rlang::exec(play, !!!task$part, !!!task$arguments)
+run_task.gym_task_batch <- function(task) {
+  rlang::exec(play_batch, kept_vector_env(task), !!!task$part, !!!task$arguments)
 }
 
 # The worker's vector environment of a recipe, which is made when it is needed for the first time.
@@ -140,12 +138,6 @@ make_from_recipe <- function(recipe, num_envs) {
   make <- function(...) rlang::exec(as_vector_env, recipe$env, ..., !!!recipe$arguments)
   if (is_registered(recipe$env)) {
     return(make(num_envs = num_envs))
-  }
-  if (isTRUE(recipe$seeded)) {
-    env <- make_seeded_sub_envs(recipe$env, num_envs, gym_client())
-    vector_env <- as_vector_env(env)
-    vector_env$close <- function(wait = TRUE) close_or_warn(env)
-    return(vector_env)
   }
   if (num_envs > 1L) {
     make(num_envs = num_envs, num_workers = recipe$num_workers %||% if (!recipe$one_seed) 0L)

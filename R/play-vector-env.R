@@ -16,19 +16,47 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = 
   # Errors from making the environment name the user's call, too.
   rlang::local_error_call(call)
   arguments <- with_random_map(env, list(...), seed)
-  vector_env <- naming_own_call(
-    rlang::inject(as_vector_env(env, !!!arguments, client = client, max_envs = episodes)),
-    "as_vector_env", call
-  )
+  made <- NULL
   finished <- FALSE
-  on.exit(vector_env$close(wait = finished))
-  vector_env$call <- call
-  vector_env$recipe <- environment_recipe(env, vector_env, arguments)
+  on.exit(if (!is.null(made)) made$close(wait = finished))
+  complete <- function(vector_env) {
+    vector_env$call <- call
+    vector_env$recipe <- environment_recipe(env, vector_env, arguments)
+    vector_env
+  }
+  make <- function() {
+    if (is.null(made)) {
+      vector_env <- naming_own_call(
+        rlang::inject(as_vector_env(env, !!!arguments, client = client, max_envs = episodes)),
+        "as_vector_env", call
+      )
+      made <<- complete(vector_env)
+      inform_of_memory(made, env)
+    }
+    made
+  }
+  vector_env <- describe_to_play(env, arguments, client, call)
+  if (is.null(vector_env)) {
+    vector_env <- make()
+  } else {
+    vector_env <- complete(vector_env)
+    vector_env$make_stepped <- make
+  }
   warn_of_own_limit(max_steps, vector_env, call)
-  inform_of_memory(vector_env, env)
   value <- use(vector_env)
   finished <- TRUE
   value
+}
+
+# What was given for sub-environments is none of the environment's own arguments.
+describe_to_play <- function(env, arguments, client, call) {
+  of_sub_envs <- rlang::names2(arguments) %in% c("num_envs", "num_workers", "frames")
+  given <- arguments[of_sub_envs]
+  check_count(given$num_envs, allow_null = TRUE, arg = "num_envs", call = call)
+  check_count(given$num_workers, min = 0, allow_null = TRUE, arg = "num_workers", call = call)
+  describe_env(
+    env, arguments[!of_sub_envs], client, given$num_envs, isTRUE(given$frames), call = call
+  )
 }
 
 # `max_steps` cannot lift the environment's own limit.

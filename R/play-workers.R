@@ -1,6 +1,6 @@
 # Playing on the workers of the plan that the user has set with future::plan(): whether it can be
-# done, and what becomes of a batch. A batch's slices are divided among the workers, each share is a
-# task (play-futures.R), and what was played is put together in order.
+# done, and what becomes of a batch that is played from R, which is a task (play-futures.R). What is
+# played beside the environment travels as lists of episodes (play-beside.R).
 
 #' Play on many cores and machines
 #'
@@ -11,15 +11,16 @@
 #' [search_landscape()] and [gym_objective()]; `train_agent(seeds = )` gives each of them whole
 #' trainings. Nothing else needs to be said, and nothing changes without a plan.
 #'
-#' Results do not depend on the plan, to the last bit: a batch of episodes is cut into at most 16
-#' slices by a rule that does not look at workers, and each slice draws from a random stream of its
-#' own. Only the library of linear algebra may make a difference on another machine;
-#' [provenance()] names it, and one that differs is warned of.
+#' Results do not depend on the plan, to the last bit: what a worker is given is a list of episodes,
+#' or a batch of them where R plays step by step (see [rollout()]), and what comes of these does not
+#' depend on who plays them. On another kind of machine the library of linear algebra, NumPy or the
+#' processor may make a difference in the last bits; [provenance()] names them, and a library that
+#' differs is warned of.
 #'
 #' Each worker plays on a server of its own, which it starts when it is first needed, keeps, and
 #' ends when it ends itself; the variable `GYM_SERVER_URL` on the worker, with the token's variable,
-#' names another one (see [gym_client()]). The worker's sub-environments run in that one process
-#' unless `num_workers` asks for more, so that cores are not used twice.
+#' names another one (see [gym_client()]). Where R plays step by step the worker's sub-environments
+#' run in that one process unless `num_workers` asks for more, so that cores are not used twice.
 #'
 #' What cannot be sent is played in the session, which is said once: an environment that was given
 #' as an object, or by a client other than the session's own; wrappers that remember something over
@@ -135,83 +136,58 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
 # Batches --------------------------------------------------------------------------------
 
 #' Play all batches of a history on workers
+#'
+#' A task is a batch. They are entered in their order.
 #' @inheritParams play_batches
 #' @noRd
-play_in_futures <- function(vector_env, history, policy_of, report, target = NULL, ...) {
+play_in_futures <- function(vector_env, history, policy_of, report, ...) {
   open <- list()
-  waiting <- list()
   arguments <- list(...)
   enter_finished <- function() {
-    while (length(open) && open[[1L]]$left == 0L) {
+    while (length(open) && !is.null(open[[1L]]$played)) {
       first <- open[[1L]]
-      whole <- bind_parts(first$batch, first$parts, first$played, target)
-      whole$candidate <- first$candidates[whole$candidate]
-      suspendInterrupts(enter_batch(history, whole))
+      suspendInterrupts(enter_batch(history, first$played))
       open <<- open[-1L]
     }
   }
-  next_part <- function() {
-    if (!length(waiting)) {
-      batch <- next_batch(vector_env, history)
-      if (is.null(batch)) {
-        return(NULL)
-      }
-      one <- open_batch(batch, policy_of)
-      open <<- c(open, list(one))
-      waiting <<- lapply(seq_along(one$parts), function(i) list(one = one, i = i))
+  next_task <- function() {
+    batch <- next_batch(vector_env, history)
+    if (is.null(batch)) {
+      return(NULL)
     }
-    first <- waiting[[1L]]
-    waiting <<- waiting[-1L]
-    one <- first$one
-    task <- slices_task(vector_env, one, first$i, arguments)
+    one <- rlang::env(played = NULL)
+    open <<- c(open, list(one))
+    task <- batch_task(vector_env, batch, policy_of, arguments)
     list(
       task = task,
-      here = function() {
-        rlang::exec(play_batch, vector_env, task$policy, !!!task$part, !!!task$arguments)
-      },
+      here = function() rlang::exec(play_batch, vector_env, !!!task$part, !!!arguments),
       done = function(played) {
-        own <- one$parts[[first$i]]$episodes$candidate
-        played$candidate <- unique(own)[played$candidate]
-        one$played[[first$i]] <- played
-        one$left <- one$left - 1L
+        played$candidate <- unique(batch$episodes$candidate)[played$candidate]
+        one$played <- played
         enter_finished()
-        report(sum(vapply(open, ended_episodes, 0)))
+        report(sum(vapply(open, function(one) length(one$played$episode), 0L)))
       }
     )
   }
-  do_tasks(next_part, slice_deadline, vector_env$call)
+  do_tasks(next_task, batch_deadline, vector_env$call)
 }
 
-ended_episodes <- function(one) sum(vapply(one$played, function(x) length(x$episode), 0))
-
-# A batch whose slices are being played, a part of them by each worker.
-open_batch <- function(batch, policy_of) {
+# The policy of a batch has its candidates alone.
+batch_task <- function(vector_env, batch, policy_of, arguments) {
   candidates <- unique(batch$episodes$candidate)
   batch$episodes$candidate <- match(batch$episodes$candidate, candidates)
-  shares <- share_slices(length(batch$streams), future::nbrOfWorkers())
-  parts <- lapply(unname(shares), slices_of, batch = batch)
-  rlang::env(
-    batch = batch, candidates = candidates, policy = policy_of(candidates), parts = parts,
-    num_envs = max(vapply(parts, function(part) length(part$slice), 0L)),
-    played = vector("list", length(parts)), left = length(parts)
-  )
-}
-
-slices_task <- function(vector_env, one, i, arguments) {
-  part <- one$parts[[i]]
-  part$at <- NULL
-  candidates <- unique(part$episodes$candidate)
-  part$episodes$candidate <- match(part$episodes$candidate, candidates)
-  num_envs <- if (vector_env$one_seed) vector_env$num_envs else one$num_envs
+  part <- c(list(policy = policy_of(candidates)), batch)
   recipe <- vector_env$recipe
   recipe$one_seed <- vector_env$one_seed
+  num_envs <- vector_env$num_envs
+  if (!vector_env$one_seed) num_envs <- min(num_envs, length(batch$episodes$episode))
   new_worker_task(
-    "slices", recipe, server_versions(vector_env$client), part = part, num_envs = num_envs,
-    policy = keep_candidates(one$policy, candidates), arguments = arguments
+    "batch", recipe, server_versions(vector_env$client), part = part, num_envs = num_envs,
+    arguments = arguments
   )
 }
 
-# After how many seconds a worker that plays a slice counts as lost.
-slice_deadline <- function(slowest) {
+# After how many seconds a worker that plays a task counts as lost.
+batch_deadline <- function(slowest) {
   getOption("gym.batch_deadline") %||% max(60, 10 * slowest)
 }

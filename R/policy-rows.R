@@ -27,19 +27,6 @@ policy_subset.gym_policy_list <- function(policy, candidates) {
   if (length(policies) == 1L) policies[[1L]] else policy_list(policies)
 }
 
-# As policy_subset(), but several stay candidates also where a single one is kept: then its actions
-# are calculated in the same way, to the last bit.
-keep_candidates <- function(policy, candidates) {
-  if (inherits(policy, "gym_policy_candidates")) {
-    policy$weights <- policy$weights[candidates, , drop = FALSE]
-    policy
-  } else if (inherits(policy, "gym_policy_list")) {
-    policy_list(unclass(policy)[candidates])
-  } else {
-    policy
-  }
-}
-
 #' Give the policy that acts for rows of observations
 #'
 #' @param candidate Which candidate acts for each row.

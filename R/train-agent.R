@@ -185,7 +185,8 @@ training_file <- function(settings, files, call) {
 train_in <- function(vector_env, settings, file, log, progress, call) {
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings$env_id <- environment_label(vector_env)
-  settings$provenance <- file$saved$provenance %||% new_provenance(vector_env, settings)
+  playing <- if (learns_online(settings$agent)) stepped(vector_env) else vector_env
+  settings$provenance <- file$saved$provenance %||% new_provenance(playing, settings)
   bound <- if (learns_online(settings$agent)) {
     spaces_policy(settings$policy, vector_env, settings$model, call)
   } else {

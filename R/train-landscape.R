@@ -77,20 +77,11 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
   streams <- new_streams(seed %||% draw_seed())
   directions <- with_generator(streams$agent, draw_directions(search$policy$weights))
   plane <- new_plane(search$policy, directions, size, span)
-  env <- search$env %||% search$env_id
-  if (is_made_by_server(env)) {
-    env <- make_seeded_sub_envs(env, as.numeric(size)^2 * episodes, client)
-    on.exit(close_or_warn(env))
-  }
-  seeded <- !identical(env, search$env %||% search$env_id)
   play <- function(vector_env) {
-    if (seeded) {
-      vector_env$recipe <- environment_recipe(search$env_id, vector_env, list())
-      if (is.list(vector_env$recipe)) vector_env$recipe$seeded <- TRUE
-    }
     play_plane(vector_env, plane, search, as.integer(episodes), streams, progress)
   }
-  with_vector_env(env, as.numeric(size)^2 * episodes, play)
+  env <- search$env %||% search$env_id
+  with_vector_env(env, as.numeric(size)^2 * episodes, play, client = client)
 }
 
 check_odd <- function(size, call = rlang::caller_env()) {
@@ -173,7 +164,7 @@ play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
       directions = plane$directions, policy = search$policy, env_id = search$env_id,
       target = search$target, episodes = episodes,
       seeds = unique(unlist(lapply(history$batches, function(batch) batch$seed))),
-      common = !vector_env$one_seed,
+      common = has_common_seeds(vector_env),
       elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted
     ),
     class = "gym_landscape"

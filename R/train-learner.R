@@ -103,6 +103,7 @@ format.gym_policy_unknown <- function(x, ...) "the learner's own"
 #' @return A list: `agent`, wiser, `returns` and `lengths` of the episodes.
 #' @noRd
 learn_episodes <- function(state, vector_env, settings, call) {
+  vector_env <- stepped(vector_env)
   agent <- state$agent
   learner <- list(
     act = function(observation, sub_env) agent_act(agent, observation, sub_env),

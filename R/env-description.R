@@ -1,0 +1,100 @@
+# An environment that is named by its id as its server describes it: what it observes, what can be
+# done, where its episodes end. No instance is made for that.
+
+#' Describe an environment whose episodes a server plays by itself
+#'
+#' The server is asked once for each environment.
+#' @param env_id,num_envs,frames,client As for [as_vector_env()].
+#' @param arguments The environment's own arguments, a list.
+#' @return As [as_vector_env()] returns it, without the functions that play, and with `description`,
+#'   a list: `fields`, JSON texts by which a request names the environment, `group`, how many
+#'   episodes share a seed where one generator serves all of them (or `NULL`), `processes`, how many
+#'   play, `versions` and `processor`. `NULL` where its episodes are played from R: an environment
+#'   in R or an object, frames, wrappers that remember earlier episodes, arguments that say how
+#'   sub-environments are made, an older server.
+#' @noRd
+describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
+                         call = rlang::caller_env()) {
+  named <- is.character(env_id) || inherits(env_id, "gym_wrapped")
+  how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
+  if (frames || !named || is_registered(env_id) || any(names(arguments) %in% how_made) ||
+        length(remembering(wrapper_names(noted_wrappers(env_id))))) {
+    return(NULL)
+  }
+  check_dots_named(arguments, "seed = 1", call)
+  check_client(client, call = call)
+  if (!plays_rollouts(client, call)) {
+    return(NULL)
+  }
+  known <- known_of_env(client, env_id, arguments)
+  known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
+  described <- known$described[[1L]]
+  group <- described$description$group
+  if (length(described$remembers) || !is.null(group) && group != num_envs %||% group) {
+    return(NULL)
+  }
+  described$num_envs <- as.integer(num_envs %||% described$num_envs)
+  described$batch_size <- episodes_of_batch(described$num_envs)
+  described$known <- known
+  described
+}
+
+# `NULL` for an environment that the server does not play by itself.
+ask_description <- function(client, env_id, arguments, call) {
+  id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
+  wrappers <- noted_wrappers(env_id)
+  fields <- c(
+    env_id = json_string(id), kwargs = if (length(arguments)) to_json(arguments),
+    wrappers = if (length(wrappers)) wrappers_json(wrappers)
+  )
+  answer <- tryCatch(
+    withCallingHandlers(
+      post_repeatable(client, rollouts_route, fields, call),
+      gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(arguments), call)
+    ),
+    gym_error_http = function(cnd) {
+      if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
+    }
+  )
+  if (!is.null(answer)) described_env(client, answer, fields, wrappers, arguments)
+}
+
+rollouts_route <- "/v1/rollouts/"
+
+described_env <- function(client, answer, fields, wrappers, arguments) {
+  check_description(answer)
+  spec <- answer$spec
+  observed <- read_space(answer, "observation_space", new_space)
+  observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
+  num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
+  structure(
+    list(
+      observation_space = observed, action_space = read_space(answer, "action_space", new_space),
+      num_envs = num_envs, one_seed = !is.null(answer$group), client = client,
+      spec = list(
+        id = shown_line(answer$env_id),
+        reward_threshold = if (!is.null(spec$reward_threshold)) {
+          number_from(spec$reward_threshold, "reward_threshold")
+        },
+        max_episode_steps = spec$max_episode_steps,
+        render_fps = if (is_number(spec$render_fps)) spec$render_fps,
+        wrappers = wrapper_names(wrappers), kwargs = arguments
+      ),
+      remembers = as.character(unlist(answer$remembers)),
+      description = list(
+        fields = fields, group = answer$group, processes = answer$processes %||% 1L,
+        versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
+      )
+    ),
+    class = "gym_vector_env"
+  )
+}
+
+check_description <- function(answer) {
+  is_natural <- function(x) is_number(x) && are_whole(x, 1, 2^24)
+  check_optional(answer, "env_id", rlang::is_string, "a string")
+  check_optional(answer, "spec", is_object, "an object")
+  check_optional(answer, "group", is_natural, "a whole number")
+  check_optional(answer, "processes", is_natural, "a whole number")
+  check_optional(answer$spec, "max_episode_steps", is_number, "a number")
+}

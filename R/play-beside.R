@@ -1,0 +1,274 @@
+# Episodes that are played beside the environment: the policy is data, and the server's worker
+# processes play whole episodes with it. An episode is a function of environment, policy, seed and
+# `max_steps` alone (in a group also of its row), so that what is asked for together, by whom and
+# how often changes nothing.
+#
+# The episodes are cut into pieces, each of which is a request, or a task for a worker of the plan.
+# Their answers may come in any order; they are entered in that of the episodes.
+
+#' Choose the way in which a policy plays
+#'
+#' @param vector_env As [with_vector_env()] gives it.
+#' @param policy The policy, bound to the environment, or several candidates.
+#' @param max_steps,keep_steps As for [play_batch()].
+#' @return The environment that plays: a described one, or one that is stepped from R.
+#' @noRd
+env_for_policy <- function(vector_env, policy, max_steps = Inf, keep_steps = FALSE) {
+  if (plays_beside(vector_env, policy, max_steps, keep_steps)) vector_env else stepped(vector_env)
+}
+
+# The environment that R steps, which is made when it is needed for the first time.
+stepped <- function(vector_env) {
+  if (is.null(vector_env$description)) vector_env else vector_env$make_stepped()
+}
+
+# Without any limit an episode may never end, and only R could be interrupted.
+plays_beside <- function(vector_env, policy, max_steps, keep_steps) {
+  if (is.null(vector_env$description)) {
+    return(FALSE)
+  }
+  spaces <- vector_env[c("observation_space", "action_space")]
+  (is.finite(max_steps) || !is.null(vector_env$spec$max_episode_steps)) &&
+    (!keep_steps || all(vapply(spaces, has_tensors, NA))) &&
+    !is.null(policy_data(policy, vector_env))
+}
+
+#' Play all episodes of a history beside the environment
+#' @inheritParams play_batches
+#' @inheritParams play_batch
+#' @noRd
+play_beside <- function(vector_env, history, policy_of, report, target = NULL, max_steps = Inf,
+                        keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE) {
+  numbers <- numbers_of_candidate(vector_env, policy_of(1L))
+  most <- max(1L, as.integer(most_numbers %/% max(numbers, 1)))
+  keep <- c("moments", "steps", "next_observation")[c(keep_moments, keep_steps, keep_next)]
+  play <- new_play(
+    vector_env, list_episodes(vector_env, history, most), policy_of, max_steps, keep,
+    most = most, each = history$episodes, target = target, report = report,
+    enter = function(batch) suspendInterrupts(enter_batch(history, batch))
+  )
+  if (plays_on_workers(vector_env, policy_of, NULL)) play_tasks(play) else play_requests(play)
+}
+
+# How many numbers of policies a request has at most.
+most_numbers <- 1e6
+
+numbers_of_candidate <- function(vector_env, policy) {
+  sum(lengths(policy_data(policy, vector_env)$tensors))
+}
+
+#' List all episodes, candidate after candidate, with their seeds
+#'
+#' A group has consecutive episodes, of as many candidates as fit into a request. Candidates that
+#' are to play the same episodes begin a group each.
+#' @param most How many candidates fit into a request.
+#' @return A list of vectors with an element for each episode: `candidate`, `episode`, `seed`,
+#'   `sub_env` and, where episodes are played in groups, `row` (from 0).
+#' @noRd
+list_episodes <- function(vector_env, history, most) {
+  each <- history$episodes
+  count <- history$candidates
+  candidate <- rep(seq_len(count), each = each)
+  common <- history$common_seeds && count > 1
+  group <- vector_env$description$group
+  at <- seq_along(candidate) - 1L
+  columns <- list(candidate = candidate, episode = rep(seq_len(each), count))
+  draw <- function(n) with_generator(history$streams$seeds, history$draw_seeds(n))
+  if (is.null(group)) {
+    columns$seed <- if (common) rep(draw(each), count) else draw(each * count)
+    columns$sub_env <- at %% vector_env$num_envs + 1L
+    return(columns)
+  }
+  within <- if (common) at %% each else at %% (most * each)
+  columns$row <- as.integer(within %% group)
+  number <- if (common) within %/% group + 1L else cumsum(columns$row == 0L)
+  columns$seed <- draw(max(number))[number]
+  columns$sub_env <- columns$row + 1L
+  columns
+}
+
+# What changes while episodes are played: `unit` is the first episode of each group, or each
+# episode, which no piece divides; `next_unit` and `size`, how many units the next piece has;
+# `again`, pieces of which the server left out the end; `pieces`, what was played, by the number of
+# its first episode; `returns` of all episodes; `entered`, how many episodes were entered; `needed`,
+# how many are, given the target; `failed`, the first episode that failed, and its error.
+new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, most = 1L, each = 1L,
+                     target = NULL, report = function(ended) NULL) {
+  n <- length(episodes$seed)
+  rlang::env(
+    vector_env = vector_env, episodes = episodes, policy_of = policy_of, max_steps = max_steps,
+    keep = keep, enter = enter, most = most, each = each, target = target, report = report,
+    unit = if (is.null(episodes$row)) seq_len(n) else which(episodes$row == 0L),
+    next_unit = 1L, size = 1L, again = list(), pieces = new.env(parent = emptyenv()),
+    returns = rep(NA_real_, n), entered = 0L, needed = n, failed = NULL
+  )
+}
+
+#' Take the next piece that is to be played
+#' @param size How many units it has at most.
+#' @return A list: the numbers of its `first` and `last` episode, and of its `units`. `NULL` when
+#'   there is none.
+#' @noRd
+take_piece <- function(play, size = play$size) {
+  if (length(play$again)) {
+    piece <- play$again[[1L]]
+    play$again <- play$again[-1L]
+    return(piece)
+  }
+  begins <- c(play$unit, length(play$returns) + 1L)
+  unit <- play$next_unit
+  if (unit > length(play$unit) || begins[[unit]] > play$needed || !is.null(play$failed)) {
+    return(NULL)
+  }
+  end <- min(unit + size, length(begins))
+  candidate <- play$episodes$candidate
+  fits <- candidate[begins[(unit + 1L):end] - 1L] < candidate[[begins[[unit]]]] + play$most
+  end <- unit + max(1L, sum(fits))
+  play$next_unit <- end
+  list(first = begins[[unit]], last = begins[[end]] - 1L, units = end - unit)
+}
+
+#' Note what came of a piece
+#' @param batch As [play_batch()] returns it, for the first episodes of the piece or for all.
+#' @param error What came of the episode after these: `NULL`, or a list like a response, with
+#'   `status_code`, `url` and `answer`.
+#' @return Whether all that is needed has been played.
+#' @noRd
+take_played <- function(play, piece, batch, error = NULL) {
+  n <- length(batch$return)
+  if (n) {
+    play$pieces[[as.character(piece$first)]] <- batch
+    play$returns[piece$first - 1L + seq_len(n)] <- batch$return
+    if (!is.null(play$target)) play$needed <- min(play$needed, needed_episodes(play))
+  }
+  rest <- piece$first + n
+  if (!is.null(error)) {
+    if (rest < (play$failed$at %||% Inf)) play$failed <- list(at = rest, error = error)
+  } else if (rest <= piece$last) {
+    rest <- list(first = rest, last = piece$last, units = piece$units)
+    play$again <- c(play$again, list(rest))
+  }
+  enter_in_order(play)
+}
+
+# Those up to the first candidate that has reached the target. One before it that is not yet played
+# to its end may make fewer needed.
+needed_episodes <- function(play) {
+  means <- colMeans(matrix(play$returns, play$each))
+  c(which(means >= play$target), Inf)[[1L]] * play$each
+}
+
+enter_in_order <- function(play) {
+  repeat {
+    place <- as.character(play$entered + 1L)
+    batch <- play$pieces[[place]]
+    if (is.null(batch) || play$entered >= play$needed) break
+    batch <- first_episodes(batch, play$needed - play$entered)
+    play$enter(batch)
+    play$entered <- play$entered + length(batch$return)
+    rm(list = place, envir = play$pieces)
+  }
+  failed <- play$failed
+  if (!is.null(failed) && failed$at == play$entered + 1L && play$entered < play$needed) {
+    abort_http(failed$error, "POST", play$vector_env$call)
+  }
+  played <- sum(!is.na(play$returns[seq_len(play$needed)]))
+  if (played > play$entered) play$report(played - play$entered)
+  play$entered >= play$needed
+}
+
+# Where later candidates are left out no steps are kept.
+first_episodes <- function(batch, n) {
+  if (length(batch$return) <= n) {
+    return(batch)
+  }
+  parts <- c("steps", "frames")
+  c(lapply(batch[setdiff(names(batch), parts)], utils::head, n), batch[parts])
+}
+
+# Tasks for workers --------------------------------------------------------------------------
+
+# A task for a worker is a list of episodes, which it plays on its own server by requests.
+play_tasks <- function(play) {
+  count <- length(play$unit)
+  most <- max(1L, ceiling(count / (2 * future::nbrOfWorkers())))
+  play$size <- min(most, 16L)
+  next_task <- function() {
+    piece <- take_piece(play)
+    if (is.null(piece)) {
+      return(NULL)
+    }
+    task <- episodes_task(play, piece)
+    begun <- now()
+    list(
+      task = task,
+      here = function() play_episodes(play$vector_env, task),
+      done = function(played) {
+        play$size <- min(most, next_size(piece$units, now() - begun, 2))
+        own <- unique(play$episodes$candidate[piece$first:piece$last])
+        first <- piece$first
+        for (batch in played$batches) {
+          batch$candidate <- own[batch$candidate]
+          last <- first + length(batch$return) - 1L
+          take_played(play, list(first = first, last = last), batch)
+          first <- last + 1L
+        }
+        if (!is.null(played$error)) {
+          take_played(play, list(first = first, last = piece$last), NULL, played$error)
+        }
+      }
+    )
+  }
+  do_tasks(next_task, batch_deadline, play$vector_env$call)
+}
+
+# Its policy has its candidates alone.
+episodes_task <- function(play, piece) {
+  vector_env <- play$vector_env
+  episodes <- lapply(play$episodes, `[`, piece$first:piece$last)
+  candidates <- unique(episodes$candidate)
+  episodes$candidate <- match(episodes$candidate, candidates)
+  new_worker_task(
+    "episodes", vector_env$recipe, server_versions(vector_env$client), episodes = episodes,
+    policy = play$policy_of(candidates), most = play$most, max_steps = play$max_steps,
+    keep = play$keep, num_envs = vector_env$num_envs
+  )
+}
+
+#' Play a list of episodes
+#' @return A list: `batches`, what was played, and `error`, what came of the episode after these,
+#'   see [take_played()].
+#' @noRd
+play_episodes <- function(vector_env, task) {
+  batches <- list()
+  play <- new_play(
+    vector_env, task$episodes, function(these) policy_subset(task$policy, these), task$max_steps,
+    task$keep, most = task$most,
+    enter = function(batch) batches[[length(batches) + 1L]] <<- batch
+  )
+  vector_env$call <- quote(rollout())
+  error <- tryCatch(
+    {
+      play_requests(play)
+      NULL
+    },
+    gym_error_http = function(cnd) play$failed$error %||% rlang::cnd_signal(cnd)
+  )
+  list(batches = batches, error = error)
+}
+
+#' @exportS3Method
+run_task.gym_task_episodes <- function(task) {
+  recipe <- task$recipe
+  client <- gym_client()
+  check_worker_gymnasium(task, client)
+  described <- describe_env(recipe$env, recipe$arguments, client, task$num_envs)
+  if (is.null(described)) {
+    gym_abort(
+      paste0("The server of worker ", Sys.getpid(), " on ", Sys.info()[["nodename"]],
+             " is older than the session's: it does not play episodes by itself."),
+      class = "gym_error_worker", host = Sys.info()[["nodename"]]
+    )
+  }
+  play_episodes(described, task)
+}

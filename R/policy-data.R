@@ -1,0 +1,87 @@
+# Policies that are data: numbers and a few words, which a server can play without asking R. The wire
+# keeps numbers in C order, each network's weights in that of coef().
+
+#' Take a policy apart into data
+#'
+#' @param policy A policy that is bound to the environment, or several candidates.
+#' @param env The environment, of which the action space is looked at.
+#' @return A list: `document`, a list for JSON, and `tensors`, a named list of numeric vectors and
+#'   arrays. `NULL` for a policy that is no data: a function, a model, one with a memory, a class of
+#'   the user's own.
+#' @noRd
+policy_data <- function(policy, env) {
+  # A class that builds on one of these may act by a method of its own.
+  if (class(policy)[[1L]] %in% data_classes) data_of_policy(policy, env)
+}
+
+data_classes <- paste0("gym_policy_", c("network", "candidates", "random", "table", "list"))
+
+data_of_policy <- function(policy, env) UseMethod("data_of_policy")
+
+#' @exportS3Method
+data_of_policy.gym_policy_network <- function(policy, env) {
+  network_data(policy, rbind(weight_vector(policy)))
+}
+
+#' @exportS3Method
+data_of_policy.gym_policy_candidates <- function(policy, env) {
+  if (class(policy$policy)[[1L]] == "gym_policy_network") {
+    network_data(policy$policy, policy$weights)
+  }
+}
+
+# `weights` has a row for each candidate.
+network_data <- function(policy, weights) {
+  list(
+    document = list(
+      kind = "network", sizes = as.list(policy$sizes), activation = as.list(policy$activation),
+      bias = isTRUE(policy$bias), output = "greedy"
+    ),
+    tensors = c(
+      list(weights = unname(weights)),
+      if (!is.null(policy$moments$mean)) policy$moments[c("mean", "scale")]
+    )
+  )
+}
+
+#' @exportS3Method
+data_of_policy.gym_policy_random <- function(policy, env) {
+  if (!is.null(policy$possible)) {
+    return(NULL)
+  }
+  own <- policy$action_space
+  document <- list(kind = "random")
+  if (!identical(own, env$action_space)) {
+    if (!inherits(own, "gym_space_discrete")) {
+      return(NULL)
+    }
+    document$action_space <- own[c("n", "start")]
+  }
+  list(document = document, tensors = list())
+}
+
+#' @exportS3Method
+data_of_policy.gym_policy_table <- function(policy, env) {
+  list(
+    document = list(
+      kind = "table", epsilon = policy$epsilon, temperature = policy$temperature
+    ),
+    tensors = list(q = policy$q)
+  )
+}
+
+#' @exportS3Method
+data_of_policy.gym_policy_list <- function(policy, env) {
+  each <- lapply(unname(unclass(policy)), policy_data, env = env)
+  if (any(vapply(each, is.null, NA))) {
+    return(NULL)
+  }
+  tensors <- lapply(seq_along(each), function(i) {
+    own <- each[[i]]$tensors
+    stats::setNames(own, paste0(i - 1L, "/", names(own), recycle0 = TRUE))
+  })
+  list(
+    document = list(kind = "list", policies = lapply(each, `[[`, "document")),
+    tensors = unlist(tensors, recursive = FALSE)
+  )
+}
