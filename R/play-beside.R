@@ -202,7 +202,7 @@ play_tasks <- function(play) {
     begun <- now()
     list(
       task = task,
-      here = function() play_episodes(play$vector_env, task),
+      here = function() play_listed_episodes(play$vector_env, task),
       done = function(played) {
         play$size <- min(most, next_size(piece$units, now() - begun, 2))
         own <- unique(play$episodes$candidate[piece$first:piece$last])
@@ -239,7 +239,7 @@ episodes_task <- function(play, piece) {
 #' @return A list: `batches`, what was played, and `error`, what came of the episode after these,
 #'   see [take_played()].
 #' @noRd
-play_episodes <- function(vector_env, task) {
+play_listed_episodes <- function(vector_env, task) {
   batches <- list()
   play <- new_play(
     vector_env, task$episodes, function(these) policy_subset(task$policy, these), task$max_steps,
@@ -270,5 +270,5 @@ run_task.gym_task_episodes <- function(task) {
       class = "gym_error_worker", host = Sys.info()[["nodename"]]
     )
   }
-  play_episodes(described, task)
+  play_listed_episodes(described, task)
 }
