@@ -87,20 +87,21 @@ list_episodes <- function(vector_env, history, most) {
   columns
 }
 
-# What changes while episodes are played: `unit` is the first episode of each group, or each
-# episode, which no piece divides; `next_unit` and `size`, how many units the next piece has;
-# `again`, pieces of which the server left out the end; `pieces`, what was played, by the number of
-# its first episode; `returns` of all episodes; `entered`, how many episodes were entered; `needed`,
-# how many are, given the target; `failed`, the first episode that failed, and its error.
+# What changes while episodes are played: `begins` has the first episode of each unit (a group, or
+# an episode), which no piece divides, and at last the number after all; `next_unit` and `size`, how
+# many units the next piece has; `again`, pieces of which the server left out the end; `pieces`, what
+# was played, by the number of its first episode; `returns` of all episodes; `played` and `entered`,
+# how many were; `needed`, how many are, given the target; `failed`, the first episode that failed,
+# and its error.
 new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, most = 1L, each = 1L,
                      target = NULL, report = function(ended) NULL) {
   n <- length(episodes$seed)
   rlang::env(
     vector_env = vector_env, episodes = episodes, policy_of = policy_of, max_steps = max_steps,
     keep = keep, enter = enter, most = most, each = each, target = target, report = report,
-    unit = if (is.null(episodes$row)) seq_len(n) else which(episodes$row == 0L),
+    begins = c(if (is.null(episodes$row)) seq_len(n) else which(episodes$row == 0L), n + 1L),
     next_unit = 1L, size = 1L, again = list(), pieces = new.env(parent = emptyenv()),
-    returns = rep(NA_real_, n), entered = 0L, needed = n, failed = NULL
+    returns = rep(NA_real_, n), played = 0L, entered = 0L, needed = n, failed = NULL
   )
 }
 
@@ -115,9 +116,10 @@ take_piece <- function(play, size = play$size) {
     play$again <- play$again[-1L]
     return(piece)
   }
-  begins <- c(play$unit, length(play$returns) + 1L)
+  begins <- play$begins
   unit <- play$next_unit
-  if (unit > length(play$unit) || begins[[unit]] > play$needed || !is.null(play$failed)) {
+  # The number after all episodes is never needed.
+  if (begins[[unit]] > play$needed || !is.null(play$failed)) {
     return(NULL)
   }
   end <- min(unit + size, length(begins))
@@ -138,6 +140,7 @@ take_played <- function(play, piece, batch, error = NULL) {
   n <- length(batch$return)
   if (n) {
     play$pieces[[as.character(piece$first)]] <- batch
+    play$played <- play$played + n
     play$returns[piece$first - 1L + seq_len(n)] <- batch$return
     if (!is.null(play$target)) play$needed <- min(play$needed, needed_episodes(play))
   }
@@ -172,8 +175,7 @@ enter_in_order <- function(play) {
   if (!is.null(failed) && failed$at == play$entered + 1L && play$entered < play$needed) {
     abort_http(failed$error, "POST", play$vector_env$call)
   }
-  played <- sum(!is.na(play$returns[seq_len(play$needed)]))
-  if (played > play$entered) play$report(played - play$entered)
+  if (play$played > play$entered) play$report(min(play$played, play$needed) - play$entered)
   play$entered >= play$needed
 }
 
@@ -182,16 +184,14 @@ first_episodes <- function(batch, n) {
   if (length(batch$return) <= n) {
     return(batch)
   }
-  parts <- c("steps", "frames")
-  c(lapply(batch[setdiff(names(batch), parts)], utils::head, n), batch[parts])
+  lapply(batch[names(batch) != "steps"], utils::head, n)
 }
 
 # Tasks for workers --------------------------------------------------------------------------
 
 # A task for a worker is a list of episodes, which it plays on its own server by requests.
 play_tasks <- function(play) {
-  count <- length(play$unit)
-  most <- max(1L, ceiling(count / (2 * future::nbrOfWorkers())))
+  most <- ceiling((length(play$begins) - 1L) / (2 * future::nbrOfWorkers()))
   play$size <- min(most, 16L)
   next_task <- function() {
     piece <- take_piece(play)

@@ -3,8 +3,8 @@
 #' Plays each policy in the same number of episodes and gives its mean return, with how sure that
 #' is. Nothing is kept of single episodes: for these see [rollout()], which plays them.
 #'
-#' All candidates play episodes with the same seeds where each episode has a seed of its own (see
-#' [as_vector_env()]), so that luck favours none of them.
+#' All candidates play the same episodes, so that luck favours none of them; but where R steps
+#' sub-environments that share a seed (see [as_vector_env()]).
 #'
 #' @inheritParams rollout
 #' @param policy The policy: as for [rollout()] one, a list of several, or [policy_candidates()].

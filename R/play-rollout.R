@@ -11,11 +11,26 @@
 #' this one draw only; so [set.seed()] fixes everything, too, but for a policy that is made in the
 #' call, whose weights are the caller's to draw.
 #'
-#' Where the environment is named by its id, or was made with `num_envs`, many episodes are played
-#' side by side in sub-environments; with `frames = TRUE` one after the other. The policy is asked
-#' about the episodes that still run, so that a function gets fewer rows as the last of them end.
-#' `vignette("playing", package = "gym")` tells how, and how to begin an episode of the result
-#' again.
+#' # Two ways to play
+#'
+#' **Beside the environment**: the policy is sent to the server, whose processes play whole episodes
+#' with it. This is the way where the environment is named by its id (with arguments, and wrappers
+#' of [gym_wrap()]) and the policy is data: [policy_random()], [policy_network()],
+#' [policy_linear()], [policy_table()], [policy_candidates()] and lists of these. An episode then
+#' depends on the environment, the policy, its seed and `max_steps` alone, what its policy draws
+#' included: not on how many processes play, nor on what else is played.
+#'
+#' **Step by step**, everything else: R is asked for the actions of each step. This is so for
+#' functions, models and other policies that only R can ask; for an environment that was made
+#' before, or that is written in R; with `frames = TRUE`; for wrappers that remember earlier
+#' episodes; where neither the environment nor `max_steps` limits an episode; where a vector
+#' implementation such as CartPole's is to play with another `num_envs` than 256; and on a server
+#' that is older than this package. Many episodes are played at once in sub-environments, but for
+#' frames, and the policy is asked about those that still run, so that a function gets fewer rows as
+#' the last of them end.
+#'
+#' [provenance()] names the way. `vignette("playing", package = "gym")` tells more, and how to begin
+#' an episode of the result again.
 #'
 #' # Steps as arrays
 #'
@@ -58,15 +73,17 @@
 #' @param ... The environment's own arguments, by name, such as `is_slippery = FALSE` for
 #'   FrozenLake, where it is named by its id.
 #' @param num_envs How many sub-environments to play in, a whole number, where the environment is
-#'   named by its id. `NULL`, the default, chooses, see [as_vector_env()].
+#'   named by its id; beside the environment, over how many the column `sub_env` and arrays deal out
+#'   the episodes. `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step as well, in columns whose names
 #'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where
 #'   steps are kept. It is the true one also where the step ended the episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
-#' @param num_workers How many processes of the server run the sub-environments, a whole number; 0
-#'   for none but the server itself. What is played does not depend on it. `NULL`, the default,
-#'   lets the server choose, see [as_vector_env()]. Only where the environment is named by its id
-#'   and has no vector implementation of its own, such as CartPole has.
+#' @param num_workers How many processes of the server run the sub-environments where R plays step
+#'   by step, a whole number; 0 for none but the server itself. What is played does not depend on
+#'   it. `NULL`, the default, lets the server choose, see [as_vector_env()]. Only where the
+#'   environment is named by its id and has no vector implementation of its own, such as CartPole
+#'   has. Beside the environment the server chooses.
 #' @return An object of class `gym_rollout`, which [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
 #'   elements
@@ -91,11 +108,11 @@
 #'       it (with package png).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
-#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer; `NULL`
-#'       where each episode has a seed of its own.}
+#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer, of which
+#'       `sub_env` is one; `NULL` where each episode has a seed of its own.}
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same result.}
-#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the batches of episodes
-#'       that were finished.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the episodes that were
+#'       finished; where R plays step by step, the batches of episodes.}
 #'     \item{provenance}{What [provenance()] tells.}
 #'   }
 #'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
@@ -105,8 +122,8 @@
 #'   that does not return one action for each observation;
 #'   `gym_error_http` when the server refuses the environment or an action;
 #'   `gym_error_connection` when it does not answer. An error in the middle has the class
-#'   `gym_error_rollout`, too, and the batches of episodes before it are the element `result` of the
-#'   condition.
+#'   `gym_error_rollout`, too, and the episodes (step by step the batches of episodes) before it are
+#'   the element `result` of the condition.
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export

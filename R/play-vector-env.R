@@ -54,9 +54,11 @@ describe_to_play <- function(env, arguments, client, call) {
   given <- arguments[of_sub_envs]
   check_count(given$num_envs, allow_null = TRUE, arg = "num_envs", call = call)
   check_count(given$num_workers, min = 0, allow_null = TRUE, arg = "num_workers", call = call)
-  describe_env(
+  described <- describe_env(
     env, arguments[!of_sub_envs], client, given$num_envs, isTRUE(given$frames), call = call
   )
+  if (isTRUE(described$one_seed)) check_no_workers(given$num_workers, call)
+  described
 }
 
 # `max_steps` cannot lift the environment's own limit.

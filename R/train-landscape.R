@@ -18,10 +18,9 @@
 #' # The same episodes
 #'
 #' All networks play episodes of the same seeds, so that neighbours differ by their
-#' weights and not by chance. For that each sub-environment must have a seed of its own: an
-#' environment named by its id is made so. One that is given with sub-environments that share a seed
-#' (`"CartPole-v1"` with `num_envs`, made with its own vector implementation) plays different
-#' episodes for each network; the element `common` of the result is `FALSE` then.
+#' weights and not by chance. Only where R steps sub-environments that share a seed
+#' (`"CartPole-v1"` that was made with `num_envs`, with its own vector implementation) different
+#' episodes are played for each network; the element `common` of the result is `FALSE` then.
 #'
 #' @param search A search, as [search_random()] returns it. An environment that was given to it
 #'   as an object has to be open still.

@@ -48,6 +48,21 @@ class Failing(Odd):
         return super().step(action)
 
 
+class FailsLater(Odd):
+    """Raises in the third step of every episode whose seed is divisible by five."""
+
+    def reset(self, *, seed=None, options=None):
+        self.seed, self.steps = seed, 0
+        self.observation = 0
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        self.steps += 1
+        if self.steps == 3 and self.seed % 5 == 0:
+            raise RuntimeError("the pole caught fire")
+        return super().step(action)
+
+
 class Slow(Odd):
     """Each step takes two seconds."""
 
@@ -180,6 +195,10 @@ def failing():
     return Failing(spaces.Discrete(2))
 
 
+def fails_later():
+    return FailsLater(spaces.Discrete(2))
+
+
 def slow():
     return Slow(spaces.Discrete(2))
 
@@ -211,6 +230,7 @@ for maker in (
     riddle,
     nested,
     failing,
+    fails_later,
     slow,
     slow_to_make,
     telling,

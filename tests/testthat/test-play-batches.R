@@ -47,8 +47,7 @@ play_in_order <- function(make, policy, order) {
   played <- vector("list", length(tasks))
   for (i in order(rep(seq_along(tasks), length.out = length(tasks)))[order]) {
     played[[i]] <- play_batch(
-      vector_env, policy, tasks[[i]]$episodes, tasks[[i]]$streams, tasks[[i]]$slice,
-      keep_steps = TRUE
+      vector_env, policy, tasks[[i]]$episodes, tasks[[i]]$stream, keep_steps = TRUE
     )
   }
   played

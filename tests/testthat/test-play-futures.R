@@ -213,7 +213,7 @@ test_that("a worker that is silent counts as lost, and its part is played here i
 })
 
 test_that("another version of the package is an error that names the host", {
-  task <- new_worker_task("slices", list(), NULL)
+  task <- new_worker_task("batch", list(), NULL)
   task$gym <- "0.0.1"
   done <- do_task(task)
   expect_s3_class(done$error, "gym_error_worker")

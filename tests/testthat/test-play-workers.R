@@ -1,9 +1,14 @@
-# Rollouts whose sub-environments are run by worker processes.
+# Rollouts whose sub-environments are run by worker processes: those that are played from R, as a
+# function is the policy.
+
+still <- function(observation) rep(0L, length(observation))
+
+wandering <- function(observation) sample.int(4L, length(observation), replace = TRUE) - 1L
 
 test_that("a rollout is the same for any number of workers, also where the policy draws", {
   client <- test_client()
   networks <- policy_candidates(policy_network(c(16, 4)), rbind(sin(1:64), cos(1:64)))
-  for (policy in list(policy_random(), networks)) {
+  for (policy in list(wandering, still, list(wandering, networks$policy))) {
     play <- function(num_workers, ...) {
       rollout("FrozenLake-v1", policy, 20, seed = 1, num_envs = 7, num_workers = num_workers,
               steps = TRUE, next_observation = TRUE, client = client, ...)
@@ -61,14 +66,31 @@ test_that("what is no number of workers, or for no sub-environments, is refused"
 test_that("more workers than the server allows are the server's error", {
   few <- local_server(max_processes = 1)
   cnd <- expect_error(
-    rollout("FrozenLake-v1", policy_random(), 40, num_workers = 2, client = few),
+    rollout("FrozenLake-v1", still, 40, num_workers = 2, client = few),
     class = "gym_error_http_429"
   )
   expect_identical(cnd$code, "too_many_processes")
   expect_length(env_list_all(few), 0)
 })
 
-test_that("the server is asked once whether an environment has a vector implementation", {
+test_that("a server that describes environments makes no instance to look at", {
+  client <- local_server()
+  made <- 0L
+  local_functions(create_instance = local({
+    create <- gym:::create_instance
+    function(...) {
+      made <<- made + 1L
+      create(...)
+    }
+  }))
+  for (id in c("FrozenLake-v1", "FrozenLake-v1", "FrozenLake8x8-v1")) {
+    rollout(id, still, 2, client = client)
+  }
+  expect_identical(made, 3L)
+})
+
+test_that("an older server is asked once whether an environment has a vector implementation", {
+  local_functions(plays_rollouts = function(...) FALSE)
   client <- local_server()
   made <- 0L
   local_functions(create_instance = local({
@@ -129,33 +151,16 @@ test_that("a worker killed in the middle ends a rollout with the batches before 
 
 test_that("no more workers are asked for than there are sub-environments", {
   client <- test_client()
-  play <- function(...) rollout("FrozenLake-v1", policy_random(), seed = 1, client = client, ...)
+  play <- function(...) rollout("FrozenLake-v1", wandering, seed = 1, client = client, ...)
   expect_identical(play(1, num_workers = 2)$episodes, play(1)$episodes)
   expect_identical(play(3, num_workers = 5)$episodes, play(3)$episodes)
 })
 
 test_that("more workers than the sub-environments asked for are the server's error", {
   cnd <- expect_error(
-    rollout("FrozenLake-v1", policy_random(), 40, num_envs = 2, num_workers = 3,
+    rollout("FrozenLake-v1", still, 40, num_envs = 2, num_workers = 3,
             client = test_client()),
     class = "gym_error_http_400"
   )
   expect_match(conditionMessage(cnd), "num_workers")
-})
-
-test_that("a landscape is the same for any number of workers", {
-  client <- test_client()
-  search <- search_random("Acrobot-v1", policy_network(c(6, 3)), rounds = 2, episodes = 2,
-                          max_steps = 20, seed = 1, client = client)
-  make <- gym:::make_seeded
-  play <- function(num_workers) {
-    made <- list()
-    local_functions(make_seeded = function(...) {
-      made[[1L]] <<- make(..., num_workers = num_workers)
-    })
-    landscape <- search_landscape(search, size = 3, episodes = 4, seed = 1, client = client)
-    expect_identical(made[[1L]]$num_workers, num_workers)
-    landscape$grid
-  }
-  expect_identical(play(2L), play(0L))
 })

@@ -1,0 +1,79 @@
+# Requests of which several are under way at once.
+
+description <- function(client, id = "Acrobot-v1") {
+  post_repeatable(client, rollouts_route, c(env_id = json_string(id)))
+}
+
+test_that("answers come to their requests, and no more are under way than allowed", {
+  client <- test_client()
+  ids <- c("Acrobot-v1", "CartPole-v1", "Pendulum-v1", "MountainCar-v0", "FrozenLake-v1")
+  given <- got <- character()
+  open <- 0L
+  send_several(
+    client, rollouts_route,
+    next_request = function() {
+      i <- length(given) + 1L
+      if (i > length(ids)) {
+        return(NULL)
+      }
+      given[[i]] <<- ids[[i]]
+      open <<- open + 1L
+      expect_lte(open, 2L)
+      list(id = ids[[i]], body = charToRaw(json_object(c(env_id = json_string(ids[[i]])))))
+    },
+    received = function(request, response, seconds) {
+      open <<- open - 1L
+      expect_identical(response$answer$env_id, request$id)
+      expect_gte(seconds, 0)
+      got <<- c(got, request$id)
+      FALSE
+    },
+    sends = json_type
+  )
+  expect_setequal(got, ids)
+})
+
+test_that("a server that has too much to do is asked again when it says so", {
+  expect_null(seconds_to_wait(list(status_code = 200L)))
+  busy <- function(header) {
+    list(status_code = 429L, headers = charToRaw(paste0("HTTP/1.1 429 X\r\n", header, "\r\n\r\n")))
+  }
+  expect_identical(seconds_to_wait(busy("Retry-After: 2")), 2)
+  expect_identical(seconds_to_wait(busy("Retry-After: 4000")), 60)
+  expect_null(seconds_to_wait(busy("Other: 2")))
+  client <- test_client()
+  refused <- 0L
+  local_functions(seconds_to_wait = function(response) {
+    refused <<- refused + 1L
+    if (refused < 4L) 0.05
+  })
+  expect_identical(description(client)$env_id, "Acrobot-v1")
+  expect_identical(refused, 4L)
+})
+
+test_that("a request whose connection broke is sent again, a few times", {
+  server <- local_server()
+  for (when in c("answered", "unsent")) {
+    cut <- local_cut_client(server, when, "rollouts", times = 3)
+    expect_identical(description(cut)$env_id, "Acrobot-v1")
+    cut <- local_cut_client(server, when, "rollouts", times = 10)
+    expect_error(description(cut), class = "gym_error_connection")
+  }
+  nobody <- create_GymClient(paste0("http://127.0.0.1:", free_port()))
+  expect_error(description(nobody), class = "gym_error_connection")
+})
+
+test_that("a server that does not answer anything else either is not waited for", {
+  stalled <- create_GymClient(local_stalling("silent"), timeout = 0.5)
+  expect_error(description(stalled), class = "gym_error_connection")
+})
+
+test_that("an answer that is too large ends the call, and errors are those of the server", {
+  client <- test_client()
+  withr::local_options(gym.max_answer_bytes = 10)
+  local_binding("small_answer", 5)
+  expect_error(description(client), "larger than 10 bytes", class = "gym_error_connection")
+  withr::local_options(gym.max_answer_bytes = NULL)
+  expect_error(description(client, "CarPole-v1"), class = "gym_error_http")
+  expect_identical(description(client)$env_id, "Acrobot-v1")
+})
