@@ -57,7 +57,7 @@ known_of_env <- function(client, env_id, arguments) {
   check_client(client)
   state <- client_state(client)
   state$known_envs <- state$known_envs %||% new.env(parent = emptyenv())
-  key <- rlang::hash(list(env_id, arguments))
+  key <- rlang::hash(list(env_id, if (length(arguments)) arguments))
   state$known_envs[[key]] <- state$known_envs[[key]] %||% new.env(parent = emptyenv())
   state$known_envs[[key]]
 }
