@@ -9,7 +9,7 @@
 #' @return As [as_vector_env()] returns it, without the functions that play, and with `description`,
 #'   a list: `fields`, JSON texts by which a request names the environment, `group`, how many
 #'   episodes share a seed where one generator serves all of them (or `NULL`), `processes`, how many
-#'   play, `versions` and `processor`. `NULL` where its episodes are played from R: an environment
+#'   play, `needs_max_steps`, whether an episode may go on forever, `versions` and `processor`. `NULL` where its episodes are played from R: an environment
 #'   in R or an object, frames, wrappers that remember earlier episodes, arguments that say how
 #'   sub-environments are made, an older server.
 #' @noRd
@@ -53,7 +53,7 @@ ask_description <- function(client, env_id, arguments, call) {
       gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(arguments), call)
     ),
     gym_error_http = function(cnd) {
-      if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
+      if (!isTRUE(cnd$code %in% c("not_supported", "too_many_processes"))) rlang::cnd_signal(cnd)
     }
   )
   if (!is.null(answer)) described_env(client, answer, fields, wrappers, arguments)
@@ -83,6 +83,7 @@ described_env <- function(client, answer, fields, wrappers, arguments) {
       remembers = as.character(unlist(answer$remembers)),
       description = list(
         fields = fields, group = answer$group, processes = answer$processes %||% 1L,
+        needs_max_steps = answer$needs_max_steps %||% is.null(spec$max_episode_steps),
         versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
       )
     ),
@@ -96,5 +97,6 @@ check_description <- function(answer) {
   check_optional(answer, "spec", is_object, "an object")
   check_optional(answer, "group", is_natural, "a whole number")
   check_optional(answer, "processes", is_natural, "a whole number")
+  check_optional(answer, "needs_max_steps", is_flag, "true or false")
   check_optional(answer$spec, "max_episode_steps", is_number, "a number")
 }

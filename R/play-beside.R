@@ -22,13 +22,13 @@ stepped <- function(vector_env) {
   if (is.null(vector_env$description)) vector_env else vector_env$make_stepped()
 }
 
-# Without any limit an episode may never end, and only R could be interrupted.
+# Where an episode may never end the server plays none without a limit.
 plays_beside <- function(vector_env, policy, max_steps, keep_steps) {
   if (is.null(vector_env$description)) {
     return(FALSE)
   }
   spaces <- vector_env[c("observation_space", "action_space")]
-  (is.finite(max_steps) || !is.null(vector_env$spec$max_episode_steps)) &&
+  (is.finite(max_steps) || !vector_env$description$needs_max_steps) &&
     (!keep_steps || all(vapply(spaces, has_tensors, NA))) &&
     !is.null(policy_data(policy, vector_env))
 }

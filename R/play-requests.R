@@ -10,11 +10,7 @@ request_seconds <- 0.25
 play_requests <- function(play) {
   vector_env <- play$vector_env
   known <- vector_env$known
-  # What took so long the last time may take longer with another policy.
-  play$size <- max(1L, as.integer((known$size %||% 0) / 4))
-  if (is.null(play$episodes$row)) {
-    play$size <- max(play$size, as.integer(vector_env$description$processes))
-  }
+  play$size <- first_size(play)
   send_several(
     vector_env$client, rollouts_route,
     next_request = function() {
@@ -33,6 +29,13 @@ play_requests <- function(play) {
     },
     call = vector_env$call
   )
+}
+
+# How many units the first piece has: what took so long the last time may take longer with another
+# policy.
+first_size <- function(play) {
+  least <- if (is.null(play$episodes$row)) play$vector_env$description$processes else 1L
+  max(least, (play$vector_env$known$size %||% 0L) %/% 4L)
 }
 
 # How many units the next piece has, so that it takes so many seconds.

@@ -58,6 +58,8 @@ do_task <- function(task) {
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
       the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
+      # As many processes as future gives the worker play beside the environment: normally one.
+      the_session$server_options$max_rollout_processes <- parallelly::availableCores()[[1L]]
       with_own_server(list(value = run_task(task)))
     },
     error = function(cnd) {

@@ -163,6 +163,14 @@ played <- function(...) rollout(...)[c("episodes", "steps", "num_envs", "seed")]
 
 way <- function(x) provenance(x)$way
 
+# Requests that all have so many episodes, or groups, until the test ends.
+local_pieces <- function(size, frame = parent.frame()) {
+  local_functions(
+    first_size = function(play) size, next_size = function(units, seconds, wanted) size,
+    frame = frame
+  )
+}
+
 test_that("what is named by its id and played by data is played beside the environment", {
   client <- test_client()
   acrobot <- function(policy, ...) {
@@ -181,7 +189,12 @@ test_that("what is named by its id and played by data is played beside the envir
   expect_identical(way(acrobot(list(still, policy_random()))), steps)
   expect_identical(way(rollout(local_env("Acrobot-v1"), policy_random(), max_steps = 5)), steps)
   # Without any limit, and with as many sub-environments as no group has.
-  expect_identical(way(rollout("Blackjack-v1", policy_random(), seed = 1, client = client)), steps)
+  along_the_cliff <- matrix(0, 48, 4)
+  along_the_cliff[cbind(c(37, 25:35, 36), c(1, rep(2, 11), 3))] <- 1
+  walk <- rollout("CliffWalking-v1", policy_table(along_the_cliff), seed = 1, client = client)
+  expect_identical(walk$episodes$return, -13)
+  expect_identical(way(walk), steps)
+  expect_identical(way(rollout("Blackjack-v1", policy_random(), seed = 1, client = client)), beside)
   expect_identical(
     way(rollout("CartPole-v1", policy_random(), num_envs = 3, seed = 1, client = client)), steps
   )
@@ -225,7 +238,7 @@ test_that("results are the same however many episodes a request has, and how man
   }
   whole <- play()
   for (size in c(1L, 7L, 1000L)) {
-    local_functions(next_size = function(units, seconds, wanted) size)
+    local_pieces(size)
     expect_identical(play(), whole, label = paste("pieces of", size))
   }
   local_functions(send_several = local({
@@ -238,7 +251,7 @@ test_that("results are the same however many episodes a request has, and how man
 test_that("connections that are lost in the middle change nothing", {
   server <- local_server()
   play <- function(client) {
-    local_functions(next_size = function(units, seconds, wanted) 4L)
+    local_pieces(4L)
     played("Acrobot-v1", policy_random(), 30, seed = 1, max_steps = 20, client = client)
   }
   whole <- play(server)
@@ -351,7 +364,7 @@ test_that("an environment that fails in the middle keeps the episodes that were 
   finished <- cnd$result$episodes
   expect_gt(nrow(finished), 0L)
   expect_true(all(finished$seed %% 5 != 0))
-  local_functions(next_size = function(units, seconds, wanted) 1L)
+  local_pieces(1L)
   again <- expect_error(
     rollout("odd_environments:FailsLater-v0", policy_random(), 50, seed = 1, max_steps = 10,
             client = server),
@@ -367,16 +380,14 @@ test_that("an interrupt keeps what was played before it, and the client goes on"
   }
   whole <- play()
   local({
-    local_functions(
-      next_size = function(units, seconds, wanted) 3L,
-      read_played = local({
-        read <- gym:::read_played
-        function(play, piece, response) {
-          if (piece$first > 15) rlang::interrupt()
-          read(play, piece, response)
-        }
-      })
-    )
+    local_pieces(3L)
+    local_functions(read_played = local({
+      read <- gym:::read_played
+      function(play, piece, response) {
+        if (piece$first > 15) rlang::interrupt()
+        read(play, piece, response)
+      }
+    }))
     expect_message(short <<- play(), class = "gym_message_interrupted")
   })
   expect_true(short$interrupted)
