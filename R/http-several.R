@@ -116,16 +116,26 @@ drop_request <- function(one, crew) {
   }
 }
 
-# Interrupts wait until curl has returned, which is at most a tenth of a second.
+# Lets curl do what it can do at once, and then waits until there is more. curl would wait for whole
+# seconds, and use up a core that the server needs.
 await_answers <- function(crew) {
-  if (any(vapply(crew$under_way, function(one) !is.null(one$handle), NA))) {
-    suspendInterrupts(curl::multi_run(timeout = 0.1, poll = TRUE, pool = crew$line$pool))
+  pool <- crew$line$pool
+  suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
+  if (!any(vapply(crew$under_way, function(one) !is.null(one$outcome), NA))) {
+    wait_for_pool(pool)
     check_silent(crew)
-  } else {
-    Sys.sleep(0.02)
   }
-  # An interrupt that has waited comes now.
-  Sys.sleep(0)
+}
+
+# At most a tenth of a second.
+wait_for_pool <- function(pool) {
+  files <- curl::multi_fdset(pool)
+  if (length(files$reads) || length(files$writes)) {
+    processx::poll(list(processx::curl_fds(files)), 100)
+  } else {
+    # While curl connects, or all requests wait to be sent again.
+    Sys.sleep(0.002)
+  }
 }
 
 # However long a request takes, a server that works answers another one.
