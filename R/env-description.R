@@ -9,16 +9,14 @@
 #' @return As [as_vector_env()] returns it, without the functions that play, and with `description`,
 #'   a list: `fields`, JSON texts by which a request names the environment, `group`, how many
 #'   episodes share a seed where one generator serves all of them (or `NULL`), `processes`, how many
-#'   play, `needs_max_steps`, whether an episode may go on forever, `versions` and `processor`. `NULL` where its episodes are played from R: an environment
-#'   in R or an object, frames, wrappers that remember earlier episodes, arguments that say how
-#'   sub-environments are made, an older server.
+#'   play, `needs_max_steps`, whether an episode may go on forever, `versions` and `processor`.
+#'   `NULL` where its episodes are played from R: an environment in R or an object, frames, wrappers
+#'   that remember earlier episodes, arguments that say how sub-environments are made, an older
+#'   server.
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
-  named <- is.character(env_id) || inherits(env_id, "gym_wrapped")
-  how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
-  if (frames || !named || is_registered(env_id) || any(names(arguments) %in% how_made) ||
-        length(remembering(wrapper_names(noted_wrappers(env_id))))) {
+  if (frames || !may_be_described(env_id, arguments)) {
     return(NULL)
   }
   check_dots_named(arguments, "seed = 1", call)
@@ -30,13 +28,25 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
   known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
   described <- known$described[[1L]]
   group <- described$description$group
-  if (length(described$remembers) || !is.null(group) && group != num_envs %||% group) {
+  other_size <- !is.null(group) && !is.null(num_envs) && group != num_envs
+  if (is.null(described) || length(described$remembers) || other_size) {
     return(NULL)
   }
   described$num_envs <- as.integer(num_envs %||% described$num_envs)
   described$batch_size <- episodes_of_batch(described$num_envs)
   described$known <- known
   described
+}
+
+may_be_described <- function(env_id, arguments) {
+  how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
+  is_made_by_server(env_id) && !any(names(arguments) %in% how_made) &&
+    !length(remembering(wrapper_names(noted_wrappers(env_id))))
+}
+
+# Whether it is named by an id that a server knows.
+is_made_by_server <- function(env) {
+  (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
 }
 
 # `NULL` for an environment that the server does not play by itself.

@@ -21,25 +21,35 @@ send_several <- function(client, route, next_request, received, sends = tensors_
   )
   on.exit(suspendInterrupts(lapply(crew$under_way, drop_request, crew = crew)))
   repeat {
-    while (length(crew$under_way) < at_once && !is.null(request <- next_request())) {
-      crew$under_way <- c(crew$under_way, list(new_under_way(request)))
-    }
-    if (!length(crew$under_way)) {
-      return(invisible())
-    }
+    take_requests(crew, next_request, at_once)
+    if (!length(crew$under_way)) break
     launch_waiting(crew)
     await_answers(crew)
-    for (one in Filter(function(one) !is.null(one$outcome), crew$under_way)) {
-      response <- settle(crew, one)
-      if (!is.null(response)) {
-        crew$under_way <- Filter(function(other) !identical(other, one), crew$under_way)
-        if (isTRUE(received(one$request, response, now() - one$launched))) {
-          return(invisible())
-        }
+    if (take_answers(crew, received)) break
+  }
+}
+
+take_requests <- function(crew, next_request, at_once) {
+  while (length(crew$under_way) < at_once && !is.null(request <- next_request())) {
+    crew$under_way <- c(crew$under_way, list(new_under_way(request)))
+  }
+}
+
+# Returns whether to end.
+take_answers <- function(crew, received) {
+  for (one in Filter(has_outcome, crew$under_way)) {
+    response <- settle(crew, one)
+    if (!is.null(response)) {
+      crew$under_way <- Filter(function(other) !identical(other, one), crew$under_way)
+      if (isTRUE(received(one$request, response, now() - one$launched))) {
+        return(TRUE)
       }
     }
   }
+  FALSE
 }
+
+has_outcome <- function(one) !is.null(one$outcome)
 
 now <- function() proc.time()[["elapsed"]]
 
@@ -121,7 +131,7 @@ drop_request <- function(one, crew) {
 await_answers <- function(crew) {
   pool <- crew$line$pool
   suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
-  if (!any(vapply(crew$under_way, function(one) !is.null(one$outcome), NA))) {
+  if (!any(vapply(crew$under_way, has_outcome, NA))) {
     wait_for_pool(pool)
     check_silent(crew)
   }

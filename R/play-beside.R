@@ -89,10 +89,10 @@ list_episodes <- function(vector_env, history, most) {
 
 # What changes while episodes are played: `begins` has the first episode of each unit (a group, or
 # an episode), which no piece divides, and at last the number after all; `next_unit` and `size`, how
-# many units the next piece has; `again`, pieces of which the server left out the end; `pieces`, what
-# was played, by the number of its first episode; `returns` of all episodes; `played` and `entered`,
-# how many were; `needed`, how many are, given the target; `failed`, the first episode that failed,
-# and its error.
+# many units the next piece has; `again`, pieces of which the server left out the end; `pieces`,
+# what was played, by the number of its first episode; `returns` of all episodes; `played` and
+# `entered`, how many were; `needed`, how many are, given the target; `failed`, the first episode
+# that failed, and its error.
 new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, most = 1L, each = 1L,
                      target = NULL, report = function(ended) NULL) {
   n <- length(episodes$seed)

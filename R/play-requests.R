@@ -80,8 +80,8 @@ data_tensor <- function(values, dtype) {
 # Answers ------------------------------------------------------------------------------------
 
 #' Read what came of a piece
-#' @return A list: `batch`, as [play_batch()] returns it, and `error`, what came of the episode after
-#'   those of the batch, see [take_played()].
+#' @return A list: `batch`, as [play_batch()] returns it, and `error`, what came of the episode
+#'   after those of the batch, see [take_played()].
 #' @noRd
 read_played <- function(play, piece, response) {
   call <- play$vector_env$call

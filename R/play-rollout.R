@@ -24,10 +24,10 @@
 #' functions, models and other policies that only R can ask; for an environment that was made
 #' before, or that is written in R; with `frames = TRUE`; for wrappers that remember earlier
 #' episodes; where an episode might go on forever, as neither the environment nor `max_steps` limits
-#' it; where a vector implementation such as CartPole's is to play with another `num_envs` than 256; and on a server
-#' that is older than this package. Many episodes are played at once in sub-environments, but for
-#' frames, and the policy is asked about those that still run, so that a function gets fewer rows as
-#' the last of them end.
+#' it; where a vector implementation such as CartPole's is to play with another `num_envs` than 256;
+#' and on a server that is older than this package. Many episodes are played at once in
+#' sub-environments, but for frames, and the policy is asked about those that still run, so that a
+#' function gets fewer rows as the last of them end.
 #'
 #' [provenance()] names the way. `vignette("playing", package = "gym")` tells more, and how to begin
 #' an episode of the result again.

@@ -19,7 +19,8 @@
 #'
 #' Each worker plays on a server of its own, which it starts when it is first needed, keeps, and
 #' ends when it ends itself; the variable `GYM_SERVER_URL` on the worker, with the token's variable,
-#' names another one (see [gym_client()]). Where R plays step by step the worker's sub-environments
+#' names another one (see [gym_client()]). That server has as many processes that play as future gives
+#' the worker cores, normally one. Where R plays step by step the worker's sub-environments
 #' run in that one process unless `num_workers` asks for more, so that cores are not used twice.
 #'
 #' What cannot be sent is played in the session, which is said once: an environment that was given

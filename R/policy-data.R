@@ -1,5 +1,5 @@
-# Policies that are data: numbers and a few words, which a server can play without asking R. The wire
-# keeps numbers in C order, each network's weights in that of coef().
+# Policies that are data: numbers and a few words, which a server can play without asking R. The
+# wire keeps numbers in C order, each network's weights in that of coef().
 
 #' Take a policy apart into data
 #'

@@ -9,14 +9,14 @@
 #' @param ... Not used.
 #' @return An object of class `gym_provenance`, which prints a line for each of its elements; a list
 #'   of `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK` (strings), `server` (the versions of the
-#'   server, a named list of strings; `NULL` for an environment in R), `processor` (a string, that of
-#'   the server where its processes play, as NumPy's last bits depend on it; else `NULL`), `way`
-#'   (`"beside the environment"` or `"step by step"`, see [rollout()]; of a learner how it learns),
-#'   `env_id` (a string), `kwargs` (the environment's own arguments, a named list), `wrappers`
-#'   (strings), `num_envs` (a whole number; `NULL` beside the environment), `seed` (whole numbers),
-#'   `preset` (a list, `NULL` where none was taken), `started` (a date with time)
-#'   and `elapsed` (seconds, a double). Rollouts and evaluations have no times, `NULL` and `NA`, so
-#'   that two with the same seed are identical.
+#'   server, a named list of strings; `NULL` for an environment in R), `processor` (a string: that of
+#'   the server, where its processes play, as the last bits of NumPy depend on it; else `NULL`),
+#'   `way` (`"beside the environment"` or `"step by step"`, see [rollout()]; of a learner how it
+#'   learns), `env_id` (a string), `kwargs` (the environment's own arguments, a named list),
+#'   `wrappers` (strings), `num_envs` (a whole number; `NULL` beside the environment), `seed` (whole
+#'   numbers), `preset` (a list, `NULL` where none was taken), `started` (a date with time) and
+#'   `elapsed` (seconds, a double). Rollouts and evaluations have no times, `NULL` and `NA`, so that
+#'   two with the same seed are identical.
 #' @section Errors: `gym_error_argument` for something that has no provenance,
 #'   `gym_error_checkpoint` for a file that is no checkpoint.
 #' @export

@@ -192,10 +192,6 @@ run_task.gym_task_training <- function(task) {
   train_seed(task$one, with_env, call)
 }
 
-is_made_by_server <- function(env) {
-  (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
-}
-
 # What a seed has of its own: its settings, its checkpoint, the folder of its log.
 training_of_seed <- function(settings, seed, files, call) {
   settings$seed <- seed

@@ -31,7 +31,9 @@ test_that("moments go along where some are known", {
 
 test_that("a random policy names its actions where they are fewer than the environment's", {
   whole <- policy_bind(policy_random(), env)
-  expect_identical(policy_data(whole, env), list(document = list(kind = "random"), tensors = list()))
+  expect_identical(
+    policy_data(whole, env), list(document = list(kind = "random"), tensors = list())
+  )
   narrow <- policy_bind(policy_random(space_discrete(2, start = 1)), env)
   expect_identical(
     to_json(policy_data(narrow, env)$document),
