@@ -19,9 +19,9 @@
 #'
 #' Each worker plays on a server of its own, which it starts when it is first needed, keeps, and
 #' ends when it ends itself; the variable `GYM_SERVER_URL` on the worker, with the token's variable,
-#' names another one (see [gym_client()]). That server has as many processes that play as future gives
-#' the worker cores, normally one. Where R plays step by step the worker's sub-environments
-#' run in that one process unless `num_workers` asks for more, so that cores are not used twice.
+#' names another one (see [gym_client()]). So that cores are not used twice, that server plays
+#' episodes in as many processes as future gives the worker cores, normally one; and where R plays
+#' step by step it runs the sub-environments in its own process, unless `num_workers` asks for more.
 #'
 #' What cannot be sent is played in the session, which is said once: an environment that was given
 #' as an object, or by a client other than the session's own; wrappers that remember something over

@@ -61,6 +61,20 @@ test_that("results are the same with none and with two workers", {
   expect_identical(everything(), alone)
 })
 
+test_that("a worker's server plays in as many processes as future gives the worker, one", {
+  local_plan(future::multisession, workers = 2)
+  rollout("Acrobot-v1", policy_random(), 40, seed = 1, max_steps = 20)
+  asked <- lapply(1:2, function(i) {
+    future::future({
+      Sys.sleep(0.3)
+      utils::getFromNamespace("the_session", "gym")$server_options$max_rollout_processes
+    }, lazy = FALSE)
+  })
+  counts <- unlist(lapply(asked, future::value))
+  expect_gt(length(counts), 0L)
+  expect_true(all(counts == 1L))
+})
+
 test_that("a search that normalises has the same moments, whoever plays beyond its end", {
   skip_unless_all()
   search <- function() {
