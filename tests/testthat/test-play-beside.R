@@ -248,6 +248,49 @@ test_that("results are the same however many episodes a request has, and how man
   expect_identical(play(), whole)
 })
 
+test_that("a training is the same with any number of processes, through broken connections, too", {
+  train <- function(client) {
+    what_counts(train_agent(
+      agent_ars(directions = 4, top = 2), "Acrobot-v1", policy_linear(normalize = TRUE),
+      iterations = 3, seed = 3, eval_episodes = 10, eval_every = 2, max_steps = 60, client = client
+    ))
+  }
+  alone <- train(local_server(max_rollout_processes = 1))
+  several <- local_server(max_rollout_processes = 3)
+  expect_identical(train(several), alone)
+  expect_identical(train(local_cut_client(several, "answered", "rollouts", times = 5)), alone)
+})
+
+# The processes that a server's processes have started last: those that play are among them.
+last_processes <- function(pid) {
+  children <- suppressWarnings(as.integer(system2("pgrep", c("-P", pid), stdout = TRUE)))
+  if (length(children)) unlist(lapply(children, last_processes)) else pid
+}
+
+test_that("processes that are killed in the middle change nothing", {
+  skip_on_os("windows")
+  server <- local_server()
+  server_pid <- the_session$servers[[server$remote_base]]$pid
+  play <- function() {
+    played("Acrobot-v1", policy_random(), 60, seed = 1, max_steps = 100, client = server)
+  }
+  whole <- play()
+  local_pieces(12L)
+  killed <- 0L
+  local_functions(read_played = local({
+    read <- gym:::read_played
+    function(play, piece, response) {
+      if (piece$first %in% c(13L, 37L)) {
+        killed <<- killed + 1L
+        tools::pskill(last_processes(server_pid), tools::SIGKILL)
+      }
+      read(play, piece, response)
+    }
+  }))
+  expect_identical(play(), whole)
+  expect_identical(killed, 2L)
+})
+
 test_that("connections that are lost in the middle change nothing", {
   server <- local_server()
   play <- function(client) {
