@@ -21,20 +21,24 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
   }
   check_dots_named(arguments, "seed = 1", call)
   check_client(client, call = call)
-  if (!plays_rollouts(client, call)) {
-    return(NULL)
+  described <- if (plays_rollouts(client, call)) {
+    known_description(client, env_id, arguments, call)
   }
-  known <- known_of_env(client, env_id, arguments)
-  known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
-  described <- known$described[[1L]]
-  group <- described$description$group
-  other_size <- !is.null(group) && !is.null(num_envs) && group != num_envs
-  if (is.null(described) || length(described$remembers) || other_size) {
+  other_size <- isTRUE(described$one_seed) && !is.null(num_envs) && num_envs != described$num_envs
+  if (is.null(described) || other_size) {
     return(NULL)
   }
   described$num_envs <- as.integer(num_envs %||% described$num_envs)
   described$batch_size <- episodes_of_batch(described$num_envs)
-  described$known <- known
+  described
+}
+
+# What the server has said of an environment, `NULL` where it does not play it by itself.
+known_description <- function(client, env_id, arguments, call) {
+  known <- known_of_env(client, env_id, arguments)
+  known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
+  described <- known$described[[1L]]
+  if (!is.null(described)) described$known <- known
   described
 }
 
@@ -49,7 +53,6 @@ is_made_by_server <- function(env) {
   (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
 }
 
-# `NULL` for an environment that the server does not play by itself.
 ask_description <- function(client, env_id, arguments, call) {
   id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
   wrappers <- noted_wrappers(env_id)
@@ -66,7 +69,9 @@ ask_description <- function(client, env_id, arguments, call) {
       if (!isTRUE(cnd$code %in% c("not_supported", "too_many_processes"))) rlang::cnd_signal(cnd)
     }
   )
-  if (!is.null(answer)) described_env(client, answer, fields, wrappers, arguments)
+  if (!is.null(answer) && !length(answer$remembers)) {
+    described_env(client, answer, fields, wrappers, arguments)
+  }
 }
 
 rollouts_route <- "/v1/rollouts/"
@@ -90,7 +95,7 @@ described_env <- function(client, answer, fields, wrappers, arguments) {
         render_fps = if (is_number(spec$render_fps)) spec$render_fps,
         wrappers = wrapper_names(wrappers), kwargs = arguments
       ),
-      remembers = as.character(unlist(answer$remembers)),
+      remembers = character(),
       description = list(
         fields = fields, group = answer$group, processes = answer$processes %||% 1L,
         needs_max_steps = answer$needs_max_steps %||% is.null(spec$max_episode_steps),

@@ -26,8 +26,8 @@
 #'   to, see [agent_observe()].
 #' @param report A function that is called with how many episodes have ended so far.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
-#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments` (of
-#'   one, those of all).
+#'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`
+#'   (of one, those of all).
 #'   Candidates after one that has reached the target are left out.
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,

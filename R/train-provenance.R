@@ -9,8 +9,8 @@
 #' @param ... Not used.
 #' @return An object of class `gym_provenance`, which prints a line for each of its elements; a list
 #'   of `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK` (strings), `server` (the versions of the
-#'   server, a named list of strings; `NULL` for an environment in R), `processor` (a string: that of
-#'   the server, where its processes play, as the last bits of NumPy depend on it; else `NULL`),
+#'   server, a named list of strings; `NULL` for an environment in R), `processor` (a string:
+#'   that of the server, where its processes play, as the last bits of NumPy depend on it),
 #'   `way` (`"beside the environment"` or `"step by step"`, see [rollout()]; of a learner how it
 #'   learns), `env_id` (a string), `kwargs` (the environment's own arguments, a named list),
 #'   `wrappers` (strings), `num_envs` (a whole number; `NULL` beside the environment), `seed` (whole
