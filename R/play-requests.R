@@ -35,7 +35,7 @@ play_requests <- function(play) {
 # policy.
 first_size <- function(play) {
   least <- if (is.null(play$episodes$row)) play$vector_env$description$processes else 1L
-  max(least, (play$vector_env$known$size %||% 0L) %/% 4L)
+  max(least, (play$vector_env$known$size %||% 0L) %/% 2L)
 }
 
 # How many units the next piece has, so that it takes so many seconds.

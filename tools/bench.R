@@ -9,11 +9,11 @@
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
-#   [wire] [memory] runs parts.
+#   [beside] [wire] [memory] runs parts.
 
 library(gym)
 for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "tasks", "rollouts",
-               "wire", "results", "goals", "table", "figure",
+               "beside", "wire", "results", "goals", "table", "figure",
                "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
@@ -52,6 +52,7 @@ bench <- function(parts, quick) {
     if ("search" %in% parts) compare_searches(setup, scale$searches, scale$rounds),
     if ("search" %in% parts) fresh_searches(scale$fresh),
     if ("env_rollouts" %in% parts) compare_rollouts(python, scale$rollout_turns, quick),
+    if ("beside" %in% parts) compare_beside(python, scale$rollout_turns, quick),
     if ("wire" %in% parts) compare_steps(python, scale$step_turns, scale$turn_steps),
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
@@ -121,7 +122,8 @@ report <- function(result, csv, text, figure, environments) {
 
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
-all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "wire", "memory")
+all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
+               "memory")
 parts <- intersect(all_parts, arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts

@@ -41,12 +41,9 @@ def _environment(env_id: str) -> gymnasium.Env:
 
 
 def _policy(env: gymnasium.Env, kind: str, numbers: np.ndarray, outputs: int) -> Callable:
-    if kind == "cards":
-        least = int(numbers[0])
-        return lambda observation: int(observation[0] < least)
-    if kind == "table":
-        actions = numbers.astype(int).tolist()
-        return lambda observation: actions[observation]
+    if kind == "random":
+        env.action_space.seed(1)
+        return lambda observation: env.action_space.sample()
     wide = env.observation_space.dtype == np.float64
     weights = numbers.reshape(outputs, -1).astype(np.float64 if wide else np.float32)
     if kind == "discrete":

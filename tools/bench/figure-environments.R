@@ -36,7 +36,7 @@ rollout_lines <- function(rows) {
     }),
     if ("candidates" %in% rows$part) {
       list(rollout_line(rows, "LunarLander-v3,\n16 candidates", "candidates", "LunarLander-v3",
-                        0.8))
+                        1.2))
     }
   )
 }

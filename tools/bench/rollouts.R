@@ -6,8 +6,11 @@ rollout_cores <- 2L
 rollout_names <- c(
   gym = "gym, rollout()",
   python = "Python",
-  by_hand = "gym, env$step(), 1,024 sub-environments",
-  workers = "gym, rollout(), %d worker processes"
+  network = "gym, rollout() through a network of 20 ms",
+  balancing = "gym, rollout(), a network that balances",
+  search = "gym, search_random()",
+  preset = "gym, train_agent(), LunarLander's preset",
+  memory = "server and processes, above an idle server"
 )
 
 # Evaluates code while this process, and whatever it starts, may use these cores only. Where the
@@ -36,18 +39,10 @@ compare_rollouts <- function(python, turns, quick) {
         episodes <- if (quick) task$quick else task$episodes
         play_paired(rollout_contenders(setup, task, episodes), turns, task$env_id)
       })),
-      play_paired(candidate_contenders(setup, tasks[["LunarLander-v3"]]), turns, "16 candidates"),
-      if (has_num_workers()) {
-        task <- tasks[["LunarLander-v3"]]
-        episodes <- if (quick) task$quick else task$episodes
-        play_paired(worker_contenders(setup, task, episodes), turns, "worker processes")
-      }
+      play_paired(candidate_contenders(setup, tasks[["LunarLander-v3"]]), turns, "16 candidates")
     )
   })
 }
-
-# Can this version of the package be told how many worker processes to use?
-has_num_workers <- function() "num_workers" %in% names(formals(gym_make))
 
 start_contenders <- function(python) {
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
@@ -92,15 +87,14 @@ rollout_contenders <- function(setup, task, episodes) {
     list(
       paired("env_rollouts", task, rollout_names[["gym"]],
              sprintf("rollout(id, policy, %d)", episodes),
-             function() rate_of(function() sum(replicate(task$repeats, play()))),
+             function() rate_of(play),
              # As many episodes, so that all worker processes run, but short ones.
              function() play(max_steps = 2)),
       paired("env_rollouts", task, rollout_names[["python"]],
              sprintf("env.step(a) in a loop, %d episodes", episodes),
-             function() mean(replicate(task$repeats, loop(episodes))), function() loop(2L))
+             function() loop(episodes), function() loop(2L))
     ),
-    if (task$reticulate) lapply(setup$reticulate, reticulate_episodes, task),
-    if (task$env_id == "FrozenLake-v1") list(steps_by_hand(setup, task))
+    if (task$reticulate) lapply(setup$reticulate, reticulate_episodes, task)
   )
 }
 
@@ -126,9 +120,9 @@ play_by_id <- function(task, policy, episodes, client, max_steps = NULL) {
 
 task_policy <- function(task, numbers = task_numbers(task)) {
   switch(task$kind,
-    table = function(observation) numbers[observation + 1L],
-    cards = function(observation) as.integer(observation$player_sum < numbers),
-    policy_network(c(task$inputs, task$outputs), "tanh", list(numbers))
+    random = policy_random(),
+    box = policy_network(c(task$inputs, task$outputs), "tanh", list(numbers)),
+    policy_network(c(task$inputs, task$outputs), "identity", list(numbers))
   )
 }
 
@@ -147,25 +141,6 @@ reticulate_episodes <- function(worker, task) {
   play <- function(seconds) ask(worker, "episodes", task$env_id, seconds, 32)
   paired("env_rollouts", task, reticulate_name(worker), "SyncVectorEnv, 32 sub-environments",
          function() play(2), function() play(0.1))
-}
-
-# What was the fastest before sub-environments began their episodes by themselves. A step that only
-# resets is none of the game's.
-steps_by_hand <- function(setup, task) {
-  n <- 1024L
-  env <- gym_make(task$env_id, num_envs = n, vectorization_mode = "sync", client = setup$client)
-  play <- function() {
-    env$reset(seed = 1)
-    ended <- logical(n)
-    steps <- 0
-    for (i in seq_len(50L)) {
-      steps <- steps + sum(!ended)
-      ended <- env$step(sample.int(task$outputs, n, replace = TRUE) - 1L)$done
-    }
-    steps
-  }
-  paired("env_rollouts", task, rollout_names[["by_hand"]], "env$step(random actions), sync",
-         function() rate_of(play))
 }
 
 # An iteration of a search: 16 candidates, 2 episodes each. Short, so a turn has several.
@@ -188,18 +163,4 @@ candidate_contenders <- function(setup, task, candidates = 16L, episodes = 2L, i
       mean(replicate(iterations, loop(episodes)))
     })
   )
-}
-
-# More worker processes than cores are to cost little.
-worker_contenders <- function(setup, task, episodes, num_envs = 128L) {
-  policy <- task_policy(task)
-  lapply(c(2L, 4L), function(num_workers) {
-    env <- gym_make(
-      task$env_id, num_envs = num_envs, num_workers = num_workers, client = setup$client
-    )
-    play <- function() sum(rollout(env, policy, episodes, seed = 1)$episodes$length)
-    paired("workers", task, sprintf(rollout_names[["workers"]], num_workers),
-           sprintf("%d sub-environments, %d episodes", num_envs, episodes),
-           function() rate_of(play))
-  })
 }

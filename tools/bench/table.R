@@ -8,7 +8,7 @@ what_text <- function(summary) {
   plural <- ifelse(summary$num_envs == 1, "", "s")
   words <- c(
     single = "single", wire = "single", search = "random search", fresh = "search in a fresh R",
-    memory = "memory", candidates = "candidates of a search", workers = "worker processes"
+    memory = "memory", candidates = "candidates of a search", beside = "rollouts"
   )
   text <- ifelse(
     summary$num_envs > 0, sprintf("%.0f sub-environment%s", summary$num_envs, plural),
@@ -20,7 +20,7 @@ what_text <- function(summary) {
 # The parts of a run, each group a table of its own.
 table_groups <- list(
   CartPole = c("single", "vector", "r_env", "search", "fresh", "memory"),
-  environments = c("env_rollouts", "candidates", "workers"),
+  environments = c("env_rollouts", "candidates", "beside"),
   step = "wire"
 )
 

