@@ -17,7 +17,9 @@ bound_to <- function(policy, space) {
 write_case <- function(policy, observation, file) {
   space <- policy$action_space
   data <- policy_data(policy, list(action_space = space))
-  described <- if (inherits(space, "gym_space_discrete")) space[c("n", "start")] else {
+  described <- if (inherits(space, "gym_space_discrete")) {
+    space[c("n", "start")]
+  } else {
     list(low = as.list(as.numeric(space$low)), high = as.list(as.numeric(space$high)))
   }
   tensors <- lapply(c(
