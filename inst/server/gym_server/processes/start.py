@@ -29,9 +29,16 @@ def preload(module: str) -> None:
     _preloaded.append(module)
 
 
+# A process for each core is what there is for more than one core: threads of NumPy's beside them
+# would wait for each other. Read when NumPy is imported, so this process keeps its own.
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
 def context() -> Any:
     """Return the ``multiprocessing`` context that starts processes."""
     context = multiprocessing.get_context(START_METHOD)
+    for name in _ONE_THREAD:
+        os.environ.setdefault(name, "1")
     context.set_forkserver_preload(_preloaded)
     with _folder_lock:
         _temporary_folder()

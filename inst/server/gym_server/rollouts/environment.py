@@ -32,8 +32,10 @@ GROUP = 256
 # world of Box2D remembers. Found by playing every registered environment both ways.
 _MADE_ANEW = ("gymnasium.envs.box2d.bipedal_walker",)
 
-# Without a time limit, and yet each episode ends, whatever is done.
-_ENDING = ("gymnasium.envs.toy_text.blackjack",)
+# Without a time limit of Gymnasium's, and yet each episode ends, whatever is done: a game of Atari
+# after half an hour, unless this argument says otherwise.
+_ENDING = ("gymnasium.envs.toy_text.blackjack", "ale_py")
+_ATARI_LIMIT = "max_num_frames_per_episode"
 
 # Wrappers that carry something from one episode into the next.
 _REMEMBERING = ("NormalizeObservation", "NormalizeReward")
@@ -132,7 +134,9 @@ class RolloutEnv:
     @property
     def needs_max_steps(self) -> bool:
         """Whether an episode may go on forever."""
-        return self.time_limit is None and not registry.module_of(self._spec).startswith(_ENDING)
+        ends = registry.module_of(self._spec).startswith(_ENDING)
+        chosen = self._task.config.kwargs or {}
+        return self.time_limit is None and (not ends or _ATARI_LIMIT in chosen)
 
     @property
     def remembers(self) -> list[str]:

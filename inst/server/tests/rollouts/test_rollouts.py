@@ -195,7 +195,19 @@ def test_the_description_is_that_of_an_instance(client, create):
         assert described["group"] == (256 if env_id == "CartPole-v1" else None)
         assert described["needs_max_steps"] is False
         assert described["processes"] >= 1
-    assert client.post("/v1/rollouts/", json={"env_id": "CliffWalking-v1"}).json["needs_max_steps"]
+
+
+@pytest.mark.parametrize(
+    ("env_id", "kwargs", "needs"),
+    [
+        ("CliffWalking-v1", {}, True),
+        ("ALE/Pong-v5", {}, False),
+        ("ALE/Pong-v5", {"max_num_frames_per_episode": 0}, True),
+    ],
+)
+def test_what_has_no_end_needs_a_limit(client, env_id, kwargs, needs):
+    how = {"env_id": env_id, "kwargs": kwargs}
+    assert client.post("/v1/rollouts/", json=how).json["needs_max_steps"] is needs
 
 
 def test_an_environment_that_changes_its_arrays_in_place_is_kept_as_it_was(client):
