@@ -58,7 +58,9 @@ lander_seconds <- function(client) {
 }
 
 preset_seconds <- function(client) {
-  seconds_of(search_ars("LunarLander-v3", seed = 1001, client = client, progress = FALSE))
+  seconds_of(
+    search_ars("LunarLander-v3", continuous = TRUE, seed = 1001, client = client, progress = FALSE)
+  )
 }
 
 start_slow_proxy <- function(python, client) {
@@ -66,8 +68,12 @@ start_slow_proxy <- function(python, client) {
   process <- processx::process$new(
     python, c("tools/bench/slow_proxy.py", port, "0.02"), stdout = "|", stderr = ""
   )
-  process$poll_io(10000)
-  list(process = process, address = paste0("http://127.0.0.1:", process$read_output_lines()[[1L]]))
+  port <- character()
+  while (!length(port) && process$is_alive()) {
+    process$poll_io(1000)
+    port <- process$read_output_lines()
+  }
+  list(process = process, address = paste0("http://127.0.0.1:", port))
 }
 
 # The private memory of the server and its processes, in MB: after rollouts in two processes, less

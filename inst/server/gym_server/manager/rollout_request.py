@@ -35,6 +35,7 @@ class Request:
         seconds: how long a unit has taken, or None.
         deaths: how often a process has died with a unit.
         failed: the first unit that has failed, and the error.
+        turn_ends: when it is another request's turn, in the clock's seconds; None before its own.
         unwanted_since: since when nobody waits for it, in the clock's seconds.
         over: set when it is done.
     """
@@ -51,6 +52,7 @@ class Request:
     seconds: float | None = None
     deaths: dict[int, int] = field(default_factory=dict)
     failed: tuple[int, GymServerError] | None = None
+    turn_ends: float | None = None
     unwanted_since: float | None = None
     over: threading.Event = field(default_factory=threading.Event)
 

@@ -1,8 +1,9 @@
 """Plays the episodes of all clients in processes of the pool.
 
 Each process is a player's, a thread that waits for it. A player takes some of a request's episodes,
-lets its process play them for some milliseconds, hands back what was not reached, and turns to the
-next request. When there has been nothing to play for a second, it puts its process back.
+lets its process play them for some milliseconds, and hands back what was not reached. The requests
+of all clients take turns. When there has been nothing to play for a second, a player puts its
+process back.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ log = logging.getLogger(__name__)
 
 # Requests that wait or are played; each has a thread, and a body of up to 16 MiB.
 _MOST_REQUESTS = 64
+
+# A request is played for so many seconds before it is another one's turn. R's requests take less:
+# while one is played the answer to the one before is on its way, and the next one.
+_TURN_SECONDS = 0.3
 
 # A process that has nothing to play is put back after so many seconds.
 _IDLE_SECONDS = 1.0
@@ -227,10 +232,7 @@ class Rollouts:
         due = time.monotonic() + _IDLE_SECONDS
         with self._changed:
             while not self._stopping:
-                for _ in range(len(self._requests)):
-                    request = self._requests[0]
-                    # The others come first the next time.
-                    self._requests.rotate(-1)
+                for request in list(self._requests):
                     if request.key != player.key:
                         if self._needs_room(request):
                             return False
@@ -238,12 +240,23 @@ class Rollouts:
                     units = request.take(len(self._players))
                     if units is not None:
                         player.request, player.units = request, units
+                        self._end_turn(request)
                         return True
                 left = due - time.monotonic()
                 if left <= 0:
                     return False
                 self._changed.wait(left)
         return False
+
+    def _end_turn(self, request: Request) -> None:
+        """Let the others come first when a request has been played for some time."""
+        now = time.monotonic()
+        if request.turn_ends is None:
+            request.turn_ends = now + _TURN_SECONDS
+        elif now > request.turn_ends:
+            request.turn_ends = None
+            self._requests.remove(request)
+            self._requests.append(request)
 
     def _needs_room(self, request: Request) -> bool:
         """Whether a request waits for a process that may play it, and there may be no more."""
