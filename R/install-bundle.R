@@ -2,9 +2,9 @@
 # network.
 #
 #   bundle.dcf   the manifest: for which system, lock, extras and Python it was made
-#   wheels/      the packages
-#   lock/        the lock files, which list the packages
-#   uv/          uv, when it was used
+#   SHA256SUMS   all other files with their SHA-256
+#   uv           uv itself (uv.exe)
+#   cache/       uv's cache, with the packages
 #   python/      the archive of the Python that uv installs, when it could be downloaded
 
 #' Fill a folder for installing without a network
@@ -14,12 +14,12 @@
 #' classroom's, say. Those need the same kind of system (Windows, macOS or Linux, and the same
 #' processor) and the same version of this package.
 #'
-#' Where uv is found or can be downloaded it is part of the bundle, and so is the Python that it
+#' The bundle holds uv, the packages in uv's cache, and the archive of the Python that uv
 #' installs. Where that cannot be downloaded the bundle is for the version of the Python that made
 #' it, and the other machines need a Python of that version, too: the function says so.
 #'
 #' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
-#'   is replaced as soon as it is clear how a new one can be made, anything else refused.
+#'   is replaced as soon as the new one is complete, anything else refused.
 #' @param extras The extras that the bundle shall have, as for [gym_server_install()].
 #' @return `dir`, invisibly.
 #' @section Errors: `gym_error_install` when something could not be downloaded, with what to do;
@@ -36,36 +36,67 @@ gym_server_bundle <- function(dir, extras = character()) {
   dir <- absolute_path(dir)
   check_bundle_place(dir, call)
   extras <- server_extras[server_extras %in% extras]
-  with_install_lock({
-    plan <- install_plan(extras, call)
-    dir <- empty_bundle(dir, call)
-    cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
-    uv <- if (plan$how == "download") install_uv(call) else if (plan$how == "uv") plan$tool
-    base <- bundle_python(dir, uv, call)
-    download_wheels(dir, base, extras, call)
-    uv_hash <- copy_uv(uv, dir)
-  })
-  dir.create(file.path(dir, "lock"))
-  file.copy(lock_files(extras), file.path(dir, "lock"))
-  # Last, as a folder with the manifest is a complete bundle.
-  write.dcf(list(
+  folder <- tempfile("bundle-", install_root())
+  new <- file.path(folder, "bundle")
+  make_folder(new, call)
+  on.exit(unlink(folder, recursive = TRUE))
+  cli::cli_inform(c(i = "Downloading {describe_packages(extras)} into {.path {dir}}."))
+  uv <- find_uv(call) %||% install_uv(call)
+  copy_uv(uv, new, call)
+  source <- bundling_source(uv, new, folder)
+  make_environment(folder, source, extras, call)
+  remove_links(file.path(new, "cache"))
+  fields <- list(
     System = bundle_system(), Lock = lock_hash(), Extras = paste(extras, collapse = " "),
-    Python = probe_python(base$python)$version,
-    Contains = if (is.null(uv_hash)) "packages" else if (base$managed) "uv and Python" else "uv",
-    UvHash = uv_hash %||% "none"
-  ), file.path(dir, "bundle.dcf"))
-  unlink(file.path(dir, "making"), recursive = TRUE)
-  inform_of_bundle(read_bundle(dir, call))
-  invisible(dir)
+    Python = probe_python(environment_python(folder))$version,
+    Index = paste(index_arguments(source, environment_python(folder)), collapse = " ")
+  )
+  write_sums(new)
+  replace_bundle(new, dir, fields, call)
+  inform_of_bundle(read_bundle(dir, extras, call))
+  invisible(normalizePath(dir, winslash = "/"))
 }
 
-bundle_parts <- c("bundle.dcf", "wheels", "lock", "uv", "python", "making")
+# Where uv gets and puts things while a bundle is made: its downloads end up in the bundle.
+bundling_source <- function(uv, new, folder) {
+  source <- network_source(uv)
+  source$env <- c(
+    UV_CACHE_DIR = file.path(new, "cache"), UV_NO_CACHE = "false",
+    UV_PYTHON_CACHE_DIR = file.path(new, "python"),
+    UV_PYTHON_INSTALL_DIR = file.path(folder, "python"), not_registered
+  )
+  source
+}
 
-# An earlier bundle has bundle.dcf, an incomplete one the folder "making". Other folders may have a
-# folder "python", too.
+# Where uv gets and puts things when it installs from a copy of a bundle.
+bundle_source <- function(copy, bundle) {
+  list(
+    uv = file.path(copy, uv_name()),
+    python = bundle$python, other_python = bundle$python, only_python = bundle$python,
+    arguments = c("--offline", bundle$index),
+    env = c(
+      UV_CACHE_DIR = file.path(copy, "cache"), UV_NO_CACHE = "false",
+      UV_PYTHON_CACHE_DIR = file.path(copy, "python"), managed_python_place(),
+      # uv's cache knows a package by its index, which the settings of this machine may not name.
+      UV_NO_CONFIG = "1", UV_DEFAULT_INDEX = "", UV_INDEX = "", UV_EXTRA_INDEX_URL = ""
+    )
+  )
+}
+
+# The indexes from which this machine's settings have uv get packages, without passwords.
+index_arguments <- function(source, python) {
+  output <- run_tool(source$uv, c(
+    "pip", "compile", "--quiet", "--offline", "--no-header", "--emit-index-url",
+    "--python", python, "-"
+  ), source$env)
+  lines <- grep("^--(extra-)?index-url ", output, value = TRUE)
+  sub("^--index-url", "--default-index", sub("://[^/@]*@", "://", lines))
+}
+
+# An earlier bundle has bundle.dcf, and so has one that was not completed.
 check_bundle_place <- function(dir, call) {
   there <- list.files(dir, all.files = TRUE, no.. = TRUE)
-  is_bundle <- all(there %in% bundle_parts) && any(c("bundle.dcf", "making") %in% there)
+  is_bundle <- all(there %in% bundle_parts()) && "bundle.dcf" %in% there
   if (file.exists(dir) && !dir.exists(dir) || length(there) && !is_bundle) {
     gym_abort(
       paste0("`dir` must be an empty folder or an earlier bundle, not \"", dir, "\"."),
@@ -75,74 +106,70 @@ check_bundle_place <- function(dir, call) {
   }
 }
 
-empty_bundle <- function(dir, call) {
-  # Again, as the folder may have changed while this session waited for the install lock.
-  check_bundle_place(dir, call)
-  # First the folder by which an incomplete bundle is known: removing the rest may be interrupted.
-  dir.create(file.path(dir, "making"), recursive = TRUE, showWarnings = FALSE)
-  if (!dir.exists(file.path(dir, "making"))) {
-    abort_install(paste0("The folder ", dir, " cannot be made."), call = call)
-  }
-  unlink(file.path(dir, setdiff(bundle_parts, "making")), recursive = TRUE)
-  unlink(list.files(file.path(dir, "making"), full.names = TRUE), recursive = TRUE)
-  normalizePath(dir, winslash = "/")
-}
+bundle_parts <- function() c("bundle.dcf", "SHA256SUMS", uv_name(), "cache", "python")
 
-# The Python that downloads the packages, and for which they are: one that uv installs, whose
-# archive becomes a part of the bundle, or one of this machine.
-bundle_python <- function(dir, uv, call) {
-  if (!is.null(uv)) {
-    place <- file.path(dir, "making", "python")
-    output <- run_tool(
-      uv, c("python", "install", managed_python_version, "--install-dir", place),
-      env = c(UV_PYTHON_CACHE_DIR = file.path(dir, "python"), not_registered)
-    )
-    found <- list.files(place, paste0("^cpython-", managed_python_version), full.names = TRUE)
-    if (!failed(output) && length(found)) {
-      python <- file.path(found[[1L]], if (is_windows()) "python.exe" else "bin/python3")
-      return(list(python = python, managed = TRUE))
-    }
-  }
-  python <- find_base_python(with_venv = TRUE)
-  if (is.null(python)) {
-    if (is.null(uv)) output <- character()
-    abort_tool(
-      "There is no Python for which the packages could be downloaded", output, call,
-      more = "Python 3.10 to 3.13 with `venv` is needed where uv cannot install one."
-    )
-  }
-  list(python = python, managed = FALSE)
-}
-
-download_wheels <- function(dir, base, extras, call) {
-  venv <- file.path(dir, "making", "venv")
-  output <- run_tool(base$python, c("-I", "-m", "venv", venv))
-  if (!failed(output)) {
-    python <- file.path(venv, if (is_windows()) "Scripts/python.exe" else "bin/python")
-    output <- run_tool(python, c(
-      "-I", "-m", "pip", "download", "--require-hashes", "--only-binary", ":all:", "--no-deps",
-      "--dest", file.path(dir, "wheels"), as.vector(rbind("-r", lock_files(extras)))
-    ))
-  }
-  if (failed(output)) {
-    abort_tool("The server's packages could not be downloaded", output, call)
-  }
-}
-
-# Copies uv into the bundle. Returns the copy's SHA-256, NULL when there is no copy that works.
-copy_uv <- function(uv, dir) {
-  if (is.null(uv)) {
-    return(NULL)
-  }
-  place <- file.path(dir, "uv", uv_name())
-  dir.create(dirname(place))
+copy_uv <- function(uv, new, call) {
+  copy <- file.path(new, uv_name())
   # The uv on the PATH may be a script that calls the real one.
-  if (file.copy(uv, place) && uv_works(place)) {
-    return(file_sha256(place))
+  if (!file.copy(uv, copy) || !uv_works(copy)) {
+    abort_bundle(
+      paste0("The uv in ", uv, " does not run from another folder, so no bundle can hold it."),
+      "`Sys.setenv(GYM_UV = )` names another one.", call
+    )
   }
-  unlink(dirname(place), recursive = TRUE)
-  NULL
 }
+
+# uv does without the links in its cache, which most sticks cannot hold.
+remove_links <- function(dir) {
+  files <- list.files(dir, recursive = TRUE, include.dirs = TRUE, full.names = TRUE)
+  links <- files[nzchar(Sys.readlink(files))]
+  file.remove(links[!is.na(links)])
+}
+
+write_sums <- function(dir) {
+  files <- list.files(dir, recursive = TRUE, all.files = TRUE)
+  hashes <- vapply(file.path(dir, files), file_sha256, "")
+  writeLines(paste0(hashes, "  ", files), file.path(dir, "SHA256SUMS"))
+}
+
+# The manifest is complete at the end, when the bundle is.
+replace_bundle <- function(new, dir, fields, call) {
+  # Again, as the folder may have changed during the download.
+  check_bundle_place(dir, call)
+  dir.create(dir, recursive = TRUE, showWarnings = FALSE)
+  manifest <- file.path(dir, "bundle.dcf")
+  tryCatch(suppressWarnings(write.dcf(list(Complete = "no"), manifest)), error = function(cnd) {
+    abort_bundle(paste0("The folder ", dir, " cannot be written."), "Name another one.", call)
+  })
+  unlink(file.path(dir, setdiff(bundle_parts(), "bundle.dcf")), recursive = TRUE)
+  copy_bundle(new, dir, call)
+  write.dcf(fields, manifest)
+}
+
+# Copies the files that a bundle lists, and checks that they arrived as they were put there.
+copy_bundle <- function(from, to, call) {
+  sums <- readLines(file.path(from, "SHA256SUMS"))
+  files <- substring(sums, 67L)
+  for (folder in unique(dirname(file.path(to, files)))) {
+    dir.create(folder, recursive = TRUE, showWarnings = FALSE)
+  }
+  suppressWarnings(file.copy(file.path(from, files), file.path(to, files)))
+  file.copy(file.path(from, "SHA256SUMS"), to)
+  # Sticks do not keep which files are programs.
+  Sys.chmod(file.path(to, files), "755")
+  right <- mapply(has_hash, file.path(to, files), substr(sums, 1L, 64L))
+  if (!all(right)) {
+    abort_bundle(
+      paste0("The bundle in ", from, " could not be copied to ", to, ", and was not run: ",
+             files[!right][[1L]], " is not what SHA256SUMS lists."),
+      paste("It was damaged or changed on the way: copy the bundle again, or make it anew.",
+            "Or the disk is full: make room."),
+      call
+    )
+  }
+}
+
+has_hash <- function(path, hash) file.exists(path) && identical(file_sha256(path), hash)
 
 inform_of_bundle <- function(bundle) {
   files <- list.files(bundle$dir, recursive = TRUE, full.names = TRUE)
@@ -162,73 +189,42 @@ bundle_system <- function() {
   paste0(system_name(), if (startsWith(system_name(), "linux") && has_musl()) "-musl")
 }
 
-read_bundle <- function(dir, call) {
+# Reads a bundle's manifest and checks that it can be installed here. Nothing is copied.
+read_bundle <- function(dir, extras, call) {
   dir <- absolute_path(dir)
   fields <- tryCatch(
     read.dcf(file.path(dir, "bundle.dcf"))[1L, ], error = function(cnd) NULL,
     warning = function(cnd) NULL
   )
-  if (!all(c("System", "Lock", "Extras", "Python", "Contains", "UvHash") %in% names(fields))) {
+  if (!all(c("System", "Lock", "Extras", "Python", "Index") %in% names(fields))) {
     abort_bundle(
       paste0("There is no complete bundle in ", dir, "."),
-      "`gym_server_bundle()` makes one; an incomplete one has no file bundle.dcf.", call
+      "`gym_server_bundle()` makes one.", call
     )
   }
+  words <- function(field) strsplit(fields[[field]], "[[:space:]]+")[[1L]]
+  check_bundle(fields, setdiff(extras, words("Extras")), extras, call)
   dir <- normalizePath(dir, winslash = "/")
-  uv <- file.path(dir, "uv", uv_name())
   list(
-    dir = dir, system = fields[["System"]], lock = fields[["Lock"]],
-    extras = strsplit(fields[["Extras"]], " ", fixed = TRUE)[[1L]], python = fields[["Python"]],
-    uv = if (fields[["UvHash"]] != "none") uv, hash_of_uv = fields[["UvHash"]],
-    has_python = fields[["Contains"]] == "uv and Python"
+    dir = dir, python = fields[["Python"]], index = words("Index"),
+    has_python = length(list.files(file.path(dir, "python"))) > 0L
   )
 }
 
-abort_bundle <- function(problem, fix, call) {
-  abort_install(c(problem, i = fix), call = call)
-}
-
-# Plans an installation from a bundle, as install_plan() does. Before the bundle's uv is run,
-# copy_bundled_uv() must copy it.
-bundle_plan <- function(dir, extras, call) {
-  bundle <- read_bundle(dir, call)
-  check_bundle(bundle, extras, call)
-  plan_from_bundle(bundle, extras, call)
-}
-
-plan_from_bundle <- function(bundle, extras, call) {
-  # Another uv would install another Python than the one whose archive is in the bundle.
-  uv <- if (is.null(bundle$uv)) find_uv(call) else bundled_uv()
-  python <- if (is.null(uv) || !bundle$has_python) {
-    find_base_python(with_venv = is.null(uv), versions = bundle$python) %||% abort_bundle(
-      paste0("The bundle is for Python ", bundle$python, " and contains none."),
-      paste0("Install Python ", bundle$python, " on this machine, or make the bundle on one where ",
-             "uv can install a Python."),
-      call
-    )
-  }
-  list(
-    how = if (is.null(uv)) "python" else "uv", tool = if (is.null(uv)) python else uv,
-    extras = extras, bundle = bundle, base_python = python,
-    megabytes = c(download = 0, disk = lock_megabytes(extras)[["disk"]])
-  )
-}
-
-check_bundle <- function(bundle, extras, call) {
-  if (bundle$system != bundle_system()) {
+check_bundle <- function(fields, lacking, extras, call) {
+  if (fields[["System"]] != bundle_system()) {
     abort_bundle(
-      paste0("The bundle was made for another system, ", bundle$system, "; this one is ",
+      paste0("The bundle was made for another system, ", fields[["System"]], "; this one is ",
              bundle_system(), "."),
       "Make it with `gym_server_bundle()` on a machine of this kind.", call
     )
   }
-  if (bundle$lock != lock_hash()) {
+  if (fields[["Lock"]] != lock_hash()) {
     abort_bundle(
       "The bundle was made by another version of this package, which needs other packages.",
       "Install the same version of the package on both machines, and make the bundle anew.", call
     )
   }
-  lacking <- setdiff(extras, bundle$extras)
   if (length(lacking)) {
     abort_bundle(
       paste0("The bundle lacks ", paste0("\"", lacking, "\"", collapse = ", "), "."),
@@ -239,33 +235,6 @@ check_bundle <- function(bundle, extras, call) {
   }
 }
 
-# A bundle's uv is copied here: programs cannot be run from some sticks and network shares.
-bundled_uv <- function() file.path(install_root(), "uv", "bundle", uv_name())
-
-# Copies the bundle's uv, unless that was done before, and runs it only if it has the SHA-256 that
-# the manifest names. If it does not run here, another uv is looked for. Returns the plan.
-copy_bundled_uv <- function(plan, call) {
-  bundle <- plan$bundle
-  if (is.null(bundle$uv)) {
-    return(plan)
-  }
-  uv <- bundled_uv()
-  if (!has_hash(uv, bundle$hash_of_uv)) {
-    dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
-    if (!has_hash(bundle$uv, bundle$hash_of_uv)) {
-      abort_bundle(
-        paste0("The uv in ", bundle$dir, " is not the one that was put there, and was not run."),
-        "It was damaged or changed on the way: copy the bundle again, or make it anew.", call
-      )
-    }
-    file.copy(bundle$uv, uv, overwrite = TRUE)
-    Sys.chmod(uv, "755")
-  }
-  if (has_hash(uv, bundle$hash_of_uv) && uv_works(uv)) {
-    return(plan)
-  }
-  bundle$uv <- NULL
-  plan_from_bundle(bundle, plan$extras, call)
+abort_bundle <- function(problem, fix, call) {
+  abort_install(c(problem, i = fix), call = call)
 }
-
-has_hash <- function(path, hash) file.exists(path) && identical(file_sha256(path), hash)

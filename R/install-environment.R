@@ -1,81 +1,121 @@
-# Making an environment, in a folder of its own: a Python, the packages of the lock files, a trial,
-# and the manifest at the end.
+# Making the environment: uv makes it from a Python and installs the packages of the lock files;
+# then a trial, and the manifest at the end. Sessions that install at once use the same folder: uv
+# has one wait for the other, and finds everything there.
 
 install_environment <- function(plan, call) {
   started <- Sys.time()
-  write_log(c("", paste("##", format(started), "gym", utils::packageVersion("gym"), plan$how)))
-  folder <- make_folder(call)
-  complete <- FALSE
-  on.exit(end_folder(folder, complete))
-  plan <- copy_bundled_uv(plan, call)
+  folder <- environment_folder()
+  make_folder(folder, call)
+  write_log(c("", paste("##", format(started), "gym", utils::packageVersion("gym"))))
   cli::cli_inform(c(i = "Installing {describe_plan(plan)}: {describe_download(plan)}."))
-  uv <- if (plan$how == "download") install_uv(call) else if (plan$how == "uv") plan$tool
-  make_environment(folder, uv, plan, call)
-  install_packages(folder, uv, plan, call)
-  python <- environment_python(folder)
-  trial <- try_environment(python, plan$extras)
-  if (failed(trial)) {
-    abort_tool("The packages are installed, but the server cannot be run with them", trial, call)
+  source <- if (is.null(plan$bundle)) {
+    network_source(plan$uv %||% install_uv(call))
+  } else {
+    copy <- tempfile("bundle-", install_root())
+    on.exit(unlink(copy, recursive = TRUE))
+    copy_bundle(plan$bundle$dir, copy, call)
+    bundle_source(copy, plan$bundle)
   }
-  write_manifest(folder, plan$extras, call)
-  complete <- TRUE
-  remove_other_folders(keep = folder)
+  make_environment(folder, source, plan$extras, call)
+  write_extras(folder, plan$extras, call)
+  remove_old_folders()
   seconds <- as.numeric(difftime(Sys.time(), started, units = "secs"))
   cli::cli_inform(c(v = "Installed in {ceiling(seconds)} s, in {.path {folder}}."))
-  python
+  environment_python(folder)
 }
 
-make_environment <- function(folder, uv, plan, call) {
-  if (is.null(uv)) {
-    return(make_venv(plan$tool, c("-I", "-m", "venv"), plan$tool, folder, call))
-  }
-  if (is.null(plan$base_python)) {
-    output <- run_tool(
-      uv, c("venv", "--managed-python", "--python", managed_python_version, venv_folder(folder)),
-      env = c(managed_python_place(), bundled_python_place(plan$bundle))
-    )
-    if (!failed(output)) {
-      return(invisible())
-    }
-    plan$base_python <- other_than_managed(plan, output, call)
-    unlink(venv_folder(folder), recursive = TRUE)
-  }
-  # The path of a Python, as a command such as python3 may stand for several versions.
-  make_venv(
-    uv, c("venv", "--no-managed-python", "--no-python-downloads", "--python", plan$base_python),
-    plan$base_python, folder, call
+#' Where uv gets and puts things
+#' @return A list: `uv`, its path; `python`, the version that it installs; `other_python`, which of
+#'   the machine's Pythons serve where it cannot; `named_python`, the user's choice, `NULL` when
+#'   there is none; `only_python`, the version that the environment must have, `NULL` for any;
+#'   `arguments`, more of them for installing packages; `env`, environment variables.
+#' @noRd
+network_source <- function(uv) {
+  list(
+    uv = uv, python = managed_python_version, other_python = "cpython>=3.10,<3.14",
+    named_python = chosen_python(), env = managed_python_place()
   )
 }
 
-venv_folder <- function(folder) file.path(folder, "venv")
+managed_python_version <- "3.12"
 
-make_venv <- function(tool, arguments, python, folder, call) {
-  output <- run_tool(tool, c(arguments, venv_folder(folder)))
-  if (failed(output)) {
-    abort_tool(paste("No environment could be made with", python), output, call)
+# UV_PYTHON is uv's own variable: a path, or a version.
+chosen_python <- function() {
+  named <- Sys.getenv("UV_PYTHON")
+  if (nzchar(named)) named
+}
+
+make_environment <- function(folder, source, extras, call) {
+  if (!has_venv(folder, source$only_python)) {
+    make_venv(folder, source, call)
+  }
+  install_packages(folder, source, extras, call)
+  trial <- try_environment(environment_python(folder), extras)
+  if (failed(trial)) {
+    # Files may have been deleted from packages that uv takes for installed.
+    install_packages(folder, source, extras, call, "--reinstall")
+    trial <- try_environment(environment_python(folder), extras)
+  }
+  if (failed(trial)) {
+    abort_tool("The packages are installed, but the server cannot be run with them", trial, call)
   }
 }
 
-# Another Python than the one that uv installs: many networks block the place where uv gets its own.
-other_than_managed <- function(plan, output, call) {
-  versions <- plan$bundle$python %||% lock_pythons
-  python <- find_base_python(with_venv = FALSE, versions = versions)
-  if (is.null(python)) {
+# A Python without pyvenv.cfg would be taken for the one that the environment was made from, and the
+# packages be installed there.
+has_venv <- function(folder, version = NULL) {
+  python <- environment_python(folder)
+  about <- if (file.exists(file.path(folder, "venv", "pyvenv.cfg"))) probe_python(python)
+  !is.null(about) && about$version == (version %||% about$version)
+}
+
+install_packages <- function(folder, source, extras, call, ...) {
+  output <- run_tool(source$uv, c(
+    "pip", "sync", "--python", environment_python(folder), "--require-hashes", "--no-build", ...,
+    source$arguments, lock_files(extras)
+  ), source$env)
+  if (failed(output)) {
+    abort_tool("The server's packages could not be installed", output, call)
+  }
+}
+
+make_venv <- function(folder, source, call) {
+  venv <- function(...) {
+    run_tool(source$uv, c("venv", "--allow-existing", ..., file.path(folder, "venv")), source$env)
+  }
+  if (!is.null(source$named_python)) {
+    output <- venv("--python", source$named_python)
+    if (failed(output)) {
+      abort_tool(
+        paste("No environment could be made with the Python that UV_PYTHON names,",
+              source$named_python),
+        output, call, more = "`Sys.unsetenv(\"UV_PYTHON\")` has uv install one."
+      )
+    }
+    return(invisible())
+  }
+  output <- venv("--managed-python", "--python", source$python)
+  if (!failed(output)) {
+    return(invisible())
+  }
+  # Many networks block the place where uv gets its own.
+  other <- venv("--no-managed-python", "--no-python-downloads", "--python", source$other_python)
+  if (failed(other)) {
     abort_tool(
-      paste0("uv could not install a Python, and there is no Python ",
-             paste(range(versions), collapse = " to "), " on this machine"),
+      paste0("uv could not install Python ", source$python,
+             ", and found none on this machine that serves as well (", source$other_python, ")"),
       output, call,
-      more = c(
-        paste("Install one of these and call `gym_server_install()` again; or set",
-              "UV_PYTHON_INSTALL_MIRROR to a place from which uv can get its Pythons.")
+      more = paste(
+        "Install one of these and call `gym_server_install()` again; or set",
+        "UV_PYTHON_INSTALL_MIRROR to a place from which uv can get its Pythons."
       )
     )
   }
   cli::cli_inform(c(
-    i = "uv could not install a Python of its own; {.path {python}} serves as well.",
+    i = "uv could not install a Python of its own; one of this machine's serves as well.",
+    " " = grep("^Using ", other, value = TRUE)[1L],
     " " = "The reason is in {.path {install_log()}}."
   ))
-  python
 }
 
 # uv's Pythons lie beside the environments, so that they are removed together, and on Windows not in
@@ -85,49 +125,27 @@ managed_python_place <- function() {
   c(UV_PYTHON_INSTALL_DIR = if (nzchar(place)) place else managed_python_folder(), not_registered)
 }
 
+managed_python_folder <- function() file.path(install_root(), "python")
+
 # uv puts no command on the PATH and makes no entry in the registry.
 not_registered <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0")
 
-bundled_python_place <- function(bundle) {
-  if (!is.null(bundle)) {
-    c(UV_PYTHON_CACHE_DIR = file.path(bundle$dir, "python"))
-  }
-}
-
-install_packages <- function(folder, uv, plan, call) {
-  python <- environment_python(folder)
-  source <- if (!is.null(plan$bundle)) {
-    c("--no-index", "--find-links", file.path(plan$bundle$dir, "wheels"))
-  }
-  requirements <- as.vector(rbind("-r", lock_files(plan$extras)))
-  output <- if (is.null(uv)) {
-    run_tool(python, c(
-      "-I", "-m", "pip", "install", "--require-hashes", "--only-binary", ":all:", "--no-deps",
-      source, requirements
-    ))
-  } else {
-    run_tool(uv, c(
-      "pip", "install", "--python", python, "--require-hashes", "--no-build", "--no-deps",
-      source, requirements
-    ))
-  }
-  if (failed(output)) {
-    abort_tool("The server's packages could not be installed", output, call)
-  }
-}
-
-# Imports the server as it will be run, and looks for the extras' modules. The exit status alone
-# does not suffice: a Python that is an empty file has the exit status 0, too.
+# Imports the server as it will be run, looks for the extras' modules, and whether each file that
+# was installed is still there. The exit status alone does not suffice: a Python that is an empty
+# file has the exit status 0, too.
 try_environment <- function(python, extras) {
   modules <- c(
     box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
   )
   modules <- modules[names(modules) %in% extras]
   script <- c(
-    "import importlib.util",
+    "import csv, importlib.metadata, importlib.util",
     "import gym_server.cli.main, gymnasium.envs.classic_control, pygame",
     sprintf("if not importlib.util.find_spec('%s'): raise SystemExit('%s is missing')",
             modules, modules),
+    "for package in importlib.metadata.distributions():",
+    "    for file, *_ in csv.reader((package.read_text('RECORD') or '').splitlines()):",
+    "        if not package.locate_file(file).exists(): raise SystemExit(f'{file} is missing')",
     sprintf("print('%s')", it_runs)
   )
   output <- run_tool(python, c("-c", paste(script, collapse = "\n")), env = c(

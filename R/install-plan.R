@@ -1,26 +1,29 @@
-# Planning an installation: with which tool, for which Python, how many megabytes.
+# Planning an installation, and what the user is told and asked before it: with which uv, how many
+# megabytes, where.
 
 #' Plan an installation
 #'
 #' Nothing is changed and nothing downloaded.
 #' @param extras All extras that the environment will hold.
-#' @return A list: `how`, `"uv"` (with the uv found), `"python"` (a Python's venv and pip) or
-#'   `"download"` (uv itself is downloaded first); `tool`, the path of the uv or the Python,
-#'   `NULL` for a download; `megabytes`, about how much is downloaded and how much it takes on
-#'   the disk, a numeric vector with the names `download` and `disk`; `extras`.
+#' @param bundle What read_bundle() returns, `NULL` when the network is used.
+#' @return A list: `extras`; `bundle`; `uv`, the path of the uv found, `NULL` when the bundle's is
+#'   used or uv is downloaded first; `new_python`, whether uv installs one; `megabytes`, about how
+#'   much is downloaded and how much it takes on the disk, a numeric vector with the names
+#'   `download` and `disk`.
 #' @noRd
-install_plan <- function(extras = character(), call = rlang::caller_env()) {
-  uv <- find_uv(call)
-  python <- if (is.null(uv)) find_base_python(with_venv = TRUE)
-  how <- if (!is.null(uv)) "uv" else if (!is.null(python)) "python" else "download"
+install_plan <- function(extras = character(), bundle = NULL, call = rlang::caller_env()) {
+  uv <- if (is.null(bundle)) find_uv(call)
   megabytes <- lock_megabytes(extras)
-  if (how != "python" && !has_managed_python()) {
+  has_python <- has_venv(environment_folder(), bundle$python) || has_managed_python()
+  installs <- if (is.null(bundle)) is.null(chosen_python()) else bundle$has_python
+  new_python <- installs && !has_python
+  if (new_python) {
     megabytes <- megabytes + managed_python_megabytes
   }
-  megabytes <- megabytes + switch(how, download = uv_megabytes, python = pip_megabytes, 0)
-  list(
-    how = how, tool = if (is.null(uv)) python else uv, megabytes = megabytes, extras = extras
-  )
+  if (is.null(bundle) && is.null(uv)) {
+    megabytes <- megabytes + uv_megabytes
+  }
+  list(extras = extras, bundle = bundle, uv = uv, new_python = new_python, megabytes = megabytes)
 }
 
 # Approximate sizes on Linux with an Intel processor: of the Python that uv installs, and of the uv
@@ -28,56 +31,43 @@ install_plan <- function(extras = character(), call = rlang::caller_env()) {
 managed_python_megabytes <- c(download = 35, disk = 110)
 uv_megabytes <- c(download = 20, disk = 40)
 
-# pip itself, and the bytecode that it compiles.
-pip_megabytes <- c(download = 0, disk = 50)
-
-managed_python_version <- "3.12"
-
-managed_python_folder <- function() file.path(install_root(), "python")
-
 has_managed_python <- function() {
   start <- paste0("^cpython-", gsub(".", "[.]", managed_python_version, fixed = TRUE))
   length(list.files(managed_python_folder(), start)) > 0L
 }
 
-# Finds a Python on this machine that an environment can be made from; NULL when there is none. If
-# uv makes the environment, the Python needs no venv and pip, which Debian packages separately.
-find_base_python <- function(with_venv, versions = lock_pythons) {
-  Find(function(python) {
-    about <- probe_python(python)
-    isTRUE(about$fits) && about$version %in% versions && (about$venv || !with_venv)
-  }, Filter(Negate(is_installed_python), python_candidates()))
-}
-
-# Asks a Python for its version, whether the lock files are for it, and whether it can make
-# environments. Returns NULL for a Python that does not run.
-probe_python <- function(python) {
-  output <- ask_program(
-    python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
-  )$stdout
-  words <- strsplit(trimws(output), " ", fixed = TRUE)[[1L]]
-  if (length(words) != 5L || words[[1L]] != "python") {
-    return(NULL)
-  }
-  version <- words[[2L]]
-  list(
-    version = version,
-    fits = version %in% lock_pythons && words[[3L]] == "CPython" && words[[4L]] == "64",
-    venv = words[[5L]] == "venv"
+confirm_install <- function(plan, call = rlang::caller_env()) {
+  what <- c(
+    "The server that plays the environments needs Python packages on this machine.",
+    paste0("What:  ", describe_plan(plan)),
+    sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
+    paste0("Where: ", install_root())
   )
+  # No by default: an empty line of a pasted script must not start a download.
+  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = FALSE, call = call)
 }
 
-lock_pythons <- c("3.10", "3.11", "3.12", "3.13")
+describe_plan <- function(plan) {
+  uv <- if (!is.null(plan$bundle)) {
+    "with the bundle's uv"
+  } else if (is.null(plan$uv)) {
+    paste("downloading uv", uv_release$version)
+  } else {
+    paste("with", plan$uv)
+  }
+  python <- if (plan$new_python) {
+    paste(" and installing Python", plan$bundle$python %||% managed_python_version)
+  }
+  paste0(describe_packages(plan$extras), ", ", uv, python)
+}
 
-# What probe_python() runs. It is run with -I, which every Python that the server can use knows.
-probe <- paste(
-  "import platform, sys",
-  "try:",
-  "    import ensurepip, venv",
-  "    found = 'venv'",
-  "except ImportError:",
-  "    found = '-'",
-  "print('python', '%d.%d' % sys.version_info[:2], platform.python_implementation(),",
-  "      64 if sys.maxsize > 2**32 else 32, found)",
-  sep = "\n"
-)
+describe_packages <- function(extras) {
+  paste0("the games of Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
+}
+
+describe_download <- function(plan) {
+  if (!is.null(plan$bundle)) {
+    return(paste0("from ", plan$bundle$dir, ", without a network"))
+  }
+  sprintf("about %.0f MB to download", plan$megabytes[["download"]])
+}

@@ -1,5 +1,5 @@
-# Running uv and pip: their output goes into a log, and a failure becomes an error that says what to
-# do.
+# Running uv and Python: their output goes into a log, and a failure becomes an error that says what
+# to do.
 
 abort_install <- function(message, ..., call = rlang::caller_env()) {
   gym_abort(message, class = "gym_error_install", ..., call = call)
@@ -10,9 +10,6 @@ abort_install <- function(message, ..., call = rlang::caller_env()) {
 tool_environment <- function(more = character()) {
   own <- c(
     PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "",
-    # The user's settings may have pip install elsewhere.
-    PIP_USER = "", PIP_TARGET = "", PIP_PREFIX = "", PIP_REQUIRE_VIRTUALENV = "",
-    PIP_DISABLE_PIP_VERSION_CHECK = "1", PIP_NO_INPUT = "1", PIP_PROGRESS_BAR = "off",
     UV_NO_PROGRESS = "1", NO_COLOR = "1",
     own_library_path()
   )
@@ -28,43 +25,22 @@ install_log <- function() file.path(install_root(), "install.log")
 #' @noRd
 run_tool <- function(command, arguments, env = character()) {
   write_log(paste(c(">", command, arguments), collapse = " "))
-  process <- with_own_tree_id(tryCatch(
-    processx::process$new(
+  run <- with_own_tree_id(tryCatch(
+    processx::run(
       command, arguments,
-      stdout = "|", stderr = "2>&1", env = tool_environment(env),
-      # Not the session's working directory, where a project may have settings for uv and pip.
-      wd = install_root(), cleanup_tree = TRUE, windows_hide_window = TRUE
+      error_on_status = FALSE, stderr_to_stdout = TRUE, env = tool_environment(env),
+      # Not the session's working directory, where a project may have settings for uv.
+      wd = install_root(), cleanup_tree = TRUE, windows_hide_window = TRUE,
+      stdout_line_callback = function(line, process) write_log(line),
+      # Shows that something is going on.
+      spinner = cli::is_dynamic_tty()
     ),
-    error = function(cnd) conditionMessage(cnd)
-  ))
-  if (is.character(process)) {
-    write_log(process)
-    return(structure(process, status = -1L))
-  }
-  # Also when the user interrupts.
-  on.exit(if (process$is_alive()) process$kill_tree())
-  output <- character()
-  # Shows that something is going on.
-  spinner <- if (cli::is_dynamic_tty()) cli::make_spinner()
-  on.exit(if (!is.null(spinner)) spinner$finish(), add = TRUE)
-  repeat {
-    if (!is.null(spinner)) spinner$spin()
-    process$poll_io(200L)
-    lines <- process$read_output_lines()
-    if (length(lines)) write_log(lines)
-    output <- c(output, lines)
-    touch_install_lock()
-    if (!process$is_incomplete_output() && !process$is_alive()) {
-      return(structure(output, status = process$get_exit_status()))
+    error = function(cnd) {
+      write_log(conditionMessage(cnd))
+      list(stdout = conditionMessage(cnd), status = -1L)
     }
-  }
-}
-
-# Runs a program that is only asked something. As several may be asked one after the other, the
-# install lock is touched after each.
-ask_program <- function(command, arguments, timeout = 30, env = NULL) {
-  on.exit(touch_install_lock())
-  run_quietly(command, arguments, timeout, env)
+  ))
+  structure(strsplit(run$stdout, "\r?\n")[[1L]], status = run$status)
 }
 
 failed <- function(output) !identical(attr(output, "status"), 0L)
@@ -88,7 +64,7 @@ abort_tool <- function(what, output, call, more = NULL) {
       x = if (length(lines)) paste(lines, collapse = "\n"),
       rlang::set_names(c(install_advice(output), more), "i"),
       i = paste0("The full output is in ", install_log(), "."),
-      i = "Nothing that was installed before has changed; `gym_server_install()` begins anew."
+      i = "What was installed before is still there; `gym_server_install()` goes on from here."
     ),
     output = output,
     call = call
@@ -98,14 +74,14 @@ abort_tool <- function(what, output, call, more = NULL) {
 # The lines that name an error and what follows them; the last lines where there is none.
 error_lines <- function(output, n = 6L) {
   lines <- trimws(output[nzchar(trimws(output))])
-  begins <- grep("^error\\b|connection broken by", lines, ignore.case = TRUE)
+  begins <- grep("^error\\b", lines, ignore.case = TRUE)
   if (length(begins)) {
     return(utils::head(lines[seq(begins[[1L]], length(lines))], n))
   }
   utils::tail(lines, n)
 }
 
-# What to do about a failure, which is known by the messages of uv, pip and the system. The first
+# What to do about a failure, which is known by the messages of uv and the system. The first
 # entry of `failures` that fits counts.
 install_advice <- function(output) {
   text <- paste(output, collapse = "\n")
@@ -128,26 +104,24 @@ failures <- list(
     )
   ),
   list(
-    words = "hash(es)? mismatch|do not match the hashes|mismatched hash",
+    words = "hash(es)? mismatch|mismatched hash",
     advice = c(
       "A file that came is not the one that the package was made for, and was refused.",
       "A proxy or mirror may have changed it; try again, or in another network."
     )
   ),
   list(
-    words = paste0(
-      "certificate|unknownissuer|ssl: |sslerror|invalid peer|tls handshake|schannel"
-    ),
+    words = "certificate|unknownissuer|ssl: |invalid peer|tls handshake|schannel",
     advice = c(
       paste("The network's certificate is not trusted, as behind a company's or university's",
             "proxy."),
-      paste("Set SSL_CERT_FILE to the file of that network's certificates (for pip also",
-            "PIP_CERT), or UV_SYSTEM_CERTS=1 (UV_NATIVE_TLS=1 for an older uv) to use those of",
-            "the system; `Sys.setenv()` sets them for this session.")
+      paste("Set SSL_CERT_FILE to the file of that network's certificates, or UV_SYSTEM_CERTS=1",
+            "(UV_NATIVE_TLS=1 for an older uv) to use those of the system; `Sys.setenv()` sets",
+            "them for this session.")
     )
   ),
   list(
-    words = "\\b407\\b|proxyerror|proxy|tunnel",
+    words = "\\b407\\b|proxy|tunnel",
     advice = paste(
       "The network's proxy did not let it through. HTTPS_PROXY must be its address, such as",
       "\"http://user:password@proxy.example:8080\"; `Sys.setenv(HTTPS_PROXY = )` sets it for",
@@ -164,8 +138,7 @@ failures <- list(
   list(
     words = paste0(
       "dns error|resolve|getaddrinfo|name resolution|timed? ?out|unreachable|connection|",
-      "connect error|connect to|error sending request|failed to (fetch|download)|",
-      "forbidden|could not fetch|from versions: none"
+      "connect error|connect to|error sending request|failed to (fetch|download)|forbidden"
     ),
     advice = c(
       "The network was not reached, or does not let these files through.",
@@ -176,8 +149,8 @@ failures <- list(
   ),
   list(
     words = paste0(
-      "no matching distribution|no solution found|no (usable )?wheels?|not a supported wheel|",
-      "doesn't have a (source distribution or )?wheel|could not find a version"
+      "no solution found|no (usable )?wheels?|not a supported wheel|",
+      "doesn't have a (source distribution or )?wheel"
     ),
     advice = c(
       "The lock file has a package that does not fit this Python or this system.",

@@ -47,7 +47,7 @@ uv_candidates <- function() {
 }
 
 uv_works <- function(uv, timeout = 30) {
-  output <- ask_program(uv, "--version", timeout)$stdout
+  output <- run_quietly(uv, "--version", timeout)$stdout
   version <- regmatches(output, regexpr("[0-9]+[.][0-9]+[.][0-9]+", output))
   startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
@@ -94,29 +94,21 @@ has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 # Where the downloaded uv is put.
 pinned_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Downloads uv, unless that was done before and it still runs. The archive is unpacked only when its
-# checksum is right. UV_DOWNLOAD_URL is a variable of uv's own installer.
+# Downloads uv. The archive is unpacked only when its checksum is right. UV_DOWNLOAD_URL is a
+# variable of uv's own installer.
 install_uv <- function(call) {
-  uv <- pinned_uv()
-  if (file.exists(uv) && uv_works(uv)) {
-    return(uv)
-  }
-  unlink(uv)
   target <- uv_target()
   if (!target %in% names(uv_release$checksums)) {
     abort_install(
-      c(
-        paste0("There is no uv to download for this system (", target, ")."),
-        i = "Install Python 3.10, 3.11, 3.12 or 3.13, then call `gym_server_install()` again."
-      ),
+      c(paste0("There is no uv to download for this system (", target, ")."), i = without_uv()),
       call = call
     )
   }
-  dir.create(dirname(uv), recursive = TRUE, showWarnings = FALSE)
-  archive <- file.path(
-    dirname(uv), paste0("uv-", target, if (is_windows()) ".zip" else ".tar.gz")
-  )
-  on.exit(unlink(archive))
+  # A folder of its own, as another session may download uv, too.
+  place <- tempfile("download-", file.path(install_root(), "uv"))
+  dir.create(place, recursive = TRUE, showWarnings = FALSE)
+  on.exit(unlink(place, recursive = TRUE))
+  archive <- file.path(place, paste0("uv-", target, if (is_windows()) ".zip" else ".tar.gz"))
   base <- Sys.getenv(
     "UV_DOWNLOAD_URL",
     paste0("https://github.com/astral-sh/uv/releases/download/", uv_release$version)
@@ -124,7 +116,17 @@ install_uv <- function(call) {
   cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
   download_uv(paste0(sub("/+$", "", base), "/", basename(archive)), archive, call)
   check_uv_archive(archive, uv_release$checksums[[target]], call)
-  unpack_uv(archive, uv, call)
+  unpack_uv(archive, call)
+}
+
+# What helps where uv cannot be had.
+without_uv <- function() {
+  paste(
+    "Without uv, install the packages into a Python 3.10 to 3.13 by other means, in a terminal",
+    "for example by", paste0("`python -m pip install ",
+                             quote_for_terminal(system.file("server", package = "gym")), "`,"),
+    "and have GYM_PYTHON name that Python."
+  )
 }
 
 # Five times as much as its archive has.
@@ -146,7 +148,6 @@ download_uv <- function(url, archive, call) {
   on.exit(close(file))
   received <- 0
   keep <- function(bytes) {
-    touch_install_lock()
     received <<- received + length(bytes)
     if (received > most_bytes_of_uv) {
       stop("What is there is larger than ", most_bytes_of_uv / 1e6, " MB.", call. = FALSE)
@@ -160,9 +161,10 @@ download_uv <- function(url, archive, call) {
       write_log(conditionMessage(cnd))
       abort_tool(
         paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
-        more = paste(
-          "uv can also be installed by hand (<https://docs.astral.sh/uv/>), and so can Python",
-          "3.10 to 3.13: `gym_server_install()` takes what it finds."
+        more = c(
+          paste("uv can also be installed by hand (<https://docs.astral.sh/uv/>):",
+                "`gym_server_install()` takes the one that it finds."),
+          without_uv()
         )
       )
     }
@@ -191,10 +193,8 @@ check_uv_archive <- function(archive, expected, call) {
   }
 }
 
-unpack_uv <- function(archive, uv, call) {
-  place <- tempfile("unpacked-", dirname(uv))
-  on.exit(unlink(place, recursive = TRUE))
-  dir.create(place)
+unpack_uv <- function(archive, call) {
+  place <- dirname(archive)
   tryCatch(
     if (is_windows()) {
       utils::unzip(archive, exdir = place)
@@ -204,18 +204,21 @@ unpack_uv <- function(archive, uv, call) {
     error = identity, warning = identity
   )
   unpacked <- list.files(place, paste0("^", uv_name(), "$"), recursive = TRUE, full.names = TRUE)
-  if (length(unpacked)) {
-    Sys.chmod(unpacked[[1L]], "755")
+  Sys.chmod(unpacked, "755")
+  works <- length(unpacked) && uv_works(unpacked[[1L]])
+  if (works) {
+    dir.create(dirname(pinned_uv()), showWarnings = FALSE)
+    file.rename(unpacked[[1L]], pinned_uv())
   }
-  if (!length(unpacked) || !uv_works(unpacked[[1L]]) || !file.rename(unpacked[[1L]], uv)) {
+  if (!works || !file.exists(pinned_uv())) {
     abort_install(
       c(
-        paste("The uv that was downloaded cannot be run from", dirname(uv)),
+        paste("The uv that was downloaded cannot be run from", dirname(pinned_uv())),
         i = "Is the disk full, or are programs not allowed to run from there?",
-        i = "A Python 3.10 to 3.13 on the PATH does without uv."
+        i = without_uv()
       ),
       call = call
     )
   }
-  uv
+  pinned_uv()
 }

@@ -6,20 +6,23 @@
 #'
 #' [uv](https://docs.astral.sh/uv/) does the work where it is found: the program that the
 #' environment variable `GYM_UV` or `RETICULATE_UV` names, one on the `PATH`, in `~/.local/bin`
-#' or the one that reticulate installed. It also installs a Python of its own; where the network
-#' does not let that through, a Python 3.10 to 3.13 on the machine is taken. Without uv such a
-#' Python's `venv` and pip do it, and without both uv is downloaded first, a release that this
-#' package names, checked by its hash.
+#' or the one that reticulate installed. Where there is none it is downloaded first, a release that
+#' this package names, checked by its hash. uv also installs a Python of its own; where the network
+#' does not let that through, a Python 3.10 to 3.13 on the machine is taken. uv's variable
+#' `UV_PYTHON` names another one, by its path or version. Where uv cannot be had, install the
+#' packages into a Python by any other means, and have `GYM_PYTHON` name it: see
+#' `vignette("server")`.
 #'
 #' The environment lies in `tools::R_user_dir("gym", "cache")`. [gym_client()] finds it there.
-#' Extras that were installed before are kept. A call that finds everything there checks it,
-#' says so and changes nothing; what was damaged is made anew.
+#' Extras that were installed before are kept, and servers that run from there find new ones. A
+#' call that finds everything there checks it, says so and changes nothing; what was damaged is
+#' made anew.
 #'
 #' Environment variables change where things come from and go, set by [Sys.setenv()] or in
 #' `~/.Renviron`: `R_USER_CACHE_DIR` is the place of the cache folder; `HTTPS_PROXY` the
 #' network's proxy; `SSL_CERT_FILE` the file of its certificates; `UV_PYTHON_INSTALL_MIRROR`
-#' where uv gets its Pythons, and `UV_DOWNLOAD_URL` where uv itself is downloaded from. uv and
-#' pip go by their own settings, such as those of an institution's mirror.
+#' where uv gets its Pythons, and `UV_DOWNLOAD_URL` where uv itself is downloaded from. uv goes by
+#' its own settings, such as those of an institution's mirror.
 #'
 #' @param extras What to install beside the server, a character vector with any of
 #'   `"toy-text"`, `"box2d"`, `"mujoco"`, `"atari"` and `"video"`; the default is none. The
@@ -48,83 +51,32 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   check_named_python(call)
   wanted <- server_extras[server_extras %in% c(extras, earlier_extras())]
   # A bundle that does not fit is an error also when it is not needed.
-  plan <- if (!is.null(offline)) bundle_plan(offline, wanted, call)
+  bundle <- if (!is.null(offline)) read_bundle(offline, wanted, call)
   there <- installed_server()
   if (has_all(there, wanted)) {
-    needed <- if (!is.null(plan)) "; the bundle was not needed"
+    needed <- if (!is.null(bundle)) "; the bundle was not needed"
     cli::cli_inform(c(v = "The server is installed already, in {.path {there$folder}}{needed}."))
-    if (length(install_folders()) > 1L) {
-      with_install_lock(remove_other_folders(keep = there$folder))
-    }
+    remove_old_folders()
     return(invisible(there$python))
   }
-  plan <- plan %||% install_plan(wanted, call)
+  plan <- install_plan(wanted, bundle, call)
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
-  python <- with_interrupt_message(with_install_lock({
-    there <- installed_server()
-    if (has_all(there, wanted)) {
-      cli::cli_inform(c(v = "Another session has installed it, in {.path {there$folder}}."))
-      there$python
-    } else {
-      install_environment(plan, call)
-    }
-  }))
+  python <- with_interrupt_message(install_environment(plan, call))
   inform_of_precedence(python)
   invisible(python)
 }
 
 with_interrupt_message <- function(code) {
   withCallingHandlers(code, interrupt = function(cnd) {
-    cli::cli_inform(c("!" = "Interrupted: what was begun is removed again."))
+    cli::cli_inform(c("!" = "Interrupted: {.code gym_server_install()} goes on from there."))
   })
 }
 
 # Whether an environment has the extras, and its server can really be imported.
 has_all <- function(there, extras) {
   !is.null(there) && all(extras %in% there$extras) && !failed(try_environment(there$python, extras))
-}
-
-confirm_install <- function(plan, call = rlang::caller_env()) {
-  what <- c(
-    "The server that plays the environments needs Python packages on this machine.",
-    paste0("What:  ", describe_plan(plan)),
-    sprintf("Size:  %s, %.0f MB on the disk", describe_download(plan), plan$megabytes[["disk"]]),
-    paste0("Where: ", install_root())
-  )
-  # No by default: an empty line of a pasted script must not start a download.
-  ask_yes_no(paste(c(what, "Install them?"), collapse = "\n"), default = FALSE, call = call)
-}
-
-describe_plan <- function(plan) {
-  uv <- if (plan$how == "download") {
-    paste("downloading uv", uv_release$version)
-  } else if (is.null(plan$bundle$uv)) {
-    paste("with", plan$tool)
-  } else {
-    "with the bundle's uv"
-  }
-  python <- if (!is.null(plan$base_python)) {
-    paste(" for", plan$base_python)
-  } else if (plan$how != "python") {
-    paste(" and installing Python", managed_python_version)
-  }
-  paste0(
-    describe_packages(plan$extras), ", ",
-    if (plan$how == "python") paste("with pip, for", plan$tool) else paste0(uv, python)
-  )
-}
-
-describe_packages <- function(extras) {
-  paste0("the games of Gymnasium", if (length(extras)) paste0(" (with ", toString(extras), ")"))
-}
-
-describe_download <- function(plan) {
-  if (!is.null(plan$bundle)) {
-    return(paste0("from ", plan$bundle$dir, ", without a network"))
-  }
-  sprintf("about %.0f MB to download", plan$megabytes[["download"]])
 }
 
 # The Python that GYM_PYTHON names is used before an installed one: if it cannot run the server, an
@@ -150,6 +102,32 @@ check_named_python <- function(call) {
   )
 }
 
+# Asks a Python for its version, and whether the lock files are for it. Returns NULL for a Python
+# that does not run.
+probe_python <- function(python) {
+  output <- run_quietly(
+    python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
+  )$stdout
+  words <- strsplit(trimws(output), " ", fixed = TRUE)[[1L]]
+  if (length(words) != 4L || words[[1L]] != "python") {
+    return(NULL)
+  }
+  version <- words[[2L]]
+  list(
+    version = version,
+    fits = version %in% c("3.10", "3.11", "3.12", "3.13") && words[[3L]] == "CPython" &&
+      words[[4L]] == "64"
+  )
+}
+
+# What probe_python() runs. It is run with -I, which every Python that the server can use knows.
+probe <- paste(
+  "import platform, sys",
+  "print('python', '%d.%d' % sys.version_info[:2], platform.python_implementation(),",
+  "      64 if sys.maxsize > 2**32 else 32)",
+  sep = "\n"
+)
+
 # Says what keeps this session from using what was installed.
 inform_of_precedence <- function(python) {
   named <- Sys.getenv("GYM_PYTHON")
@@ -157,15 +135,6 @@ inform_of_precedence <- function(python) {
     cli::cli_inform(c(
       "!" = "The variable GYM_PYTHON is set, and the Python that it names comes first.",
       " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} has this session use what was installed."
-    ))
-  }
-  running <- Filter(function(server) {
-    is_installed_python(server$python) && server$python != python && server$process$is_alive()
-  }, the_session$servers)
-  if (length(running)) {
-    cli::cli_inform(c(
-      "!" = "This session's server still runs from what was installed before.",
-      " " = "{.code gym_server_stop()} ends it; the next {.code gym_make()} starts one anew."
     ))
   }
 }

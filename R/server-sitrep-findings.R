@@ -54,8 +54,9 @@ sitrep_environment <- function(needed) {
     ))
   } else if (!length(folders)) {
     row("not installed")
-  } else if (any(startsWith(basename(folders), lock_hash()))) {
-    row(paste(folders[[1L]], "is damaged, or its installation was not finished"), wrong = TRUE)
+  } else if (environment_folder() %in% folders) {
+    row(paste(environment_folder(), "is damaged, or its installation was not finished"),
+        wrong = TRUE)
   } else {
     row(paste(folders[[1L]], "was made for another version of the package"))
   }

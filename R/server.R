@@ -142,17 +142,12 @@ register_server <- function(server) {
   new_client(server$url, token = server$token)
 }
 
-# How to install an extra on a server that runs from what gym_server_install() made; NULL for a
-# server with another Python, which somebody else looks after.
+# How to install an extra on a server that runs from what gym_server_install() made, which finds it
+# there; NULL for a server with another Python, which somebody else looks after.
 installed_extra_hint <- function(extra, python) {
-  if (!is_installed_python(python)) {
-    return(NULL)
+  if (is_installed_python(python)) {
+    paste0("`gym_server_install(extras = \"", extra, "\")` installs it, and this server finds it")
   }
-  anew <- "`gym_server_stop()` ends this server, and the next `gym_make()` starts one that has it"
-  if (extra %in% installed_server()$extras) {
-    return(paste0("it has been installed meanwhile: ", anew))
-  }
-  paste0("`gym_server_install(extras = \"", extra, "\")` installs it; ", anew)
 }
 
 # Options in the form of a command line: log_level = "info" becomes --log-level info, TRUE becomes a

@@ -9,8 +9,8 @@
 #   environments    the environments written in R that are registered, by their ids
 #   hidden          tokens, which no error may show
 #
-# and, where they apply, what was declined, whether this session holds the install lock, and the
-# function by which an upper floor asks, see prompted_server_starts().
+# and, where they apply, what was declined, and the function by which an upper floor asks, see
+# prompted_server_starts().
 #
 # Being an environment it is never identical to a copy that was read from a file or sent to
 # another process, which is how a client notices that it has been moved.

@@ -7,7 +7,7 @@ local_cache <- function(name = "a caché", frame = parent.frame()) {
   withr::local_envvar(
     R_USER_CACHE_DIR = file.path(folder, name), GYM_PYTHON = NA, GYM_UV = test_uv(),
     RETICULATE_UV = NA, CONDA_PREFIX = NA, UV_PYTHON_DOWNLOADS = "never",
-    UV_PYTHON_INSTALL_DIR = NA,
+    UV_PYTHON_INSTALL_DIR = NA, UV_PYTHON = NA,
     VIRTUAL_ENV = if (file.exists(file.path(environment, "pyvenv.cfg"))) environment else NA,
     .local_envir = frame
   )
@@ -26,17 +26,13 @@ test_uv <- function() {
 
 skip_if_no_packages <- function() {
   testthat::skip_on_cran()
-  python <- find_base_python(with_venv = TRUE)
-  testthat::skip_if(is.null(python), "no Python 3.10 to 3.13 with venv")
+  skip_if_no_uv()
   dir.create(install_root(), recursive = TRUE, showWarnings = FALSE)
-  file <- withr::local_tempfile(lines = grep("^blinker", invert = FALSE, value = TRUE, sub(
-    " .*", "", readLines(lock_file())
-  )))
-  reached <- run_tool(python, c(
-    "-I", "-m", "pip", "download", "--no-deps", "--no-cache-dir", "--retries", "0", "--timeout",
-    "10", "--dest", withr::local_tempdir(), "-r", file
-  ))
-  testthat::skip_if(failed(reached), "Python's package index is not reached")
+  reached <- run_tool(Sys.getenv("GYM_UV"), c(
+    "pip", "install", "--no-cache", "--no-deps", "--target", withr::local_tempdir(),
+    "--no-managed-python", "--python", "cpython>=3.10,<3.14", "blinker"
+  ), env = c(UV_HTTP_TIMEOUT = "10"))
+  testthat::skip_if(failed(reached), "no Python 3.10 to 3.13, or its package index is not reached")
 }
 
 skip_if_no_uv <- function() {
@@ -44,18 +40,19 @@ skip_if_no_uv <- function() {
 }
 
 # An environment as an installation leaves it, but for what is in it.
-fake_installation <- function(number = 1L, extras = character(), hash = lock_hash()) {
+fake_installation <- function(extras = character(), hash = lock_hash(), ...) {
   # Never into the user's own cache.
   stopifnot(startsWith(install_root(), dirname(tempdir())), nzchar(Sys.getenv("R_USER_CACHE_DIR")))
-  folder <- file.path(install_root(), paste0(hash, "-", number))
-  site <- if (is_windows()) "venv/Lib/site-packages" else "venv/lib/python3.12/site-packages"
-  for (package in c("flask", "numpy")) {
-    dir.create(file.path(folder, site, package), recursive = TRUE)
-  }
-  python <- environment_python(folder)
-  fake_program(python)
-  write_manifest(folder, extras, call = NULL)
+  folder <- file.path(install_root(), hash)
+  fake_program(environment_python(folder), ...)
+  writeLines("", file.path(folder, "venv", "pyvenv.cfg"))
+  write_extras(folder, extras, call = NULL)
   folder
+}
+
+installed_file <- function(python, name) {
+  files <- list.files(dirname(dirname(python)), recursive = TRUE, full.names = TRUE)
+  files[endsWith(files, paste0("/site-packages/", name))][[1L]]
 }
 
 # A program that is a shell script.
@@ -66,16 +63,23 @@ fake_program <- function(path, ...) {
   path
 }
 
-# A uv that fails in a given way.
-local_failing_uv <- function(words, frame = parent.frame()) {
+# A uv that is a shell script: the file `calls` lists its arguments, one call a line.
+local_fake_uv <- function(..., frame = parent.frame()) {
   testthat::skip_on_os("windows")
   folder <- withr::local_tempdir(.local_envir = frame)
   uv <- fake_program(
     file.path(folder, "uv"), "if [ \"$1\" = --version ]; then echo 'uv 0.99.0'; exit; fi",
-    "cat <<'END'", words, "END", "exit 2"
+    paste0("echo \"$*\" >> '", file.path(folder, "calls"), "'"), ...
   )
   withr::local_envvar(GYM_UV = uv, .local_envir = frame)
   uv
+}
+
+calls_of <- function(uv) readLines(file.path(dirname(uv), "calls"))
+
+# A uv that fails in a given way.
+local_failing_uv <- function(words, frame = parent.frame()) {
+  local_fake_uv("cat <<'END'", words, "END", "exit 2", frame = frame)
 }
 
 wait_until <- function(condition) {

@@ -2,7 +2,7 @@ fake_bundle <- function(..., frame = parent.frame()) {
   dir <- withr::local_tempdir(.local_envir = frame)
   fields <- utils::modifyList(list(
     System = bundle_system(), Lock = lock_hash(), Extras = "box2d", Python = "3.12",
-    Contains = "packages", UvHash = "none"
+    Index = "--default-index https://index.example/simple"
   ), list(...))
   write.dcf(fields, file.path(dir, "bundle.dcf"))
   dir
@@ -16,25 +16,53 @@ test_that("a bundle installs without a network", {
   suppressMessages(expect_message(
     expect_identical(gym_server_bundle(dir, "box2d"), normalizePath(dir)), "The bundle is ready"
   ))
-  expect_true(all(list.files(dir) %in% c("bundle.dcf", "wheels", "lock", "uv", "python")))
+  expect_setequal(list.files(dir), c("bundle.dcf", "SHA256SUMS", uv_name(), "cache"))
+  expect_identical(list.files(install_root()), "install.log")
   # Any other folder stays as it is.
   writeLines("", file.path(dir, "thesis.txt"))
   expect_error(gym_server_bundle(dir), "empty folder", class = "gym_error_argument")
 
-  # The other machine: no network, no packages from before, no uv but the bundle's.
+  # On the way: no links, and no file is a program any more.
+  files <- list.files(dir, recursive = TRUE, include.dirs = TRUE, full.names = TRUE)
+  expect_true(all(Sys.readlink(files) %in% c("", NA)))
+  Sys.chmod(list.files(dir, recursive = TRUE, full.names = TRUE), "644")
+  # The other machine: no network, no packages from before, no uv but the bundle's, an index of
+  # its own.
   local_cache("another")
   withr::local_envvar(
-    HTTPS_PROXY = "http://127.0.0.1:9", UV_CACHE_DIR = withr::local_tempdir(),
-    PIP_NO_CACHE_DIR = "1", GYM_UV = NA
+    HTTPS_PROXY = "http://127.0.0.1:9", UV_CACHE_DIR = withr::local_tempdir(), UV_NO_CACHE = "1",
+    GYM_UV = NA, UV_DEFAULT_INDEX = "https://mirror.example/simple"
   )
   withr::local_dir(dirname(dir))
   python <- suppressMessages(gym_server_install("box2d", offline = basename(dir)))
   expect_identical(installed_server(), list(
     python = python, folder = dirname(dirname(dirname(python))), extras = "box2d"
   ))
-  expect_match(readLines(install_log()), "--no-index", all = FALSE)
+  expect_match(readLines(install_log()), "--offline", all = FALSE)
   expect_error(gym_server_install("atari", offline = dir), "lacks \"atari\"",
                class = "gym_error_install")
+  # A file that was deleted comes from the bundle again.
+  typed <- installed_file(python, "flask/py.typed")
+  unlink(typed)
+  suppressMessages(gym_server_install("box2d", offline = basename(dir)))
+  expect_true(file.exists(typed))
+})
+
+test_that("a bundle is of the indexes that were used, and shows no password", {
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  uv <- local_fake_uv(
+    "echo --index-url https://me:secret@index.example/simple",
+    "echo --extra-index-url https://me:secret@more.example/simple"
+  )
+  expect_identical(index_arguments(list(uv = uv), "python"), c(
+    "--default-index https://index.example/simple",
+    "--extra-index-url https://more.example/simple"
+  ))
+  expect_false(any(grepl("secret", readLines(install_log()), fixed = TRUE)))
+  dir <- fake_bundle()
+  expect_identical(read_bundle(dir, "box2d", NULL)$index,
+                   c("--default-index", "https://index.example/simple"))
 })
 
 test_that("a folder that only looks like a bundle stays as it is", {
@@ -49,28 +77,52 @@ test_that("a folder that only looks like a bundle stays as it is", {
   expect_identical(readLines(file), "mine")
 })
 
-test_that("an earlier bundle stays until it is clear how a new one can be made", {
+test_that("an earlier bundle stays until the new one is complete", {
   local_cache()
-  withr::local_envvar(GYM_UV = "/no/such/uv")
   dir <- fake_bundle()
-  dir.create(file.path(dir, "wheels"))
-  writeLines("", file.path(dir, "wheels", "a.whl"))
+  dir.create(file.path(dir, "cache"))
+  writeLines("", file.path(dir, "cache", "a"))
+  before <- list.files(dir, recursive = TRUE)
+  withr::local_envvar(GYM_UV = "/no/such/uv")
   expect_error(gym_server_bundle(dir), "GYM_UV", class = "gym_error_install")
-  expect_setequal(list.files(dir, recursive = TRUE), c("bundle.dcf", "wheels/a.whl"))
+  local_failing_uv("error: Failed to fetch")
+  expect_error(
+    suppressMessages(gym_server_bundle(dir)), "network was not reached", class = "gym_error_install"
+  )
+  expect_identical(list.files(dir, recursive = TRUE), before)
+  expect_identical(list.files(install_root()), "install.log")
 
-  empty_bundle(dir, NULL)
-  expect_identical(list.files(dir), "making")
-  # As does one that broke off.
-  writeLines("", file.path(dir, "making", "half"))
-  expect_error(empty_bundle(dir, NULL), NA)
-  expect_identical(list.files(dir, recursive = TRUE), character())
+  new <- withr::local_tempdir()
+  writeLines("new", file.path(new, "uv"))
+  write_sums(new)
+  replace_bundle(new, dir, list(Complete = "yes"), NULL)
+  expect_setequal(list.files(dir, recursive = TRUE), c("bundle.dcf", "SHA256SUMS", "uv"))
+  # One that broke off is none, and is replaced, too.
+  writeLines("newer", file.path(new, "uv"))
+  expect_error(replace_bundle(new, dir, list(), NULL), "not what SHA256SUMS lists")
+  expect_error(read_bundle(dir, "box2d", NULL), "no complete bundle", class = "gym_error_install")
+  expect_silent(check_bundle_place(dir, NULL))
 })
 
-bundle_with_uv <- function(..., hash = NULL, frame = parent.frame()) {
-  uv <- fake_program(withr::local_tempfile(), ...)
-  dir <- fake_bundle(Contains = "uv and Python", UvHash = hash %||% file_sha256(uv), frame = frame)
-  dir.create(file.path(dir, "uv"))
-  file.copy(uv, file.path(dir, "uv", "uv"))
+test_that("a uv that runs in its own folder only is no part of a bundle", {
+  skip_on_os("windows")
+  local_cache()
+  folder <- withr::local_tempdir()
+  uv <- fake_program(
+    file.path(folder, "uv"), "[ -e \"$(dirname \"$0\")/real\" ] && echo 'uv 0.99.0'"
+  )
+  writeLines("", file.path(folder, "real"))
+  withr::local_envvar(GYM_UV = uv)
+  expect_error(
+    suppressMessages(gym_server_bundle(withr::local_tempdir())), "another folder",
+    class = "gym_error_install"
+  )
+})
+
+bundle_with_uv <- function(..., frame = parent.frame()) {
+  dir <- fake_bundle(frame = frame)
+  fake_program(file.path(dir, "uv"), ...)
+  write_sums(dir)
   dir
 }
 
@@ -88,30 +140,40 @@ test_that("nothing of a bundle is copied before the answer is yes", {
   expect_false(dir.exists(install_root()))
 })
 
-test_that("a bundle's uv that was changed on the way is not run", {
+test_that("what was changed on the way is not run", {
   skip_on_os("windows")
   local_cache()
   ran <- withr::local_tempfile()
-  dir <- bundle_with_uv(paste0("touch '", ran, "'"), hash = strrep("0", 64))
+  dir <- bundle_with_uv(paste0("touch '", ran, "'"))
+  cat("# changed\n", file = file.path(dir, "uv"), append = TRUE)
   expect_error(
-    suppressMessages(gym_server_install("box2d", offline = dir)), "was not run",
+    suppressMessages(gym_server_install("box2d", offline = dir)), "was not run: uv is not what",
+    class = "gym_error_install"
+  )
+  unlink(file.path(dir, "uv"))
+  expect_error(
+    suppressMessages(gym_server_install("box2d", offline = dir)), "was not run: uv is not what",
     class = "gym_error_install"
   )
   expect_false(file.exists(ran))
-  expect_identical(list.files(file.path(install_root(), "uv", "bundle")), character())
+  expect_setequal(list.files(install_root()), c("install.log", lock_hash()))
 })
 
-test_that("where a bundle's uv does not run another is taken", {
+test_that("a bundle's uv and Python are used, and settings of the machine are not", {
   skip_on_os("windows")
   local_cache()
-  uv <- local_failing_uv("error: Failed to fetch")
-  dir.create(install_root(), recursive = TRUE)
-  works <- bundle_plan(bundle_with_uv("echo 'uv 0.99.0'"), "box2d", NULL)
-  expect_identical(copy_bundled_uv(works, NULL), works)
-  expect_true(uv_works(works$tool))
-  broken <- bundle_plan(bundle_with_uv("exit 1"), "box2d", NULL)
-  expect_identical(broken$tool, bundled_uv())
-  expect_identical(copy_bundled_uv(broken, NULL)$tool, uv)
+  withr::local_envvar(UV_PYTHON = "/my/python")
+  calls <- withr::local_tempfile()
+  dir <- bundle_with_uv(
+    paste0("echo \"$* $UV_NO_CONFIG<$UV_INDEX>\" >> '", calls, "'"), "[ \"$1\" = venv ]"
+  )
+  withr::local_envvar(UV_INDEX = "https://else.example")
+  expect_error(
+    suppressMessages(gym_server_install("box2d", offline = dir)), "could not be installed",
+    class = "gym_error_install"
+  )
+  expect_match(readLines(calls)[1L], "--managed-python --python 3.12 .* 1<>$")
+  expect_match(readLines(calls)[2L], "--offline --default-index https://index.example/simple .*<>$")
 })
 
 test_that("a bundle for something else says so", {
@@ -123,8 +185,7 @@ test_that("a bundle for something else says so", {
   refused(System = "windows-riscv", words = "another system, windows-riscv")
   refused(Lock = "0123456789ab", words = "another version of this package")
   refused(Extras = "atari", words = "lacks \"box2d\"")
-  refused(Python = "3.7", words = "for Python 3.7 and contains none")
   expect_error(gym_server_install(offline = withr::local_tempdir()), "no complete bundle",
                class = "gym_error_install")
-  expect_false(dir.exists(file.path(install_root(), "installing")))
+  expect_false(dir.exists(install_root()))
 })

@@ -112,7 +112,7 @@ test_that("the pinned uv has a checksum for each system, and this system a name"
     expect_true(uv_target() %in% names(uv_release$checksums))
   }
   local_binding("system_name", function() "sunos-sparc")
-  expect_error(install_uv(NULL), "Install Python", class = "gym_error_install")
+  expect_error(install_uv(NULL), "GYM_PYTHON name that Python", class = "gym_error_install")
 })
 
 test_that("uv is downloaded, and run only when its checksum is right", {
@@ -125,9 +125,12 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   expect_identical(pinned, pinned_uv())
   expect_true(uv_works(pinned))
   expect_identical(list.files(dirname(pinned)), "uv")
-  expect_silent(install_uv(NULL))
+  local_binding("uv_candidates", function() pinned)
+  withr::local_envvar(GYM_UV = NA)
+  expect_identical(find_uv(), pinned)
   # What does not run any more is downloaded anew.
   writeLines(character(), pinned)
+  expect_null(find_uv())
   expect_message(install_uv(NULL), "Downloading uv")
   expect_true(uv_works(pinned))
 
@@ -140,7 +143,7 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   local_binding("uv_release", right)
   expect_error(suppressMessages(install_uv(NULL)), "SHA-256", class = "gym_error_install")
   expect_false(file.exists(ran))
-  expect_identical(list.files(dirname(pinned)), character())
+  expect_identical(list.files(dirname(dirname(pinned)), recursive = TRUE), character())
   # A second try, with the right one.
   withr::local_envvar(UV_DOWNLOAD_URL = paste0("file://", dirname(archive)))
   expect_identical(suppressMessages(install_uv(NULL)), pinned)
@@ -153,6 +156,7 @@ test_that("a download that fails says what else can be done", {
   error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
   expect_match(conditionMessage(error), "HTTPS_PROXY", fixed = TRUE)
   expect_match(conditionMessage(error), "by hand", fixed = TRUE)
+  expect_match(conditionMessage(error), "-m pip install '?/.*/server'?`, and have GYM_PYTHON name")
 })
 
 test_that("a download shows no password, and is not larger than it may be", {

@@ -19,58 +19,47 @@ test_that("an installation runs the server, takes extras and repairs itself", {
   local_env(client = server)$reset()
   error <- expect_error(gym_make("LunarLander-v3", client = server), class = "gym_error_http_400")
   expect_match(conditionMessage(error), "gym_server_install(extras = \"box2d\")", fixed = TRUE)
-  expect_match(error$hint, "gym_server_stop()", fixed = TRUE)
 
-  # Its server goes on, and the message mentions it.
-  suppressMessages(expect_message(
-    second <- gym_server_install("box2d"), "still runs from what was installed before"
-  ))
-  expect_false(second == python)
-  expect_true(file.exists(python))
+  # Its server goes on, and finds what is new.
+  expect_identical(suppressMessages(gym_server_install("box2d")), python)
   expect_identical(installed_server()$extras, "box2d")
   local_env("FrozenLake-v1", client = server)$reset()
-  error <- expect_error(gym_make("LunarLander-v3", client = server), class = "gym_error_http_400")
-  expect_match(error$hint, "installed meanwhile")
-  gym_server_stop(server)
-  local_env("LunarLander-v3", client = local_server())$reset()
+  local_env("LunarLander-v3", client = server)$reset()
 
   # All there: nothing is done, and what was asked for before is kept.
-  expect_message(third <- gym_server_install(), "is installed already")
-  expect_identical(third, second)
-  # What was left for that server goes with it.
-  expect_length(install_folders(), 1L)
+  expect_message(expect_identical(gym_server_install(), python), "is installed already")
+  expect_identical(installed_server()$extras, "box2d")
 
-  # A file inside a package, which only the trial notices.
-  site <- file.path(installed_server()$folder, read_manifest(installed_server()$folder)$site)
-  unlink(file.path(site, "flask", "app.py"))
-  expect_false(is.null(installed_server()))
-  fourth <- suppressMessages(gym_server_install())
-  expect_false(fourth == third)
-  expect_identical(installed_server()[c("python", "extras")],
-                   list(python = fourth, extras = "box2d"))
-  unlink(file.path(dirname(dirname(fourth)), "pyvenv.cfg"))
-  unlink(fourth)
+  # A file of a package that nothing imports.
+  typed <- installed_file(python, "flask/py.typed")
+  unlink(typed)
+  expect_match(try_environment(python, character()), "py.typed is missing", all = FALSE)
+  suppressMessages(expect_message(gym_server_install(), "Installed in"))
+  expect_true(file.exists(typed))
+  # A package, and the Python.
+  unlink(dirname(installed_file(python, "numpy/version.py")), recursive = TRUE)
+  unlink(python)
   expect_null(installed_server())
-  expect_identical(suppressMessages(gym_server_install()), installed_server()$python)
+  expect_identical(suppressMessages(gym_server_install()), python)
+  expect_identical(installed_server()$extras, "box2d")
 })
 
-test_that("pip installs it where there is no uv", {
+test_that("sessions that install at once share the environment", {
   skip_unless_all()
   local_cache()
   skip_if_no_packages()
-  local_binding("find_uv", function(...) NULL)
-  suppressMessages(expect_message(python <- gym_server_install(), "with pip, for"))
-  expect_identical(python, installed_server()$python)
-  expect_false(failed(try_environment(python, character())))
-})
-
-test_that("a Python that only ends in order cannot run the server", {
-  skip_on_os("windows")
-  local_cache()
-  there <- fake_installation()
-  expect_identical(installed_server()$folder, there)
-  expect_true(failed(try_environment(environment_python(there), character())))
-  expect_false(has_all(installed_server(), character()))
+  sessions <- lapply(c("box2d", "box2d"), function(extra) {
+    processx::process$new(
+      file.path(R.home("bin"), "Rscript"),
+      c("-e", paste0("cat(gym::gym_server_install('", extra, "'))")), stdout = "|", stderr = "2>&1",
+      env = c("current", R_LIBS = paste(.libPaths(), collapse = .Platform$path.sep))
+    )
+  })
+  for (session in sessions) {
+    session$wait()
+    expect_match(session$read_all_output(), environment_python(environment_folder()), fixed = TRUE)
+  }
+  expect_true(has_all(installed_server(), "box2d"))
 })
 
 test_that("after a no nothing is installed, and a yes is asked for once", {
@@ -101,15 +90,14 @@ test_that("an installation that fails leaves what was there before", {
   expect_match(conditionMessage(error), install_log(), fixed = TRUE)
   expect_match(error$output, "os error 28", all = FALSE)
   expect_identical(installed_server()$folder, folder)
-  expect_identical(
-    list.files(install_root()), c(basename(folder), "install.log")
-  )
+  expect_identical(installed_server()$extras, character())
+  expect_identical(list.files(install_root()), c(basename(folder), "install.log"))
 })
 
 test_that("a GYM_PYTHON that cannot run the server is named before anything is done", {
   local_cache()
   skip_on_os("windows")
-  old <- fake_program(withr::local_tempfile(), "echo python 3.9 CPython 64 venv")
+  old <- fake_program(withr::local_tempfile(), "echo python 3.9 CPython 64")
   withr::local_envvar(GYM_PYTHON = old)
   error <- expect_error(gym_server_install(), "which is Python 3.9", class = "gym_error_install")
   expect_match(conditionMessage(error), "Sys.unsetenv(\"GYM_PYTHON\")", fixed = TRUE)

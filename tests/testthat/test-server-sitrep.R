@@ -75,10 +75,13 @@ test_that("the installed environment is reported: complete, damaged, or of anoth
   }
   expect_match(environment_row()$finding, "extras: box2d; 3 MB", fixed = TRUE)
   expect_identical(environment_row()$state, "ok")
-  local_functions(installed_server = function() NULL, install_folders = function() "/c/abc-2")
+  local_functions(
+    installed_server = function() NULL,
+    install_folders = function() c("/c/0ff", file.path(install_root(), "abc"))
+  )
   expect_match(environment_row()$finding, "damaged")
   expect_identical(environment_row()$state, "wrong")
-  local_functions(install_folders = function() "/c/0ff-1")
+  local_functions(install_folders = function() "/c/0ff")
   expect_match(environment_row()$finding, "another version")
 })
 
