@@ -154,7 +154,7 @@ copy_bundle <- function(from, to, call) {
     dir.create(folder, recursive = TRUE, showWarnings = FALSE)
   }
   suppressWarnings(file.copy(file.path(from, files), file.path(to, files)))
-  file.copy(file.path(from, "SHA256SUMS"), to)
+  writeLines(sums, file.path(to, "SHA256SUMS"))
   # Sticks do not keep which files are programs.
   Sys.chmod(file.path(to, files), "755")
   right <- mapply(has_hash, file.path(to, files), substr(sums, 1L, 64L))
@@ -196,7 +196,8 @@ read_bundle <- function(dir, extras, call) {
     read.dcf(file.path(dir, "bundle.dcf"))[1L, ], error = function(cnd) NULL,
     warning = function(cnd) NULL
   )
-  if (!all(c("System", "Lock", "Extras", "Python", "Index") %in% names(fields))) {
+  if (!all(c("System", "Lock", "Extras", "Python", "Index") %in% names(fields)) ||
+        !file.exists(file.path(dir, "SHA256SUMS"))) {
     abort_bundle(
       paste0("There is no complete bundle in ", dir, "."),
       "`gym_server_bundle()` makes one.", call

@@ -61,12 +61,13 @@ make_environment <- function(folder, source, extras, call) {
   }
 }
 
-# A Python without pyvenv.cfg would be taken for the one that the environment was made from, and the
+# Whether there is an environment whose Python the lock files are for, and which has the version. A
+# Python without pyvenv.cfg would be taken for the one that the environment was made from, and the
 # packages be installed there.
 has_venv <- function(folder, version = NULL) {
   python <- environment_python(folder)
   about <- if (file.exists(file.path(folder, "venv", "pyvenv.cfg"))) probe_python(python)
-  !is.null(about) && about$version == (version %||% about$version)
+  isTRUE(about$fits) && about$version == (version %||% about$version)
 }
 
 install_packages <- function(folder, source, extras, call, ...) {
@@ -85,11 +86,14 @@ make_venv <- function(folder, source, call) {
   }
   if (!is.null(source$named_python)) {
     output <- venv("--python", source$named_python)
-    if (failed(output)) {
+    if (failed(output) || !has_venv(folder)) {
       abort_tool(
         paste("No environment could be made with the Python that UV_PYTHON names,",
               source$named_python),
-        output, call, more = "`Sys.unsetenv(\"UV_PYTHON\")` has uv install one."
+        output, call, more = paste(
+          "It must be a 64-bit Python 3.10 to 3.13; `Sys.unsetenv(\"UV_PYTHON\")` has uv install",
+          "one."
+        )
       )
     }
     return(invisible())

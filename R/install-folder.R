@@ -100,9 +100,10 @@ use_python <- function(python) {
 }
 
 # Servers of other sessions, also on other machines with the same home, may run from what another
-# version of the package installed.
+# version of the package installed. A session that was killed may have left a copy or a download.
 remove_old_folders <- function(days = 30) {
-  others <- setdiff(install_folders(), environment_folder())
+  folders <- list.files(install_root(), "^([0-9a-f]{12}|bundle-|download-)", full.names = TRUE)
+  others <- setdiff(folders, environment_folder())
   old <- difftime(Sys.time(), last_used(others), units = "days") > days
   unlink(others[old], recursive = TRUE, force = TRUE)
 }

@@ -105,7 +105,7 @@ install_uv <- function(call) {
     )
   }
   # A folder of its own, as another session may download uv, too.
-  place <- tempfile("download-", file.path(install_root(), "uv"))
+  place <- tempfile("download-", install_root())
   dir.create(place, recursive = TRUE, showWarnings = FALSE)
   on.exit(unlink(place, recursive = TRUE))
   archive <- file.path(place, paste0("uv-", target, if (is_windows()) ".zip" else ".tar.gz"))
@@ -207,7 +207,7 @@ unpack_uv <- function(archive, call) {
   Sys.chmod(unpacked, "755")
   works <- length(unpacked) && uv_works(unpacked[[1L]])
   if (works) {
-    dir.create(dirname(pinned_uv()), showWarnings = FALSE)
+    dir.create(dirname(pinned_uv()), recursive = TRUE, showWarnings = FALSE)
     file.rename(unpacked[[1L]], pinned_uv())
   }
   if (!works || !file.exists(pinned_uv())) {

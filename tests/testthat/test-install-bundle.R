@@ -5,6 +5,7 @@ fake_bundle <- function(..., frame = parent.frame()) {
     Index = "--default-index https://index.example/simple"
   ), list(...))
   write.dcf(fields, file.path(dir, "bundle.dcf"))
+  writeLines(character(), file.path(dir, "SHA256SUMS"))
   dir
 }
 
@@ -121,8 +122,8 @@ test_that("a uv that runs in its own folder only is no part of a bundle", {
 
 bundle_with_uv <- function(..., frame = parent.frame()) {
   dir <- fake_bundle(frame = frame)
-  fake_program(file.path(dir, "uv"), ...)
-  write_sums(dir)
+  uv <- fake_program(file.path(dir, "uv"), ...)
+  writeLines(paste0(file_sha256(uv), "  uv"), file.path(dir, "SHA256SUMS"))
   dir
 }
 

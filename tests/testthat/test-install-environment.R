@@ -27,9 +27,19 @@ test_that("UV_PYTHON names the Python of an environment", {
   local_cache()
   dir.create(install_root(), recursive = TRUE)
   withr::local_envvar(UV_PYTHON = "/my/python")
-  uv <- local_fake_uv()
-  make_venv("/e", network_source(uv), NULL)
-  expect_identical(calls_of(uv), "venv --allow-existing --python /my/python /e/venv")
+  folder <- fake_installation(character(), lock_hash(), "echo python 3.13 CPython 64")
+  uv <- local_fake_uv("echo 'Using CPython 3.13'")
+  expect_silent(make_venv(folder, network_source(uv), NULL))
+  expect_identical(
+    calls_of(uv), paste0("venv --allow-existing --python /my/python ", folder, "/venv")
+  )
+  # An environment that the server cannot use is not kept.
+  folder <- fake_installation(character(), lock_hash(), "echo python 3.9 CPython 64")
+  expect_error(
+    make_venv(folder, network_source(uv), NULL), "UV_PYTHON names, /my/python",
+    class = "gym_error_install"
+  )
+  expect_false(has_venv(folder))
   uv <- local_failing_uv("error: No interpreter found at path `/my/python`")
   error <- expect_error(make_venv("/e", network_source(uv), NULL), class = "gym_error_install")
   expect_match(conditionMessage(error), "UV_PYTHON names, /my/python", fixed = TRUE)

@@ -33,15 +33,16 @@ test_that("only what another version left and nobody used for a month is removed
   own <- fake_installation()
   unused <- fake_installation("box2d", hash = "0123456789aa")
   used <- fake_installation("atari", hash = "0123456789ab")
-  half <- file.path(install_root(), "0123456789ac")
-  dir.create(half)
+  half <- file.path(install_root(), c("0123456789ac", "bundle-1", "download-1"))
+  invisible(lapply(half, dir.create))
   for (path in c(own, unused, used, half, file.path(c(own, unused, used), "installed"))) {
     Sys.setFileTime(path, Sys.time() - 31 * 86400)
   }
   # As when a server starts.
   use_python(environment_python(used))
   remove_old_folders()
-  expect_identical(dir.exists(c(own, unused, used, half)), c(TRUE, FALSE, TRUE, FALSE))
+  expect_identical(dir.exists(c(own, unused, used)), c(TRUE, FALSE, TRUE))
+  expect_false(any(dir.exists(half)))
   expect_identical(install_folders()[[1L]], used)
   expect_true(file.exists(environment_python(used)))
 })
