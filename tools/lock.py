@@ -60,9 +60,7 @@ def main(folder: Path) -> None:
     (SERVER / "lock").mkdir(exist_ok=True)
     for name, requirements in files.items():
         path = SERVER / "lock" / f"{name}.txt"
-        path.write_text(
-            "".join(f"{r}\n" for r in requirements.values()), encoding="utf-8"
-        )
+        path.write_text("".join(f"{r}\n" for r in requirements.values()), encoding="utf-8")
         missing = set(_systems_without_wheels(requirements, packages))
         header = {
             "made by": "tools/lock",
@@ -72,9 +70,7 @@ def main(folder: Path) -> None:
             "not for": ", ".join(sorted(missing)) or "none",
         }
         lines = [f"# {key}: {value}\n" for key, value in header.items()]
-        path.write_text(
-            "".join(lines) + path.read_text(encoding="utf-8"), encoding="utf-8"
-        )
+        path.write_text("".join(lines) + path.read_text(encoding="utf-8"), encoding="utf-8")
         print(path, {key: header[key] for key in ("download", "disk", "not for")})
 
 
@@ -92,10 +88,7 @@ def _write_project(project: dict, folder: Path) -> None:
     text = [
         '[project]\nname = "locked"\nversion = "0"\nrequires-python = ">=3.10,<3.14"\n',
         f"dependencies = {json.dumps(project['dependencies'])}\n[project.optional-dependencies]\n",
-        *(
-            f"{extra} = {json.dumps(project['optional-dependencies'][extra])}\n"
-            for extra in EXTRAS
-        ),
+        *(f"{extra} = {json.dumps(project['optional-dependencies'][extra])}\n" for extra in EXTRAS),
         "[tool.uv]\npackage = false\nno-build = true\n",
         # Where the newest release of a package has no wheel for these, an older one is taken.
         "required-environments = [\"sys_platform == 'darwin' and platform_machine == 'x86_64'\"]\n",
@@ -105,9 +98,7 @@ def _write_project(project: dict, folder: Path) -> None:
 
 def _uv(*arguments: str, cwd: Path) -> str:
     command = [Path(sys.executable).with_name("uv"), *arguments]
-    return subprocess.run(
-        command, cwd=cwd, check=True, stdout=subprocess.PIPE, text=True
-    ).stdout
+    return subprocess.run(command, cwd=cwd, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
 def _export(folder: Path, extras: list[str]) -> dict[str, str]:
@@ -136,9 +127,7 @@ def _needed(key: str, system: str, python: tuple[int, int]) -> tuple[str, str] |
     environment = {
         "sys_platform": platform,
         "platform_machine": machine,
-        "platform_system": {"win32": "Windows", "darwin": "Darwin", "linux": "Linux"}[
-            platform
-        ],
+        "platform_system": {"win32": "Windows", "darwin": "Darwin", "linux": "Linux"}[platform],
         "os_name": "nt" if platform == "win32" else "posix",
         "python_version": version,
         "python_full_version": f"{version}.9",
@@ -164,9 +153,7 @@ def _wheel(package: dict, system: str, python: tuple[int, int]) -> dict | None:
     return None
 
 
-def _systems_without_wheels(
-    requirements: dict[str, str], packages: dict
-) -> Iterator[str]:
+def _systems_without_wheels(requirements: dict[str, str], packages: dict) -> Iterator[str]:
     for key in requirements:
         for system in SYSTEMS:
             for python in PYTHONS:
@@ -180,12 +167,8 @@ def _download(requirements: dict[str, str], packages: dict) -> int:
     """Return the bytes that the system with the largest files downloads."""
 
     def size(system: str) -> int:
-        needed = filter(
-            None, (_needed(key, system, USUAL_PYTHON) for key in requirements)
-        )
-        wheels = filter(
-            None, (_wheel(packages[pin], system, USUAL_PYTHON) for pin in needed)
-        )
+        needed = filter(None, (_needed(key, system, USUAL_PYTHON) for key in requirements))
+        wheels = filter(None, (_wheel(packages[pin], system, USUAL_PYTHON) for pin in needed))
         return sum(wheel["size"] for wheel in wheels)
 
     return max(map(size, SYSTEMS))

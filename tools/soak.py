@@ -45,9 +45,7 @@ class Part(NamedTuple):
 def python(name: str, *arguments: object) -> Part:
     """Return a part that is a script in Python."""
     script = SOAK / f"{name}.py"
-    return Part(
-        [sys.executable, str(script), *map(str, arguments)], is_here=script.exists()
-    )
+    return Part([sys.executable, str(script), *map(str, arguments)], is_here=script.exists())
 
 
 def r(name: str, *arguments: object) -> Part:
@@ -107,16 +105,12 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "processes": python("guests", "processes", 1 if quick else 5),
         "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/processes/test_worker_process.py"),
-        "environments": pytest(
-            "tests/test_environments.py", GYM_TEST_ENVIRONMENTS="all"
-        ),
+        "environments": pytest("tests/test_environments.py", GYM_TEST_ENVIRONMENTS="all"),
         "parity": testthat("parity", GYM_TEST_PARITY="all"),
         "policies": testthat("policy-on-server", GYM_TEST_POLICIES="all"),
         "orders": testthat("train-orders", GYM_TEST_ORDERS=1000),
         "spaces": testthat("round-trips", GYM_TEST_SPACES=300),
-        "futures": testthat(
-            "play-futures", GYM_TEST_ALL="true", GYM_TEST_FUTURES="all"
-        ),
+        "futures": testthat("play-futures", GYM_TEST_ALL="true", GYM_TEST_FUTURES="all"),
         "hosts": testthat("hosts", GYM_TEST_ALL="true", GYM_TEST_HOSTS="all"),
         "book": testthat("book-vignettes", GYM_TEST_BOOK="all"),
         "tables": testthat("learn-table", GYM_TEST_TABLES="all"),
@@ -161,17 +155,13 @@ def main() -> int:
     known = parts(asked.quick, asked.seconds)
     unknown = set(asked.parts) - set(known)
     if unknown:
-        options.error(
-            f"no such parts: {', '.join(unknown)}; there are {', '.join(known)}"
-        )
+        options.error(f"no such parts: {', '.join(unknown)}; there are {', '.join(known)}")
     rows = []
     for name in asked.parts or known:
         print(f"\n######## {name}", flush=True)
         began = time.monotonic()
         outcome, figures = run(name, known[name])
-        rows.append(
-            (name, outcome, f"{time.monotonic() - began:.0f} s", "; ".join(figures))
-        )
+        rows.append((name, outcome, f"{time.monotonic() - began:.0f} s", "; ".join(figures)))
     print("\n| part | outcome | took | figures |\n|---|---|---:|---|")
     for row in rows:
         print(f"| {' | '.join(row)} |")

@@ -18,7 +18,8 @@ writeLines(c(
   "args <- commandArgs(TRUE)",
   "env <- gym_make('CartPole-v1', num_envs = 16)",
   "search <- search_random(env, rounds = 60, target = Inf, seed = 1, checkpoint = args[[1]])",
-  "search <- search[setdiff(names(search), c('elapsed', 'client', 'env', 'template', 'provenance'))]",
+  "changing <- c('elapsed', 'client', 'env', 'template', 'provenance')",
+  "search <- search[setdiff(names(search), changing)]",
   "saveRDS(search, args[[2]])"
 ), script)
 
