@@ -130,11 +130,23 @@ drop_request <- function(one, crew) {
 # seconds, and use up a core that the server needs.
 await_answers <- function(crew) {
   pool <- crew$line$pool
-  suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
+  let_curl_work(pool, crew$line$limits)
   if (!any(vapply(crew$under_way, has_outcome, NA))) {
     wait_for_pool(pool)
     check_silent(crew)
   }
+}
+
+# Newer versions of curl signal an interrupt when an answer was stopped for its size, which R takes
+# some moments later.
+let_curl_work <- function(pool, limits) {
+  tryCatch(
+    {
+      suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
+      if (limits$too_large) Sys.sleep(0.05)
+    },
+    interrupt = function(cnd) if (!limits$too_large) rlang::interrupt()
+  )
 }
 
 # At most a tenth of a second.
