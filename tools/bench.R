@@ -4,7 +4,7 @@
 # step. All in one run, turn by turn.
 #
 #   make bench              half an hour; writes vignettes/bench.csv, vignettes/bench.md,
-#                           man/figures/bench.png, man/figures/bench-environments.png and
+#                           vignettes/bench.png, vignettes/bench-environments.png and
 #                           the figures in README.md
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
@@ -133,8 +133,8 @@ report(
   result,
   csv = if (whole) "vignettes/bench.csv" else "pictures/bench.csv",
   text = if (whole) "vignettes/bench.md" else "pictures/bench.md",
-  figure = if (whole) "man/figures/bench.png" else "pictures/bench.png",
-  environments = if (whole) "man/figures/bench-environments.png"
+  figure = if (whole) "vignettes/bench.png" else "pictures/bench.png",
+  environments = if (whole) "vignettes/bench-environments.png"
   else "pictures/bench-environments.png"
 )
 if (whole) write_readme(result$rows, result$run)

@@ -14,7 +14,7 @@ fewer_colours <- function(files, max = 32) {
 # The options of a vignette's chunks. What they draw has fewer colours, where magick is there.
 set_up_pictures <- function(height) {
   knitr::opts_chunk$set(
-    collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height, dpi = 72,
+    collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height, dpi = 64,
     dev.args = list(antialias = "none")
   )
   write_link <- knitr::knit_hooks$get("plot")

@@ -2,7 +2,7 @@
 # takes beside the bare exchange of its bytes.
 
 draw_environments <- function(rows, run, file) {
-  grDevices::png(file, width = 1900, height = 1050, res = 170)
+  grDevices::png(file, width = 1330, height = 735, res = 119)
   on.exit(grDevices::dev.off())
   graphics::layout(matrix(1:2, 1L), widths = c(1.5, 1))
   draw_rollouts(rows)

@@ -18,7 +18,7 @@ draw_figure <- function(rows, run, file) {
   curves <- summary[summary$part == "vector", ]
   single <- summary[summary$part == "single", ]
   styles <- figure_styles(reticulates(rows))
-  grDevices::png(file, width = 1500, height = 1050, res = 190)
+  grDevices::png(file, width = 1050, height = 735, res = 133)
   on.exit(grDevices::dev.off())
   graphics::par(mar = c(4, 5.5, 2.5, 1), las = 1, mgp = c(3.2, 0.7, 0))
   sizes <- sort(unique(curves$num_envs))

@@ -52,7 +52,7 @@ episode_lines <- function(rows) {
     `reticulate in process` = vapply(lines, function(line) ratio(line$reticulate), "")
   )
   c(
-    "![Steps a second against Python's own loop](man/figures/bench-environments.png)",
+    "![Steps a second against Python's own loop](vignettes/bench-environments.png)",
     "",
     strwrap(paste(
       "Whole episodes by `rollout()` with the environment's id and a linear policy (in FrozenLake,",
