@@ -57,8 +57,8 @@ episode_lines <- function(rows) {
     strwrap(paste(
       "Whole episodes by `rollout()` with the environment's id and a linear policy (in FrozenLake,",
       "Taxi and Blackjack a random one), on two cores: how many times as many steps a second as",
-      "Python's own loop over one environment, which uses one core. With reticulate it is the faster",
-      "NumPy:"
+      "Python's own loop over one environment, which uses one core. With reticulate it is the",
+      "faster NumPy:"
     ), 95),
     "",
     markdown(columns, right = names(columns)[-1L])
