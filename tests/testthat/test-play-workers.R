@@ -73,40 +73,37 @@ test_that("more workers than the server allows are the server's error", {
   expect_length(env_list_all(few), 0)
 })
 
+# How many instances are made until the test ends: a function that returns their number.
+count_instances <- function(frame = parent.frame()) {
+  made <- 0L
+  create <- gym:::create_instance
+  local_functions(create_instance = function(...) {
+    made <<- made + 1L
+    create(...)
+  }, frame = frame)
+  function() made
+}
+
 test_that("a server that describes environments makes no instance to look at", {
   client <- local_server()
-  made <- 0L
-  local_functions(create_instance = local({
-    create <- gym:::create_instance
-    function(...) {
-      made <<- made + 1L
-      create(...)
-    }
-  }))
+  made <- count_instances()
   for (id in c("FrozenLake-v1", "FrozenLake-v1", "FrozenLake8x8-v1")) {
     rollout(id, still, 2, client = client)
   }
-  expect_identical(made, 3L)
+  expect_identical(made(), 3L)
 })
 
 test_that("an older server is asked once whether an environment has a vector implementation", {
   local_functions(plays_rollouts = function(...) FALSE)
   client <- local_server()
-  made <- 0L
-  local_functions(create_instance = local({
-    create <- gym:::create_instance
-    function(...) {
-      made <<- made + 1L
-      create(...)
-    }
-  }))
+  made <- count_instances()
   play <- function(...) rollout("FrozenLake-v1", policy_random(), 2, client = client, ...)
   play()
-  expect_identical(made, 2L)
+  expect_identical(made(), 2L)
   play()
-  expect_identical(made, 3L)
+  expect_identical(made(), 3L)
   play(is_slippery = FALSE)
-  expect_identical(made, 5L)
+  expect_identical(made(), 5L)
 })
 
 test_that("there are as many sub-environments as fit a mebibyte of observations, 16 to 256", {

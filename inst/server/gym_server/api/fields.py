@@ -54,7 +54,7 @@ def _video_callable(value: object) -> int:
     return integer(value)
 
 
-def _num_envs(value: object) -> int:
+def _positive(value: object) -> int:
     number = integer(value)
     if number < 1:
         raise ValueError
@@ -163,7 +163,7 @@ VIDEO_CALLABLE = Kind(
     "true, false or an integer n for every n-th episode",
     _video_callable,
 )
-NUM_ENVS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _num_envs)
+POSITIVE = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _positive)
 SEED = Kind(
     {
         "oneOf": [

@@ -15,7 +15,7 @@ from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, answer_to, invalid_parameter
 from gym_server.protocol.answers import Content, dumps
 from gym_server.protocol.bodies import loads_file
-from gym_server.protocol.fields import OBJECT, Field, Kind, integer
+from gym_server.protocol.fields import OBJECT, Field, Kind
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.environment import GROUP
 from gym_server.rollouts.task import Keep, Unit
@@ -32,19 +32,11 @@ def _keep(value: object) -> Keep:
     return Keep(**dict.fromkeys(value, True))
 
 
-def _max_steps(value: object) -> int:
-    number = integer(value)
-    if number < 1:
-        raise ValueError
-    return number
-
-
 _KEEP = Kind(
     {"type": "array", "items": {"enum": list(_KEPT)}},
     f"a list of some of {', '.join(_KEPT)}",
     _keep,
 )
-_MAX_STEPS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _max_steps)
 
 
 @ROUTES.declare(
@@ -62,7 +54,7 @@ _MAX_STEPS = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater",
     ),
     Field(
         "max_steps",
-        _MAX_STEPS,
+        fields.POSITIVE,
         "After how many steps an episode is cut short; required where the environment has no time "
         "limit.",
     ),

@@ -43,7 +43,7 @@ ROUTES = Table()
     Field("kwargs", OBJECT, "Handed to the environment."),
     Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field(
-        "num_envs", fields.NUM_ENVS, "How many sub-environments; absent for a single environment."
+        "num_envs", fields.POSITIVE, "How many sub-environments; absent for a single environment."
     ),
     Field(
         "vectorization_mode",

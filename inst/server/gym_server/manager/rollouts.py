@@ -300,7 +300,7 @@ class Rollouts:
         """Return how many units were played, what came of them, and why no more."""
         process = player.process
         if process is None:
-            process = pool.take(_WORKER, polite=True) if player.key is None else _untrusted()
+            process = pool.take(_WORKER, polite=True, trusted=player.key is None)
             process.report_end(lambda why: None)
             player.known.clear()
         process.progress[1] = 0
@@ -391,13 +391,6 @@ class Rollouts:
                 if player.process is not None and player.request is not None:
                     player.process.kill()
             self._changed.notify_all()
-
-
-def _untrusted() -> PoolProcess:
-    process = PoolProcess(pool.most_mb, trusted=False)
-    process.module = _WORKER
-    process.give_way()
-    return process
 
 
 def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import prod
 
 import numpy as np
@@ -46,14 +47,12 @@ def read_network(
     output = _output(document, sizes, acted)
     plan = NetworkPlan(sizes, activation, _bias(document))
     weights = _weights(tensors, plan)
-    plan = NetworkPlan(
-        sizes,
-        activation,
-        plan.bias,
-        _moments(tensors, sizes[0], observed),
-        output,
-        _epsilon(document, output),
-        _deviation(tensors, output, (len(weights), sizes[-1])),
+    plan = replace(
+        plan,
+        moments=_moments(tensors, sizes[0], observed),
+        output=output,
+        epsilon=_epsilon(document, output),
+        deviation=_deviation(tensors, output, (len(weights), sizes[-1])),
     )
     if isinstance(acted, Box) and plan.stretched_from is not None:
         _check_bounded(acted, plan.stretched_from)
@@ -95,13 +94,18 @@ def _bias(document: Mapping) -> bool:
     return bias
 
 
+def _supported(space: Space, do: str, what: str) -> Box | Discrete:
+    if isinstance(space, (Box, Discrete)):
+        return space
+    raise GymServerError(
+        "not_supported",
+        f"A network cannot {do} {brief_space(space)}",
+        f"networks need {what} of a Box or a Discrete space",
+    )
+
+
 def _check_inputs(sizes: tuple[int, ...], space: Space) -> Box | Discrete:
-    if not isinstance(space, (Box, Discrete)):
-        raise GymServerError(
-            "not_supported",
-            f"A network cannot observe {brief_space(space)}",
-            "networks need observations of a Box or a Discrete space",
-        )
+    space = _supported(space, "observe", "observations")
     gives = _width(space)
     if sizes[0] != gives:
         kind = (
@@ -118,12 +122,7 @@ def _check_inputs(sizes: tuple[int, ...], space: Space) -> Box | Discrete:
 
 
 def _check_outputs(sizes: tuple[int, ...], space: Space) -> Box | Discrete:
-    if not isinstance(space, (Box, Discrete)):
-        raise GymServerError(
-            "not_supported",
-            f"A network cannot choose from {brief_space(space)}",
-            "networks need actions of a Box or a Discrete space",
-        )
+    space = _supported(space, "choose from", "actions")
     width, outputs = _width(space), sizes[-1]
     is_discrete = isinstance(space, Discrete)
     if outputs != width and not (is_discrete and outputs == 1 and width == 2):

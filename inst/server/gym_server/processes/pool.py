@@ -42,15 +42,18 @@ class Pool:
         self._idle: list[tuple[float, PoolProcess]] = []
         self._timer: threading.Timer | None = None
 
-    def take(self, module: str, polite: bool = False) -> PoolProcess:
+    def take(self, module: str, polite: bool = False, trusted: bool = True) -> PoolProcess:
         """Return a process that nobody uses, started if need be.
 
         Args:
             module: the name of the module whose functions it is to run.
             polite: whether it gives way to other processes from now on, also those that use it
                 later; ordinary ones are given to those who did not ask for that.
+            trusted: see ``PoolProcess``; one that is not is always a new one, and must not be put
+                here.
         """
-        process = self._take_idle(polite) or PoolProcess(self.most_mb)
+        idle = self._take_idle(polite) if trusted else None
+        process = idle or PoolProcess(self.most_mb, trusted)
         process.module = module
         if polite:
             process.give_way()

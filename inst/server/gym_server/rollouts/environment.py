@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import platform
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -18,10 +17,11 @@ from gym_server.budget import Budget
 from gym_server.envs import make, registry, wrappers
 from gym_server.envs.drawing_on_demand import save_drawing
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import GymServerError
+from gym_server.instances.environment import env_id_of
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
 from gym_server.vector_envs.make import make_own_implementation
+from gym_server.vector_envs.num_workers import may_share_processes
 from gym_server.vector_envs.sub_env import ThisThread
 
 # How many episodes an environment's own vector implementation plays in lockstep: always as many,
@@ -56,13 +56,12 @@ class RolloutEnv:
             GymServerError: see ``make.make_env()`` and ``make_vector_env()``.
         """
         self._task = task
-        self._own = self._make_own()
-        self._env = None if self._own is not None else self._make()
-        self.group = None if self._own is None else GROUP
-        described: Any = self._own or self._env
-        prefix = "" if self._own is None else "single_"
-        self.observation_space: Space = getattr(described, f"{prefix}observation_space")
-        self.action_space: Space = getattr(described, f"{prefix}action_space")
+        own = self._make_own()
+        self._env: Any = self._make() if own is None else own
+        self.group = None if own is None else GROUP
+        prefix = "" if own is None else "single_"
+        self.observation_space: Space = getattr(self._env, f"{prefix}observation_space")
+        self.action_space: Space = getattr(self._env, f"{prefix}action_space")
         self._used = False
 
     def _make_own(self) -> VectorEnv | None:
@@ -94,13 +93,10 @@ class RolloutEnv:
     def is_made_anew(self) -> bool:
         """Whether each episode needs a new one."""
         module = registry.module_of(self._spec)
-        known = module.partition(".")[0] in registry.KNOWN_PACKAGES
-        return not known or module.startswith(_MADE_ANEW)
+        return not may_share_processes(self._spec) or module.startswith(_MADE_ANEW)
 
     def for_an_episode(self) -> Any:
         """Return an environment that plays as a new one does."""
-        if self._env is None:
-            raise GymServerError("not_supported", "It is played in groups")
         if self._used and self.is_made_anew:
             self._env.close()
             self._env = self._make()
@@ -109,24 +105,23 @@ class RolloutEnv:
 
     @property
     def for_a_group(self) -> Any:
-        """The environment's own vector implementation."""
-        return self._own
+        """The environment's own vector implementation, where there is a group."""
+        return self._env
 
     def close(self) -> None:
         """Close it."""
-        close: Callable[[], object] = (self._own or self._env).close  # type: ignore[union-attr]
-        close()
+        self._env.close()
 
     # What is known of it --------------------------------------------------------------------
 
     @property
     def _spec(self) -> Any:
-        return (self._own or self._env).spec  # type: ignore[union-attr]
+        return self._env.spec
 
     @property
     def time_limit(self) -> int | None:
         """After how many steps it ends an episode itself."""
-        if self._env is None:
+        if self.group is not None:
             limit: int | None = self._spec.max_episode_steps
             return limit
         return wrappers.time_limit(self._env)
@@ -146,9 +141,8 @@ class RolloutEnv:
     def describe(self) -> dict:
         """Return what a client must know to fit a policy to it."""
         config, spec = self._task.config, self._spec
-        metadata = (self._own or self._env).metadata or {}  # type: ignore[union-attr]
-        module, colon, name = str(config.env_id).rpartition(":")
-        env_id = f"{module}{colon}{spec.id if spec else name}"
+        metadata = self._env.metadata or {}
+        env_id = env_id_of(config, self._env)
         return {
             "env_id": env_id,
             "observation_space": spaces.describe(self.observation_space),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
 
+from gym_server.envs.memory_estimate import observation_bytes
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.task import MOST_BYTES, Keep
@@ -44,17 +45,6 @@ def _has_arrays(space: Space) -> bool:
             return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces.values()))
         case _:
             return isinstance(space, ARRAYS)
-
-
-def _bytes_of(space: Space) -> int:
-    """Return how much a value of a space of arrays takes."""
-    match space:
-        case Tuple():
-            return sum(map(_bytes_of, space.spaces))
-        case Dict():
-            return sum(map(_bytes_of, space.spaces.values()))
-        case _:
-            return int(np.prod(space.shape or ())) * np.dtype(space.dtype).itemsize
 
 
 class Moments:
@@ -118,8 +108,8 @@ class Recorder:
         self._flags: list[tuple[bool, bool]] = []
         self._complete = 0
         observations = 2 if keep.next_observation else 1
-        size = observations * _bytes_of(observation_space) + _bytes_of(action_space)
-        self._most_steps = MOST_BYTES // max(1, size)
+        size = observations * observation_bytes(observation_space) + observation_bytes(action_space)
+        self._most_steps = int(MOST_BYTES // max(1, size))
 
     def begin(self) -> None:
         """An episode begins."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from gym_server.protocol.answers import Content
-from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor, native_dtype, write
+from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor, write
 
 
 def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
@@ -28,14 +26,6 @@ def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
 def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Content:
     """Return tensors as the body of an answer."""
     if by_column:
-        tensors = {name: _by_column(tensor) for name, tensor in tensors.items()}
+        tensors = {name: Tensor.of(one.array(), by_column) for name, one in tensors.items()}
     file = write(tensors, metadata)
     return Content(file, COLUMN_TENSORS if by_column else TENSORS)
-
-
-def _by_column(tensor: Tensor) -> Tensor:
-    if len(tensor.shape) < 2:
-        return tensor
-    stored, _ = native_dtype(tensor.dtype)
-    array = np.frombuffer(tensor.data, stored).reshape(tensor.shape)
-    return Tensor.of(array, by_column=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -111,11 +111,10 @@ class _Playing:
         self._check_rows(units[0])
         due = time.monotonic() + _SECONDS
         play = self._play_episodes if self._env.group is None else self._play_groups
-        done, columns, tensors, error = play(units, due)
+        done, tensors, error = play(units, due)
         metadata = {"done": str(done)}
         if error is not None:
             metadata["error"] = dumps(answer_to(error)[1]).decode("ascii")
-        tensors.update({name: Tensor.of(column) for name, column in columns.items()})
         return Ready(write(tensors, metadata), TENSORS)
 
     def _check_rows(self, unit: Unit) -> None:
@@ -137,39 +136,26 @@ class _Playing:
         keeps = task.keep.moments or task.keep.steps
         recorder = Recorder(task.keep, env.observation_space, env.action_space) if keeps else None
         played: list[Played] = []
-        error = None
-        for place, unit in enumerate(units):
-            pool_process.progress[1] = place
-            try:
-                actor = self._actor(unit.candidates[0])
-                if recorder is not None:
-                    recorder.begin()
-                one = play_episode(env.for_an_episode(), actor, unit.seed, task.max_steps, recorder)
-            except BaseException as failure:
-                error = _named(failure, unit.seed)
-                break
+
+        def play(unit: Unit) -> None:
+            actor = self._actor(unit.candidates[0])
+            if recorder is not None:
+                recorder.begin()
+            one = play_episode(env.for_an_episode(), actor, unit.seed, task.max_steps, recorder)
             if recorder is not None:
                 recorder.end()
             played.append(one)
-            if time.monotonic() >= due:
-                break
+
+        error = _play_until(due, units, play)
+        tensors = recorder.tensors() if recorder is not None else {}
         columns = _columns(*(zip(*played, strict=True) if played else ((), (), (), ())))
-        return len(played), columns, recorder.tensors() if recorder is not None else {}, error
+        return len(played), {**tensors, **columns}, error
 
     def _play_groups(self, units: Sequence[Unit], due: float) -> tuple:
         env = self._env
         results: list[dict[str, Tensor]] = []
-        error = None
-        for place, unit in enumerate(units):
-            pool_process.progress[1] = place
-            try:
-                results.append(self._play_group(env, unit))
-            except BaseException as failure:
-                error = _named(failure, unit.seed)
-                break
-            if time.monotonic() >= due:
-                break
-        return len(results), {}, concatenated(results), error
+        error = _play_until(due, units, lambda unit: results.append(self._play_group(env, unit)))
+        return len(results), concatenated(results), error
 
     def _play_group(self, env: RolloutEnv, unit: Unit) -> dict[str, Tensor]:
         group = env.for_a_group
@@ -179,14 +165,8 @@ class _Playing:
         candidates[rows] = unit.candidates
         actor = self._policy.group_actor(candidates, group.num_envs)
         played = play_group(group, actor, unit, self._task.max_steps, self._task.keep)
-        columns = _columns(
-            played.earned[rows],
-            played.length[rows],
-            played.terminated[rows],
-            played.truncated[rows],
-        )
-        tensors = {name: Tensor.of(column) for name, column in columns.items()}
-        return {**tensors, **played.tensors}
+        columns = (played.earned, played.length, played.terminated, played.truncated)
+        return {**_columns(*(column[rows] for column in columns)), **played.tensors}
 
     def _actor(self, candidate: int) -> Any:
         actor = self._actors.get(candidate)
@@ -197,12 +177,27 @@ class _Playing:
         return actor
 
 
-def _columns(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, np.ndarray]:
+def _play_until(
+    due: float, units: Sequence[Unit], play: Callable[[Unit], None]
+) -> GymServerError | None:
+    """Play one unit after the other, until the time is over; return why one of them failed."""
+    for place, unit in enumerate(units):
+        pool_process.progress[1] = place
+        try:
+            play(unit)
+        except BaseException as failure:
+            return _named(failure, unit.seed)
+        if time.monotonic() >= due:
+            break
+    return None
+
+
+def _columns(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, Tensor]:
     return {
-        "return": np.array(earned, dtype=np.float64),
-        "length": np.array(length, dtype=np.int32),
-        "terminated": np.array(terminated, dtype=bool),
-        "truncated": np.array(truncated, dtype=bool),
+        "return": Tensor.of(np.array(earned, dtype=np.float64)),
+        "length": Tensor.of(np.array(length, dtype=np.int32)),
+        "terminated": Tensor.of(np.array(terminated, dtype=bool)),
+        "truncated": Tensor.of(np.array(truncated, dtype=bool)),
     }
 
 
@@ -210,7 +205,6 @@ def _named(failure: BaseException, seed: int) -> GymServerError:
     """Name the seed of the episode that has failed."""
     if not isinstance(failure, GymServerError):
         failure = environment_error(failure)
-    failure = failure.again()
     return GymServerError(
         failure.code, f"{failure.message} (episode of seed {seed})", failure.hint, failure.extra
     )

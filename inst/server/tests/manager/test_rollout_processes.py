@@ -36,6 +36,14 @@ def asked(server, seeds, **how):
         return read_answer(connection.getresponse().read())[0]
 
 
+def ask_and_leave(server, seconds, seeds, **how):
+    """Ask a real server for episodes, and leave before it has answered."""
+    with contextlib.closing(server.connect()) as connection:
+        body = request_body(seeds, **how)
+        connection.request("POST", "/v1/rollouts/", body, {"Content-Type": TENSORS})
+        time.sleep(seconds)
+
+
 def test_an_episode_that_hangs_is_ended_and_named(quick):
     client = quick(max_call_seconds=0.5, max_rollout_processes=1).test_client()
     how = {"env_id": "faulty_envs:Hanging-v0", "max_steps": 5}
@@ -119,13 +127,7 @@ def test_a_long_request_does_not_keep_others_waiting(quick):
 
 def test_episodes_of_a_client_that_leaves_are_not_played(serve):
     server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs")
-    body = request_body(range(100_000), env_id="LunarLander-v3")
-    head = f"POST /v1/rollouts/ HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
-    head += f"Content-Type: {TENSORS}\r\nContent-Length: {len(body)}\r\n\r\n"
-    client = server.socket()
-    client.sendall(head.encode() + body)
-    time.sleep(0.5)
-    client.close()
+    ask_and_leave(server, 0.5, range(100_000), env_id="LunarLander-v3")
     began = time.monotonic()
     assert len(asked(server, [1, 2], **LAKE)["return"]) == 2
     # Long before the others could have been played.
@@ -135,13 +137,7 @@ def test_episodes_of_a_client_that_leaves_are_not_played(serve):
 def test_a_step_that_nobody_waits_for_is_ended(serve):
     limits = {"gym_server.manager.rollouts._UNWANTED_SECONDS": 0.1}
     server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs", limits=limits)
-    body = request_body([1], env_id="faulty_envs:Hanging-v0", max_steps=3)
-    head = f"POST /v1/rollouts/ HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
-    head += f"Content-Type: {TENSORS}\r\nContent-Length: {len(body)}\r\n\r\n"
-    client = server.socket()
-    client.sendall(head.encode() + body)
-    time.sleep(1)
-    client.close()
+    ask_and_leave(server, 1, [1], env_id="faulty_envs:Hanging-v0", max_steps=3)
     assert len(asked(server, [1], **LAKE)["return"]) == 1
 
 
