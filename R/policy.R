@@ -29,7 +29,7 @@
 #'
 #' [saveRDS()] keeps a policy, and [readRDS()] gives it back in any session. A function keeps the
 #' variables that it uses where these are not in the global environment; connections among them, and
-#' environments made by [gym_make()], are lost, and such a function is refused.
+#' environments made by [gym_make()], are lost.
 #'
 #' @param policy The policy: of class `gym_policy`, or a function of many
 #'   observations.
@@ -116,7 +116,6 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   }
   if (is.function(x) && !has_act_method(x)) {
     check_takes_observations(x, arg, call)
-    check_connections(x, arg, call)
   }
   invisible(x)
 }

@@ -19,28 +19,14 @@ without_tokens <- function(x) {
     x[is_token_text(x)] <- "<token>"
     x
   } else if (is.call(x) || is.pairlist(x)) {
-    without_tokens_in_parts(x)
-  } else if (is.list(x) && !is.object(x)) {
-    # Data that do.call() has put there may be large.
-    rapply(x, without_tokens, classes = c("character", "call"), how = "replace")
+    # An argument may be missing, as in x[1, ].
+    for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
+      x[[i]] <- without_tokens(x[[i]])
+    }
+    x
   } else {
     x
   }
-}
-
-without_tokens_in_parts <- function(x) {
-  # With options(keep.source = TRUE) a call also has the text of its source.
-  for (source in c("srcref", "srcfile", "wholeSrcref")) {
-    attr(x, source) <- NULL
-  }
-  if (is.call(x) && identical(x[[1L]], quote(`function`))) {
-    x <- x[1:3]
-  }
-  # An argument may be missing, as in x[1, ].
-  for (i in which(!vapply(x, function(part) is.null(part) || rlang::is_missing(part), NA))) {
-    x[[i]] <- without_tokens(x[[i]])
-  }
-  x
 }
 
 is_token_text <- function(texts) {

@@ -160,8 +160,8 @@ whole_from_halves <- function(bytes, n, signed) {
   }
   lost <- if (signed) is.na(upper) & lower %in% 0L else is.na(upper) | upper < 0L
   if (any(lost)) {
-    first <- which(lost)[[1L]]
-    abort_whole(digits_of_halves(signed_half(upper[first]), unsigned_half(lower[first]), signed))
+    number <- numbers[lost][[1L]]
+    abort_whole(if (signed) "-9223372036854775808" else paste("near", format(number)))
   }
   structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
 }
@@ -182,21 +182,6 @@ signed_half <- function(half) {
 unsigned_half <- function(half) {
   half <- signed_half(half)
   half + (half < 0) * 2^32
-}
-
-# The digits of a number that no type of R's can hold, by a division by 10^9 of its halves.
-digits_of_halves <- function(upper, lower, signed) {
-  if (signed) {
-    return("-9223372036854775808")
-  }
-  upper <- upper + (upper < 0) * 2^32
-  high <- upper %/% 1e9
-  rest <- (upper %% 1e9) * 2^32
-  # rest < 2^62: take it apart further before lower is added.
-  billions <- (rest %/% 2^16) %/% 1e9
-  rest <- ((rest %/% 2^16) %% 1e9) * 2^16
-  total <- high * 2^32 + billions * 2^16 + (rest + lower) %/% 1e9
-  paste0(sprintf("%.0f", total), sprintf("%09.0f", (rest + lower) %% 1e9))
 }
 
 bytes_of_whole <- function(x) {
