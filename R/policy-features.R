@@ -198,6 +198,15 @@ act.gym_policy_features <- function(policy, observation, ...) {
   act_batch(policy, observed$batch, observed$n, NULL)
 }
 
+#' @exportS3Method
+predict_policy.gym_policy_features <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (type == "action") {
+    return(act(policy, newdata))
+  }
+  observed <- observed_batch(newdata, policy$observation_space)
+  linear_values(policy$basis, policy$weights, policy$basis$of(observed$batch, observed$n))
+}
+
 #' @export
 format.gym_policy_features <- function(x, ...) {
   features <- x$basis$features

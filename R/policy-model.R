@@ -166,22 +166,20 @@ abort_no_model <- function(x, call) {
 #' @export
 format.gym_policy_model <- function(x, ...) {
   formula <- tryCatch(stats::formula(x$model), error = function(cnd) NULL)
-  paste0(
-    class(x$model)[[1L]], " model",
-    if (inherits(formula, "formula")) paste0(", ", describe_value(plain_formula(formula)))
-  )
-}
-
-# Without the environment, which would be printed, too.
-plain_formula <- function(formula) {
-  attributes(formula) <- NULL
-  formula
+  if (inherits(formula, "formula")) {
+    # Without the environment, which would be printed, too.
+    attributes(formula) <- NULL
+    text <- describe_value(formula)
+  } else {
+    text <- NULL
+  }
+  paste(c(paste(class(x$model)[[1L]], "model"), text), collapse = ", ")
 }
 
 #' @exportS3Method
 policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()) {
   actions <- env$action_space
-  if (!inherits(actions, "gym_space_discrete") && !inherits(actions, "gym_space_box")) {
+  if (!inherits(actions, c("gym_space_discrete", "gym_space_box"))) {
     gym_abort(
       c(paste0("A model cannot choose from ", format(actions), " of ", environment_label(env), "."),
         i = paste("It can predict discrete actions and those of a Box; a function of observations",
@@ -203,4 +201,175 @@ load_model_package <- function(policy, call) {
     check_suggested(package, paste("let a model of class", class(policy$model)[[1L]], "predict"),
                     call)
   }
+}
+
+# Asking it ----------------------------------------------------------------------------
+
+#' @exportS3Method
+act_batch.gym_policy_model <- function(policy, observation, n, vector_env) {
+  columns <- observation_columns(policy$observation_space, observation)
+  model_actions(policy, columns, vector_env$call)
+}
+
+#' @export
+act.gym_policy_model <- function(policy, observation, ...) {
+  predict_policy(policy, observation, "action", rlang::current_env())
+}
+
+#' @exportS3Method
+predict_policy.gym_policy_model <- function(policy, newdata, type, call = rlang::caller_env()) {
+  observed <- list(batch = newdata, one = FALSE)
+  if (is.data.frame(newdata)) {
+    columns <- as.list(narrow_values(newdata))
+  } else {
+    check_was_played(policy, call)
+    space <- policy$observation_space
+    if (is_stackable(space)) observed <- observed_batch(newdata, space, call)
+    columns <- observation_columns(space, observed$batch)
+  }
+  if (type == "output") {
+    return(model_predictions(policy, columns, call))
+  }
+  actions <- model_actions(policy, columns, call)
+  if (observed$one) batch_value(policy$action_space, actions, 1L) else actions
+}
+
+check_was_played <- function(policy, call) {
+  if (is.null(policy$action_space)) {
+    gym_abort(
+      c("The model does not know what is observed, nor what actions there are.",
+        i = "Play it with `rollout()`: the policy in what that returns knows the environment."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+}
+
+#' Ask a model about observations
+#' @param columns A named list, the columns of a table of observations.
+#' @return What its predict() gives, a data frame of one column as a vector.
+#' @noRd
+model_predictions <- function(policy, columns, call) {
+  load_model_package(policy, call)
+  has_formula <- !is.null(tryCatch(stats::terms(policy$model), error = function(cnd) NULL))
+  newdata <- if (has_formula) list2DF(columns) else do.call(cbind, columns)
+  predicted <- tryCatch(
+    do.call(stats::predict, c(list(quote(policy$model), quote(newdata)), policy$arguments)),
+    error = function(cnd) {
+      known <- paste0("`", names(columns), "`", collapse = ", ")
+      abort_prediction(
+        policy, paste("failed:", conditionMessage(cnd)),
+        paste0("The columns that it can use are ", known), call, parent = cnd
+      )
+    }
+  )
+  predicted <- if (is.data.frame(predicted) && ncol(predicted) == 1L) predicted[[1L]] else predicted
+  plain_numbers(predicted, "predict()", call)
+}
+
+# From a prediction to an action ---------------------------------------------------------
+
+model_actions <- function(policy, columns, call) {
+  check_was_played(policy, call)
+  space <- policy$action_space
+  n <- length(columns[[1L]])
+  predicted <- model_predictions(policy, columns, call)
+  discrete <- inherits(space, "gym_space_discrete")
+  if (discrete && inherits(policy$model, "nnet") && NCOL(predicted) == space$n && space$n > 1) {
+    predicted <- largest_output(policy, predicted, call)
+  }
+  check_predictions(policy, predicted, n, if (discrete) 1L else prod(space$shape), call)
+  values <- matrix(if (is.factor(predicted)) as.character(predicted) else predicted, n)
+  actions <- if (discrete) chosen_actions(policy, values[, 1L]) else values
+  wrong <- if (discrete) is.na(actions) else !is.finite(actions)
+  if (any(wrong)) {
+    abort_no_action(policy, values[wrong][[1L]], call)
+  }
+  if (discrete) actions else shape_values(as.vector(t(actions)), c(n, space$shape))
+}
+
+# Whether there is an action for each observation, of as many numbers as it has.
+check_predictions <- function(policy, predicted, n, width, call) {
+  discrete <- inherits(policy$action_space, "gym_space_discrete")
+  right <- if (discrete) is.atomic(predicted) else is.numeric(predicted)
+  must <- "must give one action for each observation, not"
+  if (!right || NCOL(predicted) != width) {
+    hint <- if (right && discrete) {
+      paste("If these are probabilities, name the type that gives the most probable action,",
+            "such as `as_policy(model, type = \"class\")`")
+    } else if (right) {
+      paste0("An action of ", format(policy$action_space), " has ", count_of(width, "number"))
+    }
+    abort_prediction(policy, paste(must, describe_argument(predicted)), hint, call)
+  }
+  if (NROW(predicted) != n) {
+    hint <- paste("Fit the model by the columns' names, as in",
+                  "`lm(action ~ pole_angle, data = as.data.frame(played))`: a model of",
+                  "`data$action` predicts for the data that it was fitted to")
+    problem <- paste(must, NROW(predicted), "for", count_of(n, "observation"))
+    abort_prediction(policy, problem, hint, call)
+  }
+}
+
+# Several columns of nnet() are outputs to be compared.
+largest_output <- function(policy, outputs, call) {
+  space <- policy$action_space
+  if (anyNA(outputs)) {
+    abort_no_action(policy, NA, call)
+  }
+  labels <- colnames(outputs) %||% (space$start + seq_len(space$n) - 1L)
+  labels[max.col(outputs, ties.method = "first")]
+}
+
+# Discrete actions from labels, or the nearest ones; NA for what stands for none.
+chosen_actions <- function(policy, values) {
+  space <- policy$action_space
+  if (!is.null(policy$labels) && is.numeric(values)) {
+    values <- policy$labels[1L + (values > 0.5)]
+  }
+  if (!is.character(values)) {
+    return(nearest_actions(space, as.numeric(values)))
+  }
+  # The actions' numbers, or what the documentation calls them.
+  numbers <- as.integer(space$start + seq_len(space$n) - 1L)
+  found <- match(values, as.character(numbers))
+  found <- ifelse(is.na(found), match(values, action_meaning(policy$env_id, space$n)), found)
+  numbers[found]
+}
+
+# NA for a whole number that is no action.
+nearest_actions <- function(space, numbers) {
+  last <- space$start + space$n - 1
+  whole <- numbers == trunc(numbers)
+  nearest <- pmin(pmax(ceiling(numbers - 0.5), space$start), last)
+  nearest[!is.finite(numbers) | whole & nearest != numbers] <- NA
+  as.integer(nearest)
+}
+
+abort_no_action <- function(policy, predicted, call) {
+  space <- policy$action_space
+  missing <- is.na(predicted) && !is.nan(predicted)
+  actions <- if (!inherits(space, "gym_space_discrete")) {
+    "The numbers of an action must be finite"
+  } else if (space$n <= 8L) {
+    names <- action_names(policy$env_id, space$n, space$start)
+    paste("The actions are", paste(names, collapse = ", "))
+  } else {
+    paste("The actions are from", space$start, "to", space$start + space$n - 1L)
+  }
+  abort_prediction(
+    policy,
+    paste0("gave ", if (missing) "NA" else describe_value(predicted), ", which is no action of ",
+           format(space)),
+    c(actions, if (missing) "Is a part of the observation missing in the data of the model?"), call
+  )
+}
+
+abort_prediction <- function(policy, problem, hints, call, parent = NULL) {
+  lines <- c(paste("The `predict()` of the", format(policy), problem), hints)
+  lines <- ifelse(grepl("[.?]$", lines), lines, paste0(lines, "."))
+  names(lines) <- c("", rep("i", length(hints)))
+  gym_abort(
+    lines,
+    class = "gym_error_argument", argument = "policy", value = policy, call = call, parent = parent
+  )
 }

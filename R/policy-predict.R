@@ -12,19 +12,20 @@ predict.gym_policy <- function(object, newdata, type = c("action", "output"), ..
 }
 
 predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
-  if (inherits(policy, "gym_policy_model")) {
-    return(predict_model(policy, newdata, type, call))
-  }
-  if (inherits(policy, c("gym_policy_table", "gym_policy_features"))) {
-    return(predict_values(policy, newdata, type))
-  }
-  if (!inherits(policy, "gym_policy_network")) {
-    gym_abort(
-      paste0("`predict()` needs the policy to be a network, a table or a model, not ",
-             policy_text(policy), "."),
-      class = "gym_error_argument", argument = "object", value = policy, call = call
-    )
-  }
+  UseMethod("predict_policy")
+}
+
+#' @exportS3Method
+predict_policy.default <- function(policy, newdata, type, call = rlang::caller_env()) {
+  gym_abort(
+    paste0("`predict()` needs the policy to be a network, a table or a model, not ",
+           policy_text(policy), "."),
+    class = "gym_error_argument", argument = "object", value = policy, call = call
+  )
+}
+
+#' @exportS3Method
+predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlang::caller_env()) {
   observation <- observations_from(newdata, policy, call)
   if (type == "action") {
     return(act(policy, observation))
@@ -32,19 +33,6 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
   values <- observation_rows(observation, policy$observation_space)$values
   outputs <- network_outputs(policy, values, call)
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
-}
-
-# The output of a table, and of values that are linear in features, is a value for each action.
-predict_values <- function(policy, newdata, type) {
-  if (type == "action") {
-    return(act(policy, newdata))
-  }
-  if (inherits(policy, "gym_policy_table")) {
-    observed <- observed_batch(newdata, states_of(policy))
-    return(table_rows(policy, observed$batch, observed$n))
-  }
-  observed <- observed_batch(newdata, policy$observation_space)
-  linear_values(policy$basis, policy$weights, policy$basis$of(observed$batch, observed$n))
 }
 
 # The observations in a data frame: the columns with their names, or all columns where it has none

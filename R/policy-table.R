@@ -48,6 +48,16 @@ act.gym_policy_table <- function(policy, observation, ...) {
   act_batch(policy, observed$batch, observed$n, NULL)
 }
 
+#' @exportS3Method
+predict_policy.gym_policy_table <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (type == "action") {
+    return(act(policy, newdata))
+  }
+  # The output is a value for each action.
+  observed <- observed_batch(newdata, states_of(policy))
+  table_rows(policy, observed$batch, observed$n)
+}
+
 # What a table has rows for.
 states_of <- function(policy) policy$observation_space %||% space_discrete(nrow(policy$q))
 

@@ -287,17 +287,27 @@ check_rows <- function(observation, rank, space, call) {
 #'
 #' @param space The observation space. Where it has parts there is one observation, or a data frame
 #'   with a column for each part.
-#' @return A list: `batch`, whose arrays are rows of numbers as [observation_rows()] has them, and
-#'   `n`, how many observations there are.
+#' @return A list: `batch`; `n`, how many observations there are; `one`, whether `observation` was a
+#'   single observation rather than a batch.
 #' @noRd
 observed_batch <- function(observation, space, call = rlang::caller_env()) {
   if (is_stackable(space)) {
-    rows <- observation_rows(observation, space, call)$values
-    list(batch = if (length(space$shape)) rows else rows[, 1L], n = nrow(rows))
+    rows <- observation_rows(observation, space, call)
+    n <- nrow(rows$values)
+    rank <- length(space$shape)
+    batch <- if (rank == 0L) {
+      rows$values[, 1L]
+    } else if (rank == 1L) {
+      rows$values
+    } else {
+      shape_values(row_major(rows$values), c(n, space$shape))
+    }
+    list(batch = batch, n = n, one = rows$one)
   } else if (is.data.frame(observation)) {
-    list(batch = in_order(space, as.list(observation)), n = nrow(observation))
+    batch <- in_order(space, as.list(observation))
+    list(batch = batch, n = nrow(observation), one = FALSE)
   } else {
     check_value(space, observation, "", call)
-    list(batch = batch_of(space, list(in_order(space, observation))), n = 1L)
+    list(batch = batch_of(space, list(in_order(space, observation))), n = 1L, one = TRUE)
   }
 }
