@@ -258,7 +258,7 @@ bare_stepper <- function(env) {
   function(action, which) {
     step <- choose(action, which)
     out <- take_step(env, step$n, step$action, step$which, finals = FALSE)
-    if (is.null(step$row)) out else rows_of_step(env, out, step$row)
+    if (is.null(step$row)) out else rows_of_step(env$single_observation_space, out, step$row)
   }
 }
 
@@ -286,8 +286,7 @@ step_chooser <- function(env) {
 }
 
 # Some rows of what a step returned.
-rows_of_step <- function(env, out, row) {
-  space <- env$single_observation_space
+rows_of_step <- function(space, out, row) {
   # The two are nearly always the same, which identical() sees at once.
   same <- identical(out$observation, out$next_observation)
   observation <- batch_rows(space, out$observation, row)
@@ -309,7 +308,7 @@ joint_sub_envs <- function(env) {
     if (length(which) == n) {
       return(out)
     }
-    rows_of_step(env, out, which)
+    rows_of_step(observed, out, which)
   }
   list(
     observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,

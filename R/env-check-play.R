@@ -129,25 +129,15 @@ look_at_step <- function(check, out, place) {
     note(name, "`step()` must return a list with an element `", name, "`, and in ", place,
          " there is none.")
   }
-  n <- check$env[["num_envs"]] %||% 1L
-  rules <- list(
-    reward = list(are_rewards, "one finite number"), terminated = list(is_flags, "TRUE or FALSE"),
-    truncated = list(is_flags, "TRUE or FALSE"),
-    info = list(function(x, n) is.null(x) || is.list(x), "a list")
-  )
-  for (name in setdiff(names(rules), absent)) {
-    if (!rules[[name]][[1L]](out[[name]], n)) {
-      note(name, "`", name, "` must be ", rules[[name]][[2L]],
-           if (n > 1L && name != "info") " for each sub-environment", ", and is ",
-           describe_argument(out[[name]]), " in ", place, ".")
-    }
+  wrong <- wrong_parts(out, check$env[["num_envs"]] %||% 1L, finite = TRUE)
+  for (name in setdiff(names(wrong), absent)) {
+    note(name, "`", name, "` must be ", wrong[[name]], ", and is ", describe_argument(out[[name]]),
+         " in ", place, ".")
   }
   if (!"observation" %in% absent) {
     look_at_observation(check, "step", out$observation, paste("The observation of", place))
   }
 }
-
-are_rewards <- function(x, n) is.numeric(x) && length(x) == n && all(is.finite(x))
 
 # Environments written in R --------------------------------------------------------------
 
@@ -172,7 +162,7 @@ without_checks <- function(env) {
       sub_env$taken <- sub_env$taken + 1L
       if (is.list(out)) {
         truncated <- out$truncated %||% logical(n)
-        at_limit <- sub_env$taken >= sub_env$task$limit
+        at_limit <- sub_env$taken >= sub_env$traits$limit
         out$truncated <- if (is.logical(truncated)) truncated | at_limit else truncated
       }
       out

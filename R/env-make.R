@@ -282,11 +282,12 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
 format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
 
 check_open <- function(env, call = rlang::caller_env()) {
-  if (!env$is_open) {
-    gym_abort(
-      c("This environment was closed.",
-        i = paste0("`gym_make(\"", env$spec$id, "\")` makes a new one.")),
-      class = "gym_error_argument", argument = "env", value = env, call = call
-    )
-  }
+  if (!env$is_open) abort_closed(paste0("`gym_make(\"", env$spec$id, "\")` makes a new one."), call)
+}
+
+abort_closed <- function(hint, call) {
+  gym_abort(
+    c("This environment was closed.", i = hint),
+    class = "gym_error_argument", argument = "env", call = call
+  )
 }

@@ -85,10 +85,10 @@ GymEnv <- R6Class(
                           action_space = self$action_space, id = class(self)[[1L]],
                           max_episode_steps = NULL, reward_threshold = NULL, render_fps = NULL) {
       check_overrides(self)
-      task <- new_task(
+      traits <- new_traits(
         observation_space, action_space, id, max_episode_steps, reward_threshold, render_fps
       )
-      private$gym_sub_env <- class_sub_env(self, task)
+      private$gym_sub_env <- class_sub_env(self, traits)
       become_sub_env(self, private$gym_sub_env)
     },
     reset = function() abort_no_method(self, "reset"),
@@ -122,15 +122,15 @@ sub_env_of <- function(env) {
 
 # Sets what an object shows of its sub-environment.
 become_sub_env <- function(env, sub_env) {
-  task <- sub_env$task
+  traits <- sub_env$traits
   n <- sub_env$num_envs
   spread <- function(space) if (is.null(n)) space else spread_bounds(batch_space(space, n))
-  env$single_observation_space <- task$observation_space
-  env$single_action_space <- task$action_space
-  env$observation_space <- spread(task$observation_space)
-  env$action_space <- spread(task$action_space)
+  env$single_observation_space <- traits$observation_space
+  env$single_action_space <- traits$action_space
+  env$observation_space <- spread(traits$observation_space)
+  env$action_space <- spread(traits$action_space)
   env$num_envs <- n
-  env$spec <- task$spec
+  env$spec <- traits$spec
   replace_methods(env, checked_methods(sub_env))
 }
 
@@ -145,7 +145,7 @@ replace_methods <- function(env, methods) {
 }
 
 # The sub-environment that an object's own methods play.
-class_sub_env <- function(env, task) {
+class_sub_env <- function(env, traits) {
   reset <- env$reset
   takes <- intersect(c("seed", "options"), names(formals(reset)))
   functions <- plain_results(list(
@@ -155,7 +155,7 @@ class_sub_env <- function(env, task) {
     step = env$step
   ))
   new_sub_env(
-    task,
+    traits,
     reset = functions$reset,
     step = functions$step,
     render = if (overrides(env, "render")) env$render,

@@ -27,53 +27,34 @@ reset_r_env <- function(sub_env, seed, options, return_info, call = rlang::calle
 step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
   check_sub_env_open(sub_env, call)
   check_was_reset(sub_env, call)
-  task <- sub_env$task
+  traits <- sub_env$traits
   action <- narrow_values(action)
   if (is.null(sub_env$num_envs)) {
-    check_value(task$action_rules, action, "", call, bounds = TRUE)
-    action <- tidy_value(task$action_space, action)
+    check_value(traits$action_rules, action, "", call, bounds = TRUE)
+    action <- tidy_value(traits$action_space, action, NULL)
   } else {
-    check_actions(task, action, seq_len(sub_env$num_envs), call)
-    action <- tidy_actions(task$action_space, action)
+    check_actions(traits, action, seq_len(sub_env$num_envs), call)
+    action <- tidy_actions(traits$action_space, action)
   }
   out <- raw_step(sub_env, action, call = call)
   out <- complete_step(out, sub_env, call = call)
-  done <- out$terminated | out$truncated
   if (isTRUE(all(sub_env$ended))) {
-    warn_step_after_end(sub_env, call)
+    # NA: the episode is over, and the warning has been given.
+    sub_env$ended <- NA
+    warn_step_after_end(traits$spec$id, call)
   } else {
-    sub_env$ended <- sub_env$ended | done
+    sub_env$ended <- sub_env$ended | out$terminated | out$truncated
   }
-  append(out, list(done = done, info = out$info), after = 2L)[
-    c("observation", "reward", "done", "info", "terminated", "truncated")
-  ]
-}
-
-warn_step_after_end <- function(sub_env, call) {
-  # NA: the episode is over, and the warning has been given.
-  sub_env$ended <- NA
-  rlang::warn(
-    c(
-      paste0(sub_env$task$spec$id, " took a step after the end of its episode."),
-      i = "What comes of it is undefined: reset the environment first."
-    ),
-    class = "gym_warning_step_after_done",
-    call = call
-  )
+  step_result(out$observation, out$reward, out$terminated, out$truncated, out$info)
 }
 
 check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
-  if (sub_env$closed) {
-    gym_abort(
-      c("This environment was closed.", i = "Make a new one."),
-      class = "gym_error_argument", argument = "env", call = call
-    )
-  }
+  if (sub_env$closed) abort_closed("Make a new one.", call)
 }
 
 abort_clone <- function(sub_env, call = rlang::caller_env()) {
   gym_abort(
-    c(paste0(sub_env$task$spec$id, " cannot be cloned: a clone would share its random generator."),
+    c(paste0(sub_env$traits$spec$id, " cannot be cloned: a clone would share its random generator."),
       i = "Make another one instead."),
     class = "gym_error_argument", argument = "env", call = call
   )

@@ -18,7 +18,7 @@ render_r_env <- function(sub_env, call = rlang::caller_env()) {
 check_renders <- function(sub_env, call = rlang::caller_env()) {
   if (is.null(sub_env$render)) {
     gym_abort(
-      c(paste0("There is nothing to see of ", sub_env$task$spec$id, ": it cannot be drawn."),
+      c(paste0("There is nothing to see of ", sub_env$traits$spec$id, ": it cannot be drawn."),
         i = "An environment in R is drawn by its function `render`, see `?gym_env`."),
       class = "gym_error_argument", argument = "render", call = call
     )
@@ -46,7 +46,7 @@ draw_sub_env <- function(sub_env, call) {
     frame_from_picture(picture, sub_env, call)
   } else if (is.null(bytes)) {
     gym_abort(
-      c(paste0("`render()` of ", sub_env$task$spec$id, " drew nothing and returned ",
+      c(paste0("`render()` of ", sub_env$traits$spec$id, " drew nothing and returned ",
                describe_argument(picture), "."),
         i = "It must plot, or return a raster image, a matrix or an array of height x width x 3."),
       class = "gym_error_argument", argument = "render", value = picture, call = call
@@ -58,10 +58,10 @@ draw_sub_env <- function(sub_env, call) {
 
 abort_render <- function(cnd, sub_env, call) {
   gym_abort(
-    paste0("`render()` of ", sub_env$task$spec$id, " raised an error."),
+    paste0("`render()` of ", sub_env$traits$spec$id, " raised an error."),
     class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
               "gym_error_environment"),
-    env_id = sub_env$task$spec$id, call = call, parent = cnd
+    env_id = sub_env$traits$spec$id, call = call, parent = cnd
   )
 }
 

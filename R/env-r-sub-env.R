@@ -12,9 +12,9 @@
 #'   need; `taken`, how many steps the episode has taken, `NA` before the first reset; `ended`,
 #'   whether it has ended, `NA` when it was warned of that; `closed`.
 #' @noRd
-new_sub_env <- function(task, reset, step, render = NULL, takes_options = FALSE, num_envs = NULL) {
+new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALSE, num_envs = NULL) {
   sub_env <- new.env(parent = emptyenv())
-  sub_env$task <- task
+  sub_env$traits <- traits
   sub_env$reset <- reset
   sub_env$step <- step
   sub_env$render <- render
@@ -48,7 +48,7 @@ reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number =
                           call = rlang::caller_env()) {
   if (!is.null(options) && !sub_env$takes_options) {
     gym_abort(
-      c(paste0("`reset()` of ", sub_env$task$spec$id, " takes no options."),
+      c(paste0("`reset()` of ", sub_env$traits$spec$id, " takes no options."),
         i = "It takes some when it has an argument `options`."),
       class = "gym_error_argument", argument = "options", value = options, call = call
     )
@@ -63,14 +63,8 @@ reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number =
     with_generator(sub_env$generator, sub_env$reset(seed, options)),
     error = function(cnd) abort_raised(cnd, sub_env, sub_env_number, call)
   )
-  where <- paste0("`reset()` of ", sub_env$task$spec$id)
-  observation <- if (is.null(sub_env$num_envs)) {
-    check_observation(sub_env$task, observation, where, call)
-    tidy_value(sub_env$task$observation_space, observation)
-  } else {
-    check_observations(sub_env$task, observation, seq_len(sub_env$num_envs), where, call)
-    tidy_batch(sub_env$task$observation_space, observation)
-  }
+  where <- paste0("`reset()` of ", sub_env$traits$spec$id)
+  observation <- checked_observation(sub_env$traits, observation, sub_env$num_envs, where, call)
   sub_env$taken <- 0L
   sub_env$ended <- logical(sub_env$num_envs %||% 1L)
   observation
@@ -94,7 +88,7 @@ raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::calle
 check_was_reset <- function(sub_env, call) {
   if (is.na(sub_env$taken)) {
     gym_abort(
-      c(paste0(sub_env$task$spec$id, " has not been reset, so that it has no episode yet."),
+      c(paste0(sub_env$traits$spec$id, " has not been reset, so that it has no episode yet."),
         i = "`env$reset()` starts an episode."),
       class = "gym_error_argument", argument = "env", call = call
     )
@@ -111,10 +105,10 @@ abort_raised <- function(cnd, sub_env, sub_env_number, call) {
   at <- if (!is.na(taken)) paste0(" in step ", taken + 1L, " of the episode")
   in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
   gym_abort(
-    paste0(where, sub_env$task$spec$id, " raised an error", at, in_sub_env, "."),
+    paste0(where, sub_env$traits$spec$id, " raised an error", at, in_sub_env, "."),
     class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
               "gym_error_environment"),
-    env_id = sub_env$task$spec$id, step = if (!is.na(taken)) taken + 1L,
+    env_id = sub_env$traits$spec$id, step = if (!is.na(taken)) taken + 1L,
     sub_env = sub_env_number, call = call, parent = cnd
   )
 }

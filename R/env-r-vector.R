@@ -10,47 +10,55 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_made_before(NULL, c(list(...), num_workers = num_workers), x)
   check_count(num_envs, allow_null = TRUE)
   check_one_framed(num_envs, frames)
-  sub_env <- sub_env_of(x)
-  check_sub_env_open(sub_env)
-  if (frames) {
-    check_renders(sub_env)
-    num_envs <- 1L
-  }
-  definition <- definition_of(x)
-  if (is.null(definition)) {
-    check_only_one(num_envs, sub_env)
-    scalar_vector_env(list(sub_env), 1L, frames)
-  } else if (definition$vectorized) {
-    vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames)
-  } else {
-    if (length(remembering(sub_env$task$spec$wrappers))) {
-      num_envs <- 1L
-    }
-    copies <- lapply(seq_len(num_envs %||% min(r_sub_envs, max_envs)), function(i) {
-      definition_sub_env(definition)
-    })
-    scalar_vector_env(copies, episodes_of_batch(num_envs %||% r_sub_envs), frames)
-  }
+  check_sub_env_open(sub_env_of(x))
+  r_vector_env(x, num_envs, max_envs, frames)
 }
 
-check_only_one <- function(num_envs, sub_env, call = rlang::caller_env()) {
+#' Play an environment in R in copies of it
+#' @param another A function that makes another sub-environment for an object of a class; `NULL`
+#'   where nobody can: then there is this one only.
+#' @noRd
+r_vector_env <- function(env, num_envs, max_envs, frames, another = NULL,
+                         call = rlang::caller_env()) {
+  sub_env <- sub_env_of(env)
+  definition <- definition_of(env)
+  if (frames) check_renders(sub_env, call)
+  if (isTRUE(definition$vectorized)) {
+    num_envs <- if (frames) 1L else as.integer(num_envs %||% vectorized_sub_envs)
+    return(vectorized_vector_env(definition, num_envs, frames))
+  }
+  if (is.null(definition) && is.null(another)) {
+    check_only_one(num_envs, sub_env, call)
+    return(scalar_vector_env(list(sub_env), 1L, frames))
+  }
+  if (frames || length(remembering(sub_env$traits$spec$wrappers))) num_envs <- 1L
+  n <- num_envs %||% min(r_sub_envs, max_envs)
+  sub_envs <- if (is.null(definition)) {
+    c(list(sub_env), lapply(seq_len(n - 1), function(i) another()))
+  } else {
+    lapply(seq_len(n), function(i) definition_sub_env(definition))
+  }
+  scalar_vector_env(sub_envs, episodes_of_batch(num_envs %||% r_sub_envs), frames)
+}
+
+check_only_one <- function(num_envs, sub_env, call) {
   if (isTRUE(num_envs > 1)) {
     gym_abort(
       c(paste0("`num_envs = ", num_envs, "` takes as many environments, and this ",
-               sub_env$task$spec$id, " is one."),
+               sub_env$traits$spec$id, " is one."),
         i = "`gym_register()` its class, and name the environment by its id."),
       class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
     )
   }
 }
 
-new_r_vector_env <- function(task, ..., frames, sub_env) {
+new_r_vector_env <- function(traits, ..., frames, sub_env) {
   structure(
     list(
-      observation_space = task$observation_space, action_space = task$action_space,
-      spec = task$spec, ...,
+      observation_space = traits$observation_space, action_space = traits$action_space,
+      spec = traits$spec, ...,
       frame = if (frames) function() sub_env_png(sub_env),
-      remembers = remembering(task$spec$wrappers), client = NULL,
+      remembers = remembering(traits$spec$wrappers), client = NULL,
       close = function(wait = TRUE) invisible()
     ),
     class = "gym_vector_env"
@@ -61,16 +69,16 @@ new_r_vector_env <- function(task, ..., frames, sub_env) {
 
 #' Play sub-environments side by side
 #'
-#' @param sub_envs A list of them, all of one task.
+#' @param sub_envs A list of them, all of one traits.
 #' @noRd
 scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
-  task <- sub_envs[[1L]]$task
+  traits <- sub_envs[[1L]]$traits
   all <- seq_along(sub_envs)
   number <- function(i) if (length(sub_envs) > 1L) i
-  pick <- action_picker(task$action_space)
-  stack <- result_stacker(task)
+  pick <- action_picker(traits$action_space)
+  stack <- result_stacker(traits)
   new_r_vector_env(
-    task, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
+    traits, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
     env = if (length(sub_envs) == 1L) checked_methods(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
       call <- rlang::current_env()
@@ -79,13 +87,13 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
         i <- which[[k]]
         reset_sub_env(sub_envs[[i]], seeds[[k]], sub_env_number = number(i), call = call)
       })
-      tidy_batch(task$observation_space, batch_of(task$observation_space, values))
+      tidy_value(traits$observation_space, batch_of(traits$observation_space, values), length(which))
     },
     step = function(action, which = all) {
       call <- rlang::current_env()
       which <- which %||% all
-      check_actions(task, action, which, call)
-      action <- tidy_actions(task$action_space, action)
+      check_actions(traits, action, which, call)
+      action <- tidy_actions(traits$action_space, action)
       stepping <- sub_envs[which]
       taken <- vapply(stepping, function(sub_env) sub_env$taken, 0L) + 1L
       if (anyNA(taken)) {
@@ -107,8 +115,8 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
         error = function(cnd) abort_raised(cnd, stepping[[k]], number(which[[k]]), call)
       ))
       result <- stack(outs) %||% stack_checked(outs, stepping, lapply(which, number), call)
-      if (task$limit < Inf) {
-        result$truncated <- result$truncated | taken >= task$limit
+      if (traits$limit < Inf) {
+        result$truncated <- result$truncated | taken >= traits$limit
       }
       ended <- result$terminated | result$truncated
       if (any(ended)) {
@@ -125,8 +133,8 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
 #'
 #' @return A function of a list of results. It returns `NULL` where one of them may be wrong.
 #' @noRd
-result_stacker <- function(task) {
-  space <- task$observation_space
+result_stacker <- function(traits) {
+  space <- traits$observation_space
   stack <- observation_stacker(space)
   if (is.null(stack)) {
     return(function(outs) NULL)
@@ -136,16 +144,17 @@ result_stacker <- function(task) {
     if (!all(vapply(outs, is.list, NA))) {
       return(NULL)
     }
-    reward <- stack_singles(outs, "reward")
-    terminated <- stack_singles(outs, "terminated")
-    truncated <- stack_singles(outs, "truncated", optional = TRUE)
-    good <- is_reward(reward, n) && is_flags(terminated, n) && is_flags(truncated, n)
-    observation <- if (good) stack(lapply(outs, .subset2, "observation"), n)
-    if (!is.null(observation) && task$fits_observations(observation, n)) {
-      list(
-        observation = tidy_batch(space, observation),
-        reward = as.numeric(reward), terminated = terminated, truncated = truncated
-      )
+    result <- list(
+      reward = stack_singles(outs, "reward"),
+      terminated = stack_singles(outs, "terminated"),
+      truncated = stack_singles(outs, "truncated", optional = TRUE)
+    )
+    observation <- if (is.null(wrong_parts(result, n))) {
+      stack(lapply(outs, .subset2, "observation"), n)
+    }
+    if (!is.null(observation) && traits$fits_observations(observation, n)) {
+      result$reward <- as.numeric(result$reward)
+      c(list(observation = tidy_value(space, observation, n)), result)
     }
   }
 }
@@ -192,14 +201,13 @@ observation_stacker <- function(space) {
 
 # The same with a look at each of them, which finds the one that is wrong.
 stack_checked <- function(outs, sub_envs, numbers, call) {
-  task <- sub_envs[[1L]]$task
+  space <- sub_envs[[1L]]$traits$observation_space
   results <- Map(complete_step, outs, sub_envs, numbers, MoreArgs = list(call = call))
-  values <- lapply(results, function(result) result$observation)
-  each <- function(name, type) vapply(results, function(result) result[[name]], type)
+  each <- function(name) lapply(results, `[[`, name)
   list(
-    observation = tidy_batch(task$observation_space, batch_of(task$observation_space, values)),
-    reward = each("reward", 0), terminated = each("terminated", NA),
-    truncated = each("truncated", NA)
+    observation = tidy_value(space, batch_of(space, each("observation")), length(outs)),
+    reward = unlist(each("reward")), terminated = unlist(each("terminated")),
+    truncated = unlist(each("truncated"))
   )
 }
 
@@ -212,66 +220,41 @@ stack_checked <- function(outs, sub_envs, numbers, call) {
 #' @noRd
 vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   sub_env <- definition_sub_env(definition, num_envs)
-  task <- definition$task
-  observed <- task$observation_space
+  traits <- definition$traits
   new_r_vector_env(
-    task, num_envs = num_envs, batch_size = num_envs, one_seed = TRUE,
+    traits, num_envs = num_envs, batch_size = num_envs, one_seed = TRUE,
     reset = function(seeds, which = NULL) {
       reset_sub_env(sub_env, seeds[[1L]], call = rlang::current_env())
     },
     step = function(action, which = seq_len(num_envs)) {
       call <- rlang::current_env()
       which <- which %||% seq_len(num_envs)
-      check_actions(task, action, which, call)
-      action <- tidy_actions(task$action_space, action)
-      action <- actions_of_all(task$action_space, action, which, num_envs)
+      check_actions(traits, action, which, call)
+      action <- tidy_actions(traits$action_space, action)
+      action <- actions_of_all(traits$action_space, action, which, num_envs)
       out <- raw_step(sub_env, action, call = call)
-      result <- take_rows(out, sub_env, which, call)
-      result$next_observation <- result$observation
-      result
+      some <- length(which) < num_envs
+      if (some) out <- without_ended(out, traits$observation_space, which, num_envs)
+      out <- complete_step(out, sub_env, call = call)
+      out$next_observation <- out$observation
+      if (some) rows_of_step(traits$observation_space, out, which) else out
     },
     frames = frames, sub_env = sub_env
   )
 }
 
-#' Take the results of some sub-environments out of what a vectorised step returned, and check them
-#' @noRd
-take_rows <- function(out, sub_env, which, call) {
-  task <- sub_env$task
-  space <- task$observation_space
-  n <- sub_env$num_envs
-  where <- step_place(sub_env)
-  if (length(which) < n) {
-    out <- rows_of_result(out, sub_env, which, where, call)
+# What those return whose episode has ended may be anything: what the first that plays has returned
+# takes its place.
+without_ended <- function(out, space, which, n) {
+  if (is.list(out)) {
+    row <- rep(which[[1L]], n)
+    row[which] <- which
+    for (name in c("reward", flags)) {
+      if (length(out[[name]]) == n) out[[name]] <- out[[name]][row]
+    }
+    if (identical(as.integer(batch_length(space, out$observation)), n)) {
+      out$observation <- batch_rows(space, out$observation, row)
+    }
   }
-  n <- length(which)
-  quick <- is.list(out) && is_reward(out$reward, n) && is_flags(out$terminated, n) &&
-    (is.null(out$truncated) || is_flags(out$truncated, n))
-  if (!quick) {
-    check_step_parts(out, n, where, call)
-  }
-  check_observations(task, out$observation, which, where, call)
-  list(
-    observation = tidy_batch(space, out$observation),
-    reward = as.numeric(out$reward),
-    terminated = out$terminated,
-    truncated = (out$truncated %||% logical(n)) | sub_env$taken >= task$limit
-  )
-}
-
-# What those return whose episode has ended may be anything.
-rows_of_result <- function(out, sub_env, which, where, call) {
-  space <- sub_env$task$observation_space
-  n <- sub_env$num_envs
-  parts <- c("reward", "terminated", if (is.list(out) && !is.null(out$truncated)) "truncated")
-  complete <- is.list(out) && all(lengths(out[parts]) == n)
-  if (!complete) {
-    check_step_parts(out, n, where, call)
-  }
-  if (!identical(as.integer(batch_length(space, out$observation)), n)) {
-    check_observations(sub_env$task, out$observation, seq_len(n), where, call)
-  }
-  out[parts] <- lapply(out[parts], `[`, which)
-  out$observation <- batch_rows(space, out$observation, which)
   out
 }

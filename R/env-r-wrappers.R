@@ -1,8 +1,8 @@
 # Wrappers of environments written in R, with the names, the arguments and the formulas of
 # Gymnasium's (https://gymnasium.farama.org/api/wrappers/).
 #
-# A wrapper is made by a function of the task that it wraps and of its arguments. What it returns is
-# a list: `task`, as the environment looks from outside, and `around`, a function of `inner` (a list
+# A wrapper is made by a function of the traits that it wraps and of its arguments. What it returns is
+# a list: `traits`, as the environment looks from outside, and `around`, a function of `inner` (a list
 # of the functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL` where they are
 # not vectorised), which returns these functions as they are from outside. It is called for each
 # sub-environment, so what a wrapper remembers belongs to one.
@@ -13,16 +13,16 @@
 #' @noRd
 wrap_r_env <- function(env, wrapper, arguments, call) {
   sub_env <- sub_env_of(env)
-  made <- make_r_wrapper(sub_env$task, wrapper, arguments, call)
-  made$task$spec$wrappers <- c(made$task$spec$wrappers, wrapper)
+  made <- make_r_wrapper(sub_env$traits, wrapper, arguments, call)
+  made$traits$spec$wrappers <- c(made$traits$spec$wrappers, wrapper)
   definition <- definition_of(env)
   if (is.null(definition)) {
     functions <- made$around(list(reset = sub_env$reset, step = sub_env$step), NULL)
     wrapped_env$new(new_sub_env(
-      made$task, functions$reset, functions$step, sub_env$render, sub_env$takes_options
+      made$traits, functions$reset, functions$step, sub_env$render, sub_env$takes_options
     ))
   } else {
-    definition$task <- made$task
+    definition$traits <- made$traits
     definition$wrappers <- c(definition$wrappers, list(made$around))
     # A wrapper may change what the model says.
     definition["model"] <- list(NULL)
@@ -50,10 +50,10 @@ wrapped_env <- R6Class(
   )
 )
 
-make_r_wrapper <- function(task, wrapper, arguments, call) {
+make_r_wrapper <- function(traits, wrapper, arguments, call) {
   check_r_wrapper(wrapper, call)
   make <- r_wrappers[[wrapper]]
-  known <- setdiff(names(formals(make)), c("task", "call"))
+  known <- setdiff(names(formals(make)), c("traits", "call"))
   strange <- setdiff(names(arguments), known)
   needed <- known[vapply(formals(make)[known], is_without_default, NA)]
   lacking <- setdiff(needed, names(arguments))
@@ -68,7 +68,7 @@ make_r_wrapper <- function(task, wrapper, arguments, call) {
       class = "gym_error_argument", argument = c(strange, lacking)[[1L]], call = call
     )
   }
-  rlang::exec(make, task, !!!arguments, call = call)
+  rlang::exec(make, traits, !!!arguments, call = call)
 }
 
 is_without_default <- function(formal) rlang::is_missing(formal)
@@ -85,23 +85,23 @@ check_r_wrapper <- function(wrapper, call) {
 
 # Each wrapper --------------------------------------------------------------------------
 
-wrap_time_limit <- function(task, max_episode_steps, call) {
+wrap_time_limit <- function(traits, max_episode_steps, call) {
   check_count(max_episode_steps, call = call)
-  limit <- as.integer(min(task$limit, max_episode_steps))
+  limit <- as.integer(min(traits$limit, max_episode_steps))
   list(
-    task = change_task(task, list(max_episode_steps = limit)),
+    traits = change_traits(traits, list(max_episode_steps = limit)),
     around = function(inner, num_envs) inner
   )
 }
 
-wrap_clip_action <- function(task, call) {
-  space <- task$action_space
+wrap_clip_action <- function(traits, call) {
+  space <- traits$action_space
   check_wrapped_box(space, "ClipAction", "actions", call)
   outside <- space
   outside$low <- rep(-Inf, prod(space$shape))
   outside$high <- -outside$low
   list(
-    task = change_spaces(task, action_space = outside),
+    traits = change_spaces(traits, action_space = outside),
     around = function(inner, num_envs) {
       low <- spread_numbers(space$low, space$shape, num_envs)
       high <- spread_numbers(space$high, space$shape, num_envs)
@@ -110,8 +110,8 @@ wrap_clip_action <- function(task, call) {
   )
 }
 
-wrap_rescale_action <- function(task, min_action, max_action, call) {
-  space <- task$action_space
+wrap_rescale_action <- function(traits, min_action, max_action, call) {
+  space <- traits$action_space
   check_wrapped_box(space, "RescaleAction", "actions", call)
   outside <- rescaled_box(space, min_action, max_action, call)
   if (any(outside$low == outside$high)) {
@@ -119,19 +119,19 @@ wrap_rescale_action <- function(task, min_action, max_action, call) {
     abort_argument(max_action, must, "max_action", call)
   }
   list(
-    task = change_spaces(task, action_space = outside),
+    traits = change_spaces(traits, action_space = outside),
     around = function(inner, num_envs) {
       change_action(inner, rescaler(outside, space, num_envs))
     }
   )
 }
 
-wrap_rescale_observation <- function(task, min_obs, max_obs, call) {
-  space <- task$observation_space
+wrap_rescale_observation <- function(traits, min_obs, max_obs, call) {
+  space <- traits$observation_space
   check_wrapped_box(space, "RescaleObservation", "observations", call)
   outside <- rescaled_box(space, min_obs, max_obs, call)
   list(
-    task = change_spaces(task, observation_space = outside),
+    traits = change_spaces(traits, observation_space = outside),
     around = function(inner, num_envs) {
       rescale <- rescaler(space, outside, num_envs)
       size <- prod(space$shape) * (num_envs %||% 1L)
@@ -148,7 +148,7 @@ wrap_rescale_observation <- function(task, min_obs, max_obs, call) {
   )
 }
 
-wrap_clip_reward <- function(task, min_reward = NULL, max_reward = NULL, call) {
+wrap_clip_reward <- function(traits, min_reward = NULL, max_reward = NULL, call) {
   check_number(min_reward, allow_null = TRUE, call = call)
   check_number(max_reward, allow_null = TRUE, call = call)
   if (is.null(min_reward) && is.null(max_reward)) {
@@ -160,13 +160,13 @@ wrap_clip_reward <- function(task, min_reward = NULL, max_reward = NULL, call) {
   if (low > high) {
     abort_argument(max_reward, paste("at least `min_reward`, which is", low), "max_reward", call)
   }
-  list(task = task, around = function(inner, num_envs) {
+  list(traits = traits, around = function(inner, num_envs) {
     change_reward(inner, function(out) pmin(pmax(out$reward, low), high))
   })
 }
 
-wrap_normalize_observation <- function(task, epsilon = 1e-8, call) {
-  space <- task$observation_space
+wrap_normalize_observation <- function(traits, epsilon = 1e-8, call) {
+  space <- traits$observation_space
   if (!is_stackable(space)) {
     abort_wrapped("NormalizeObservation", "observations that are numbers", space, call)
   }
@@ -175,7 +175,7 @@ wrap_normalize_observation <- function(task, epsilon = 1e-8, call) {
   size <- prod(shape)
   outside <- space_box(-Inf, Inf, shape)
   outside$names <- space$names
-  list(task = change_spaces(task, observation_space = outside), around = function(inner, num_envs) {
+  list(traits = change_spaces(traits, observation_space = outside), around = function(inner, num_envs) {
     n <- num_envs %||% 1L
     moments <- running_moments(size)
     playing <- playing_sub_envs(n)
@@ -185,8 +185,9 @@ wrap_normalize_observation <- function(task, epsilon = 1e-8, call) {
         return(observation)
       }
       rows <- matrix(as.double(observation), n)
-      update_moments(moments, rows[playing$which, , drop = FALSE])
-      rows <- (rows - rep(moments$mean, each = n)) / rep(sqrt(moments$var + epsilon), each = n)
+      moments <<- merge_moments(moments, moments_of(rows[playing$which, , drop = FALSE]))
+      deviation <- sqrt(variance_of(moments) + epsilon)
+      rows <- (rows - rep(moments$mean, each = n)) / rep(deviation, each = n)
       dim(rows) <- dim(observation) %||% if (!is.null(num_envs)) dim(rows)
       rows
     })
@@ -194,10 +195,10 @@ wrap_normalize_observation <- function(task, epsilon = 1e-8, call) {
   })
 }
 
-wrap_normalize_reward <- function(task, gamma = 0.99, epsilon = 1e-8, call) {
+wrap_normalize_reward <- function(traits, gamma = 0.99, epsilon = 1e-8, call) {
   check_number(gamma, min = 0, max = 1, call = call)
   check_epsilon(epsilon, call)
-  list(task = task, around = function(inner, num_envs) {
+  list(traits = traits, around = function(inner, num_envs) {
     n <- num_envs %||% 1L
     moments <- running_moments(1L)
     playing <- playing_sub_envs(n)
@@ -210,8 +211,8 @@ wrap_normalize_reward <- function(task, gamma = 0.99, epsilon = 1e-8, call) {
       which <- playing$which
       goes_on <- !out$terminated[which]
       discounted[which] <<- discounted[which] * gamma * goes_on + out$reward[which]
-      update_moments(moments, matrix(discounted[which]))
-      out$reward / sqrt(moments$var + epsilon)
+      moments <<- merge_moments(moments, moments_of(matrix(discounted[which])))
+      out$reward / sqrt(variance_of(moments) + epsilon)
     })
     follow_ends(inner, playing)
   })
@@ -225,13 +226,13 @@ r_wrappers <- list(
 
 # What they are made of -----------------------------------------------------------------
 
-change_spaces <- function(task, observation_space = task$observation_space,
-                          action_space = task$action_space) {
-  changed <- new_task(observation_space, action_space, task$spec$id)
+change_spaces <- function(traits, observation_space = traits$observation_space,
+                          action_space = traits$action_space) {
+  changed <- new_traits(observation_space, action_space, traits$spec$id)
   parts <- c("observation_space", "action_space", "action_rules", "fits_observations",
              "fits_actions")
-  task[parts] <- changed[parts]
-  task
+  traits[parts] <- changed[parts]
+  traits
 }
 
 change_action <- function(inner, change) {
@@ -351,27 +352,9 @@ rescaler <- function(from, to, num_envs) {
 # Running moments -----------------------------------------------------------------------
 
 # Begins as Gymnasium's RunningMeanStd: as if a ten-thousandth of a value had been seen.
-running_moments <- function(size) {
-  rlang::env(mean = numeric(size), var = rep(1, size), count = 1e-4)
-}
+running_moments <- function(size) new_moments(1e-4, numeric(size), rep(1e-4, size))
 
-# Chan's parallel algorithm, as Gymnasium has it
-# (https://en.wikipedia.org/wiki/Algorithms_for_calculating_variance#Parallel_algorithm).
-update_moments <- function(moments, rows) {
-  n <- nrow(rows)
-  if (n == 0L) {
-    return(invisible())
-  }
-  mean <- colMeans(rows)
-  var <- colMeans((rows - rep(mean, each = n))^2)
-  total <- moments$count + n
-  delta <- mean - moments$mean
-  squares <- moments$var * moments$count + var * n + delta^2 * moments$count * n / total
-  moments$mean <- moments$mean + delta * n / total
-  moments$var <- squares / total
-  moments$count <- total
-  invisible()
-}
+variance_of <- function(moments) moments$squares / moments$count
 
 # Which sub-environments are playing: what the others return does not count.
 playing_sub_envs <- function(n) rlang::env(which = seq_len(n), all = seq_len(n))

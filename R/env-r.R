@@ -122,16 +122,16 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
   # A space that was left out is refused as one that is NULL is.
   if (missing(observation_space)) observation_space <- NULL
   if (missing(action_space)) action_space <- NULL
-  task <- new_task(
+  traits <- new_traits(
     observation_space, action_space, id, max_episode_steps, reward_threshold, render_fps
   )
   function_env$new(list(
-    task = task, reset = reset, step = step, render = render, vectorized = vectorized,
+    traits = traits, reset = reset, step = step, render = render, vectorized = vectorized,
     parameters = parameters, model = model
   ))
 }
 
-# The sub-environments of functions are made of a definition: `task`, the functions, `vectorized`,
+# The sub-environments of functions are made of a definition: `traits`, the functions, `vectorized`,
 # `parameters`, the values that each `self` begins with, and `wrappers`, see wrap_r_env().
 function_env <- R6Class(
   "gym_function_env",
@@ -179,7 +179,7 @@ definition_sub_env <- function(definition, num_envs = NULL) {
     functions <- wrap_around(functions, num_envs)
   }
   new_sub_env(
-    definition$task,
+    definition$traits,
     reset = functions$reset,
     step = functions$step,
     render = if (!is.null(render)) function() render(self),

@@ -151,8 +151,8 @@ make_entry <- function(id, arguments, call) {
     env <- change_function_env(env, changes, list(), id, call)
   } else if (inherits(env, "gym_r_env")) {
     sub_env <- sub_env_of(env)
-    sub_env$task <- change_task(sub_env$task, changes)
-    env$spec <- sub_env$task$spec
+    sub_env$traits <- change_traits(sub_env$traits, changes)
+    env$spec <- sub_env$traits$spec
   }
   env
 }
@@ -168,7 +168,7 @@ own_limit <- function(max_episode_steps, call) {
 change_function_env <- function(env, changes, parameters, id, call) {
   definition <- definition_of(env)
   check_parameters(parameters, definition, id, call)
-  definition$task <- change_task(definition$task, changes)
+  definition$traits <- change_traits(definition$traits, changes)
   definition$parameters[names(parameters)] <- parameters
   function_env$new(definition)
 }
@@ -258,19 +258,13 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
     return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
   }
   check_count(num_envs, allow_null = TRUE, call = call)
-  if (frames || length(remembering(env$spec$wrappers))) {
-    num_envs <- 1L
+  envs <- list(env)
+  another <- function() {
+    made <- make_registered(id, arguments, call)
+    envs[[length(envs) + 1L]] <<- made
+    sub_env_of(made)
   }
-  more <- lapply(seq_len((num_envs %||% min(r_sub_envs, max_envs)) - 1), function(i) {
-    make_registered(id, arguments, call)
-  })
-  envs <- c(list(env), more)
-  if (frames) {
-    check_renders(sub_env_of(env), call)
-  }
-  vector_env <- scalar_vector_env(
-    lapply(envs, sub_env_of), episodes_of_batch(num_envs %||% r_sub_envs), frames
-  )
+  vector_env <- r_vector_env(env, num_envs, max_envs, frames, another, call)
   vector_env$close <- function(wait = TRUE) for (env in envs) env$close()
   vector_env
 }

@@ -41,34 +41,67 @@ plain_step <- function(out) {
   out
 }
 
-check_observation <- function(task, observation, where, call) {
-  space <- task$observation_space
-  if (length(observation) && is.atomic(observation) && is.null(dim(observation))) {
-    # As the batch that it makes alone, which is checked more quickly.
-    alone <- observation
-    dim(alone) <- if (length(space$shape) == 1L) c(1L, length(alone))
-    if (task$fits_observations(alone, 1L)) {
-      return(invisible())
-    }
-  }
-  tryCatch(
-    check_value(space, observation, "", NULL, bounds = TRUE),
-    gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
+#' Check what a step returned, and complete it
+#'
+#' The one check of the steps of environments in R: [check_env()] finds the same.
+#' @param out What the user's `step()` returned.
+#' @param sub_env The sub-environment, which has counted the step.
+#' @return A list of `observation`, `reward`, `terminated`, `truncated`, which also says where the
+#'   limit of steps was reached, and `info`.
+#' @noRd
+complete_step <- function(out, sub_env, sub_env_number = NULL, call = rlang::caller_env(),
+                          where = step_place(sub_env, sub_env_number)) {
+  traits <- sub_env$traits
+  out <- check_step_parts(out, sub_env$num_envs %||% 1L, where, call)
+  list(
+    observation = checked_observation(traits, out$observation, sub_env$num_envs, where, call),
+    reward = as.numeric(out$reward),
+    terminated = out$terminated,
+    truncated = out$truncated | sub_env$taken >= traits$limit,
+    info = out$info %||% list()
   )
 }
 
-#' Check the observations of several sub-environments
-#' @param which The numbers of these sub-environments.
+# Who returned what is wrong, and when. It is put into words where something is.
+step_place <- function(sub_env, sub_env_number = NULL) {
+  in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
+  paste0("`step()` of ", sub_env$traits$spec$id, " in step ", sub_env$taken, " of the episode",
+         in_sub_env)
+}
+
+# Observations -------------------------------------------------------------------------
+
+#' Check an observation that an environment in R returned, or a batch of them
+#'
+#' @param n Of how many sub-environments it is a batch; `NULL` for a single observation.
+#' @param where Who returned it and when, in words.
+#' @return The observation, in the form that a server's has.
 #' @noRd
-check_observations <- function(task, observations, which, where, call) {
-  n <- length(which)
-  if (!task$fits_observations(observations, n)) {
-    space <- task$observation_space
+checked_observation <- function(traits, observation, n, where, call) {
+  space <- traits$observation_space
+  if (!fits_quickly(traits, observation, n)) {
     tryCatch(
-      check_batch(space, batch_space(space, n), observations, n, NULL, which, bounds = TRUE),
+      if (is.null(n)) {
+        check_value(space, observation, "", NULL, bounds = TRUE)
+      } else {
+        check_batch(space, batch_space(space, n), observation, n, NULL, seq_len(n), bounds = TRUE)
+      },
       gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
+  tidy_value(space, observation, n)
+}
+
+# Whether it fits, as it nearly always does; a single one is looked at as a batch of one.
+fits_quickly <- function(traits, observation, n) {
+  if (is.null(n)) {
+    if (!length(observation) || !is.atomic(observation) || !is.null(dim(observation))) {
+      return(FALSE)
+    }
+    n <- 1L
+    if (length(traits$observation_space$shape) == 1L) dim(observation) <- c(n, length(observation))
+  }
+  traits$fits_observations(observation, n)
 }
 
 refuse_observation <- function(cnd, space, where, call) {
@@ -84,66 +117,15 @@ refuse_observation <- function(cnd, space, where, call) {
   )
 }
 
-#' Check what a step returned, and complete it
-#'
-#' @param out What the user's `step()` returned.
-#' @param sub_env The sub-environment, which has counted the step.
-#' @return A list of `observation`, `reward`, `terminated`, `truncated`, which also says where the
-#'   limit of steps was reached, and `info`.
-#' @noRd
-complete_step <- function(out, sub_env, sub_env_number = NULL, call = rlang::caller_env()) {
-  task <- sub_env$task
-  where <- step_place(sub_env, sub_env_number)
-  check_step_parts(out, sub_env$num_envs %||% 1L, where, call)
-  observation <- if (is.null(sub_env$num_envs)) {
-    check_observation(task, out$observation, where, call)
-    tidy_value(task$observation_space, out$observation)
-  } else {
-    check_observations(task, out$observation, seq_len(sub_env$num_envs), where, call)
-    tidy_batch(task$observation_space, out$observation)
-  }
-  truncated <- out$truncated %||% logical(sub_env$num_envs %||% 1L)
-  list(
-    observation = observation,
-    reward = as.numeric(out$reward),
-    terminated = out$terminated,
-    truncated = truncated | sub_env$taken >= task$limit,
-    info = out$info %||% list()
-  )
-}
-
-# Who returned what is wrong, and when.
-step_place <- function(sub_env, sub_env_number = NULL) {
-  in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
-  paste0("`step()` of ", sub_env$task$spec$id, " in step ", sub_env$taken, " of the episode",
-         in_sub_env)
-}
-
-# Checks -------------------------------------------------------------------------------
+# The other parts ------------------------------------------------------------------------
 
 #' Check all of what a step returned but the observation
 #' @param n For how many sub-environments.
 #' @param where Who returned it and when, in words.
+#' @return The same; where it lacks `truncated` and need not have it, that is FALSE.
 #' @noRd
 check_step_parts <- function(out, n, where, call,
                              needed = c("observation", "reward", "terminated")) {
-  check_step_names(out, where, call, needed)
-  must_be <- function(right, name, must) {
-    if (!right) {
-      problem <- paste0("The element `", name, "` of what ", where, " returned must be ", must,
-                        ", not ", describe_argument(out[[name]]))
-      abort_step(problem, out, call)
-    }
-  }
-  must_be(is_reward(out$reward, n), "reward", if (n == 1L) "a number" else paste(n, "numbers"))
-  flag <- paste0("TRUE or FALSE", if (n != 1L) paste(" for each of", n, "sub-environments"))
-  must_be(is_flags(out$terminated, n), "terminated", flag)
-  lacks <- is.null(out$truncated) && !"truncated" %in% needed
-  must_be(lacks || is_flags(out$truncated, n), "truncated", flag)
-  must_be(is.null(out$info) || is.list(out$info), "info", "a list")
-}
-
-check_step_names <- function(out, where, call, needed) {
   if (!is.list(out)) {
     abort_step(paste0(where, " must return a list, not ", describe_argument(out)), out, call)
   }
@@ -152,6 +134,40 @@ check_step_names <- function(out, where, call, needed) {
     has <- if (length(names(out))) paste0("; it has `", paste(names(out), collapse = "`, `"), "`")
     abort_step(paste0("What ", where, " returned lacks `", absent[[1L]], "`", has), out, call)
   }
+  if (!"truncated" %in% needed) out$truncated <- out$truncated %||% logical(n)
+  wrong <- wrong_parts(out, n)
+  if (length(wrong)) {
+    name <- names(wrong)[[1L]]
+    problem <- paste0("The element `", name, "` of what ", where, " returned must be ",
+                      wrong[[1L]], ", not ", describe_argument(out[[name]]))
+    abort_step(problem, out, call)
+  }
+  out
+}
+
+#' Find the parts of what a step returned that are wrong
+#' @param finite Whether a reward that is infinite is wrong, too.
+#' @return What each of them must be, a character vector with their names; `NULL` where all are
+#'   right.
+#' @noRd
+wrong_parts <- function(out, n, finite = FALSE) {
+  right <- c(
+    reward = is_reward(out$reward, n) &&
+      (!finite || is.numeric(out$reward) && all(is.finite(out$reward))),
+    terminated = is_flags(out$terminated, n),
+    truncated = is_flags(out$truncated, n),
+    info = is.null(out$info) || is.list(out$info)
+  )
+  if (all(right)) {
+    return(NULL)
+  }
+  each <- if (n != 1L) paste(" for each of", n, "sub-environments")
+  flag <- paste0("TRUE or FALSE", each)
+  must <- c(
+    reward = paste0(if (finite) "one finite number" else "a number", each), terminated = flag,
+    truncated = flag, info = "a list"
+  )
+  must[!right]
 }
 
 is_reward <- function(x, n) (is.numeric(x) || is.logical(x)) && length(x) == n && !anyNA(x)
@@ -167,5 +183,18 @@ abort_step <- function(problem, out, call) {
                 "of steps).")
     ),
     class = "gym_error_argument", argument = "env", value = out, call = call
+  )
+}
+
+# Steps after the end --------------------------------------------------------------------
+
+warn_step_after_end <- function(what, call) {
+  rlang::warn(
+    c(
+      paste(what, "took a step after the end of its episode."),
+      i = "What comes of it is undefined: reset the environment first."
+    ),
+    class = "gym_warning_step_after_done",
+    call = call
   )
 }

@@ -70,7 +70,9 @@ step_instance <- function(client, instance, action, render, which = NULL, named 
   result <- call_prepared(client, prepared, content, call)
   if (is.null(instance$num_envs)) {
     if (isTRUE(instance$done)) {
-      warn_step_after_done(instance, call)
+      # NA: the episode is over, and the warning has been given.
+      instance$done <- NA
+      warn_step_after_end(paste("Instance", instance$id, "of", instance$spec$id), call)
     } else if (isFALSE(instance$done)) {
       instance$done <- result$done
     }
@@ -194,20 +196,6 @@ read_single_step <- function(instance, answer, named) {
 }
 
 flags_and_reward <- c("reward", "terminated", "truncated")
-
-warn_step_after_done <- function(instance, call) {
-  # NA: the episode is over, and the warning has been given.
-  instance$done <- NA
-  rlang::warn(
-    c(
-      paste0("Instance ", instance$id, " of ", instance$spec$id,
-             " took a step after the end of its episode."),
-      i = "What comes of it is undefined: reset the environment first."
-    ),
-    class = "gym_warning_step_after_done",
-    call = call
-  )
-}
 
 # Observations -------------------------------------------------------------------------------
 

@@ -149,13 +149,13 @@ test_that("moments of vectorised functions are those of all sub-environments tha
   plain <- steps_of(TRUE, num_envs = 3)
   seen <- plain$reset(seed = 1)
   moments <- running_moments(2)
-  expected <- function(rows) t((t(rows) - moments$mean) / sqrt(moments$var + 0.5))
-  update_moments(moments, seen)
+  expected <- function(rows) t((t(rows) - moments$mean) / sqrt(variance_of(moments) + 0.5))
+  moments <- merge_moments(moments, moments_of(seen))
   expect_equal(unclass(env$reset(seed = 1)), expected(seen))
   ended <- c(FALSE, FALSE, FALSE)
   for (step in 1:6) {
     rows <- plain$step(c(0.1, 0.5, 1))
-    update_moments(moments, rows$observation[!ended, , drop = FALSE])
+    moments <- merge_moments(moments, moments_of(rows$observation[!ended, , drop = FALSE]))
     expect_equal(env$step(c(0.1, 0.5, 1))$observation, expected(rows$observation))
     ended <- ended | rows$terminated
   }
@@ -163,11 +163,10 @@ test_that("moments of vectorised functions are those of all sub-environments tha
 })
 
 test_that("the running moments are Gymnasium's", {
-  moments <- running_moments(1)
-  update_moments(moments, matrix(c(1, 2, 4)))
+  moments <- merge_moments(running_moments(1), moments_of(matrix(c(1, 2, 4))))
   expect_equal(moments$mean, 7 / 3.0001)
   expect_equal(moments$count, 3.0001)
-  expect_equal(moments$var, (1e-4 + 3 * 14 / 9 + (7 / 3)^2 * 1e-4 * 3 / 3.0001) / 3.0001)
+  expect_equal(variance_of(moments), (1e-4 + 3 * 14 / 9 + (7 / 3)^2 * 1e-4 * 3 / 3.0001) / 3.0001)
 })
 
 test_that("a number within its bounds stays within them, whatever the rounding", {

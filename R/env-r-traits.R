@@ -8,7 +8,7 @@
 #'   its Boxes, because a Box action outside of its bounds goes to the environment as in Gymnasium;
 #'   `fits_observations` and `fits_actions`, quick checks of batches.
 #' @noRd
-new_task <- function(observation_space, action_space, id, max_episode_steps = NULL,
+new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
                      reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
   check_is_space(observation_space, call = call)
   check_is_space(action_space, call = call)
@@ -33,10 +33,10 @@ new_task <- function(observation_space, action_space, id, max_episode_steps = NU
 }
 
 # The same environment under another id, or with another limit: `changes` are elements of its spec.
-change_task <- function(task, changes) {
-  task$spec[names(changes)] <- changes
-  task$limit <- task$spec$max_episode_steps %||% Inf
-  task
+change_traits <- function(traits, changes) {
+  traits$spec[names(changes)] <- changes
+  traits$limit <- traits$spec$max_episode_steps %||% Inf
+  traits
 }
 
 check_is_space <- function(x, arg = rlang::caller_arg(x), call) {
@@ -64,47 +64,38 @@ loosen_boxes <- function(space) {
 #' Check the actions of several sub-environments
 #' @param which The numbers of these sub-environments.
 #' @noRd
-check_actions <- function(task, action, which, call) {
+check_actions <- function(traits, action, which, call) {
   n <- length(which)
-  if (!task$fits_actions(action, n)) {
-    rules <- task$action_rules
+  if (!traits$fits_actions(action, n)) {
+    rules <- traits$action_rules
     check_batch(rules, batch_space(rules, n), action, n, call, which, bounds = TRUE)
   }
 }
 
-# Whole numbers are integers, and the parts of a Dict are in the order of the space, whatever a
-# function has made of them; where the space has names the numbers have them.
-tidy_value <- function(space, value) {
+#' Put a value into the form that a server's has
+#'
+#' Whole numbers are integers, and the parts of a Dict are in the order of the space, whatever a
+#' function has made of them; where the space has names the numbers have them.
+#' @param n Of how many values it is a batch; `NULL` for a single value.
+#' @noRd
+tidy_value <- function(space, value, n) {
   if (inherits(space, "gym_space_discrete")) {
-    narrow_if_double(value)
-  } else if (has_parts(space)) {
-    name_parts(space, map_parts(space, tidy_value, in_order(space, value)))
-  } else if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
-    dim(value) <- NULL
-    names(value) <- space$names
-    value
-  } else {
-    value
+    return(narrow_if_double(value))
   }
-}
-
-tidy_batch <- function(space, batch) {
-  if (inherits(space, "gym_space_discrete")) {
-    narrow_if_double(batch)
-  } else if (has_parts(space)) {
-    name_parts(space, map_parts(space, tidy_batch, in_order(space, batch)))
-  } else if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
-    if (is.null(dim(batch))) {
-      dim(batch) <- c(length(batch), 1L)
-    }
-    columns <- if (!is.null(space$names)) list(NULL, space$names)
-    if (!identical(dimnames(batch), columns)) {
-      dimnames(batch) <- columns
-    }
-    batch
-  } else {
-    batch
+  if (has_parts(space)) {
+    return(name_parts(space, map_parts(space, tidy_value, in_order(space, value), list(n))))
   }
+  if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
+    if (is.null(n)) {
+      dim(value) <- NULL
+      names(value) <- space$names
+    } else {
+      if (is.null(dim(value))) dim(value) <- c(length(value), 1L)
+      columns <- if (!is.null(space$names)) list(NULL, space$names)
+      if (!identical(dimnames(value), columns)) dimnames(value) <- columns
+    }
+  }
+  value
 }
 
 name_parts <- function(space, parts) {
