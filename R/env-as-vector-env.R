@@ -94,12 +94,21 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
     return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
   }
   call <- rlang::caller_env()
-  make <- env_maker(x, list(...), client, call)
+  arguments <- list(...)
+  check_dots_named(arguments, "seed = 1", call)
+  check_client(client, call = call)
+  make <- function(num_envs, ...) {
+    rlang::exec(
+      make_unseeded, x, !!!arguments, num_envs = num_envs, ..., client = client, call = call
+    )
+  }
   single <- frames || length(remembering(wrapper_names(noted_wrappers(x))))
   made <- if (single) {
     list(env = make(NULL))
   } else {
-    make_sub_envs(make, num_envs, num_workers, max_envs, call)
+    own <- arguments[!rlang::names2(arguments) %in% how_made()]
+    described <- known_description(client, x, own, call)
+    make_sub_envs(make, described, num_envs, num_workers, max_envs, call)
   }
   env <- made$env
   vector_env <- vector_env_of(env, frames, made$batch_size)

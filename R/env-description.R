@@ -21,9 +21,7 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
   }
   check_dots_named(arguments, "seed = 1", call)
   check_client(client, call = call)
-  described <- if (plays_rollouts(client, call)) {
-    known_description(client, env_id, arguments, call)
-  }
+  described <- known_description(client, env_id, arguments, call)
   other_size <- isTRUE(described$one_seed) && !is.null(num_envs) && num_envs != described$num_envs
   if (is.null(described) || other_size) {
     return(NULL)
@@ -35,6 +33,9 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
 
 # What the server has said of an environment, `NULL` where it does not play it by itself.
 known_description <- function(client, env_id, arguments, call) {
+  if (!plays_rollouts(client, call)) {
+    return(NULL)
+  }
   known <- known_of_env(client, env_id, arguments)
   known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
   described <- known$described[[1L]]
@@ -43,9 +44,13 @@ known_description <- function(client, env_id, arguments, call) {
 }
 
 may_be_described <- function(env_id, arguments) {
-  how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
-  is_made_by_server(env_id) && !any(names(arguments) %in% how_made) &&
+  is_made_by_server(env_id) && !any(names(arguments) %in% how_made()) &&
     !length(remembering(wrapper_names(noted_wrappers(env_id))))
+}
+
+# The names of arguments that are none of the environment's own.
+how_made <- function() {
+  setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
 }
 
 # Whether it is named by an id that a server knows.

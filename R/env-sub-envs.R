@@ -39,20 +39,7 @@ dtype_bytes <- function(dtype) {
   if (is.na(bits)) 1 else bits / 8
 }
 
-#' Prepare to make an environment with any number of sub-environments
-#' @return A function that makes it. Its attribute `known` is an environment in which what was found
-#'   out about it is kept, as long as the client lives.
-#' @noRd
-env_maker <- function(env_id, arguments, client, call) {
-  make <- function(num_envs, ...) {
-    rlang::exec(
-      make_unseeded, env_id, !!!arguments, num_envs = num_envs, ..., client = client, call = call
-    )
-  }
-  attr(make, "known") <- known_of_env(client, env_id, arguments)
-  make
-}
-
+# What was found out about an environment, as long as the client lives.
 known_of_env <- function(client, env_id, arguments) {
   check_client(client)
   state <- client_state(client)
@@ -64,13 +51,15 @@ known_of_env <- function(client, env_id, arguments) {
 
 #' Make an environment with sub-environments, and without any where the server cannot make them
 #'
-#' @param make As [env_maker()] returns it.
+#' @param make A function that makes it, of how many sub-environments and how they are run.
+#' @param described As [known_description()] returns it. A server that does not say how large
+#'   observations are refuses more sub-environments than it can make.
 #' @return A list: `env`, the environment, and `batch_size`, how many episodes make a batch where
 #'   each sub-environment has a seed of its own.
 #' @noRd
-make_sub_envs <- function(make, num_envs, num_workers, max_envs, call) {
-  traits <- sub_env_traits(make)
-  if (isTRUE(traits$own_implementation)) {
+make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call) {
+  own_implementation <- isTRUE(described$one_seed)
+  if (own_implementation) {
     check_no_workers(num_workers, call)
     own <- if_supported(
       make(num_envs %||% entry_point_sub_envs, vectorization_mode = "vector_entry_point")
@@ -79,27 +68,26 @@ make_sub_envs <- function(make, num_envs, num_workers, max_envs, call) {
       return(list(env = own))
     }
   }
-  full <- num_envs %||% count_sub_envs(traits$observation_bytes %||% 0)
-  # No more sub-environments are made than there are episodes.
-  most_workers <- num_workers %||% if (max_envs < few_episodes) 0L
+  # Sub-environments with seeds of their own. What has a vector implementation uses no workers.
+  make_seeded <- function(n, workers) {
+    make(
+      n, num_workers = workers, autoreset_mode = "SameStep",
+      vectorization_mode = if (own_implementation || is.null(described)) "sync"
+    )
+  }
+  full <- num_envs %||% count_sub_envs(observation_bytes(described$observation_space))
+  # No more sub-environments are made than there are episodes. Without a number the server chooses
+  # the workers.
+  workers <- num_workers %||% if (max_envs < few_episodes) 0L
   env <- if (!is.null(num_envs)) {
-    make_seeded(make, num_envs, traits, most_workers)
-  } else if (!is.null(traits)) {
+    make_seeded(num_envs, workers)
+  } else {
     first_supported(
-      function(n) make_seeded(make, n, traits, if (!is.null(most_workers)) min(most_workers, n)),
+      function(n) make_seeded(n, if (!is.null(workers)) min(workers, n)),
       counts_to_try(min(max_envs, full))
     )
   }
   list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
-}
-
-# Makes sub-environments with seeds of their own. What has a vector implementation uses no workers.
-# `NULL` as `num_workers` lets the server choose.
-make_seeded <- function(make, n, traits, num_workers = NULL) {
-  own <- isTRUE(traits$own_implementation)
-  make(
-    n, num_workers = num_workers, vectorization_mode = if (own) "sync", autoreset_mode = "SameStep"
-  )
 }
 
 # Fewer sub-environments are tried where the server refuses so many.
@@ -114,34 +102,6 @@ first_supported <- function(make, counts) {
       return(env)
     }
   }
-}
-
-# Does the server choose the environment's own vector implementation where it may choose, and how
-# large is an observation? A server that has described the environment has said it; an older one is
-# asked once, with one sub-environment, because making many takes long. NULL where the server cannot
-# make that one.
-sub_env_traits <- function(make) {
-  known <- attr(make, "known")
-  if (is.null(known$traits)) {
-    described <- known$described[[1L]]
-    if (!is.null(described)) {
-      known$traits <- list(
-        own_implementation = described$one_seed,
-        observation_bytes = observation_bytes(described$observation_space)
-      )
-      return(known$traits)
-    }
-    sub_env <- if_supported(make(1L))
-    if (is.null(sub_env)) {
-      return(NULL)
-    }
-    on.exit(close_quietly(sub_env))
-    known$traits <- list(
-      own_implementation = identical(sub_env$vectorization_mode, "vector_entry_point"),
-      observation_bytes = observation_bytes(sub_env$single_observation_space)
-    )
-  }
-  known$traits
 }
 
 check_no_workers <- function(num_workers, call) {

@@ -12,9 +12,9 @@
 #' Draws from the batch's own stream; the session's generator stays as it was. An error or an
 #' interrupt ends it without a result.
 #' @param vector_env As [as_vector_env()] returns it.
-#' @param policy The policy, bound to the environment: one, or several candidates.
-#' @param episodes A list of vectors with an element for each episode: `candidate` (which of the
-#'   policies plays it), `episode` (its number among those of the candidate) and `seed`.
+#' @param policy The policy, bound to the environment: one, or the candidates that play the batch.
+#' @param episodes A list of vectors with an element for each episode: `candidate` (the number of
+#'   that which plays it), `episode` (its number among those of the candidate) and `seed`.
 #' @param stream The stream that the policy draws from.
 #' @param max_steps After how many steps an episode is cut short.
 #' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
@@ -39,8 +39,9 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   on.exit(options(matprod))
   n <- length(episodes$episode)
   at_once <- if (vector_env$one_seed) vector_env$num_envs else min(n, vector_env$num_envs)
+  candidates <- unique(episodes$candidate)
   batch <- rlang::env(
-    candidate = episodes$candidate, episode = episodes$episode, seed = episodes$seed,
+    candidate = match(episodes$candidate, candidates), episode = episodes$episode, seed = episodes$seed,
     sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     # Whose observations count must not depend on when others end.
@@ -65,6 +66,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   kept <- mget(c("steps", "frames"), batch)
   kept["moments"] <- list(if (keep_moments) list(batch$moments))
   episodes <- lapply(mget(columns, batch), utils::head, batch$needed)
+  episodes$candidate <- candidates[episodes$candidate]
   c(if (keep_moments) without_needless(episodes, each, target) else episodes, kept)
 }
 

@@ -205,10 +205,8 @@ play_tasks <- function(play) {
       here = function() play_listed_episodes(play$vector_env, task),
       done = function(played) {
         play$size <- min(most, next_size(piece$units, now() - begun, 2))
-        own <- unique(play$episodes$candidate[piece$first:piece$last])
         first <- piece$first
         for (batch in played$batches) {
-          batch$candidate <- own[batch$candidate]
           last <- first + length(batch$return) - 1L
           take_played(play, list(first = first, last = last), batch)
           first <- last + 1L
@@ -226,11 +224,9 @@ play_tasks <- function(play) {
 episodes_task <- function(play, piece) {
   vector_env <- play$vector_env
   episodes <- lapply(play$episodes, `[`, piece$first:piece$last)
-  candidates <- unique(episodes$candidate)
-  episodes$candidate <- match(episodes$candidate, candidates)
   new_worker_task(
     "episodes", vector_env$recipe, server_versions(vector_env$client), episodes = episodes,
-    policy = play$policy_of(candidates), most = play$most, max_steps = play$max_steps,
+    policy = play$policy_of(unique(episodes$candidate)), most = play$most, max_steps = play$max_steps,
     keep = play$keep, num_envs = vector_env$num_envs
   )
 }
@@ -241,8 +237,10 @@ episodes_task <- function(play, piece) {
 #' @noRd
 play_listed_episodes <- function(vector_env, task) {
   batches <- list()
+  candidates <- unique(task$episodes$candidate)
+  policy_of <- function(these) policy_subset(task$policy, match(these, candidates))
   play <- new_play(
-    vector_env, task$episodes, function(these) policy_subset(task$policy, these), task$max_steps,
+    vector_env, task$episodes, policy_of, task$max_steps,
     task$keep, most = task$most,
     enter = function(batch) batches[[length(batches) + 1L]] <<- batch
   )

@@ -113,7 +113,7 @@ run_task <- function(task) UseMethod("run_task")
 
 #' @exportS3Method
 run_task.gym_task_batch <- function(task) {
-  rlang::exec(play_batch, kept_vector_env(task), !!!task$part, !!!task$arguments)
+  rlang::exec(play_batch, kept_vector_env(task), !!!task$part)
 }
 
 # The worker's vector environment of a recipe, which is made when it is needed for the first time.

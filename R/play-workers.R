@@ -136,37 +136,37 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
 
 # Batches --------------------------------------------------------------------------------
 
-#' Play all batches of a history on workers
+#' Play all batches on workers
 #'
 #' A task is a batch. They are entered in their order.
+#' @param batches As [draw_batches()] returns them.
 #' @inheritParams play_batches
 #' @noRd
-play_in_futures <- function(vector_env, history, policy_of, report, ...) {
-  open <- list()
-  arguments <- list(...)
-  enter_finished <- function() {
-    while (length(open) && !is.null(open[[1L]]$played)) {
-      first <- open[[1L]]
-      suspendInterrupts(enter_batch(history, first$played))
-      open <<- open[-1L]
+play_in_futures <- function(vector_env, batches, history, policy_of, report, ...) {
+  sent <- entered <- 0L
+  played <- vector("list", length(batches))
+  enter <- function() {
+    while (entered < sent && !is.null(played[[entered + 1L]])) {
+      suspendInterrupts({
+        entered <<- entered + 1L
+        enter_batch(history, played[[entered]])
+      })
     }
   }
   next_task <- function() {
-    batch <- next_batch(vector_env, history)
-    if (is.null(batch)) {
+    if (sent == length(batches)) {
       return(NULL)
     }
-    one <- rlang::env(played = NULL)
-    open <<- c(open, list(one))
-    task <- batch_task(vector_env, batch, policy_of, arguments)
+    sent <<- sent + 1L
+    number <- sent
+    task <- batch_task(vector_env, batches[[number]], policy_of, list(...))
     list(
       task = task,
-      here = function() rlang::exec(play_batch, vector_env, !!!task$part, !!!arguments),
-      done = function(played) {
-        played$candidate <- unique(batch$episodes$candidate)[played$candidate]
-        one$played <- played
-        enter_finished()
-        report(sum(vapply(open, function(one) length(one$played$episode), 0L)))
+      here = function() rlang::exec(play_batch, vector_env, !!!task$part),
+      done = function(batch) {
+        played[[number]] <<- batch
+        enter()
+        report(sum(lengths(lapply(played[seq_len(sent)[-seq_len(entered)]], `[[`, "episode"))))
       }
     )
   }
@@ -175,16 +175,14 @@ play_in_futures <- function(vector_env, history, policy_of, report, ...) {
 
 # The policy of a batch has its candidates alone.
 batch_task <- function(vector_env, batch, policy_of, arguments) {
-  candidates <- unique(batch$episodes$candidate)
-  batch$episodes$candidate <- match(batch$episodes$candidate, candidates)
-  part <- c(list(policy = policy_of(candidates)), batch)
   recipe <- vector_env$recipe
   recipe$one_seed <- vector_env$one_seed
   num_envs <- vector_env$num_envs
   if (!vector_env$one_seed) num_envs <- min(num_envs, length(batch$episodes$episode))
+  policy <- policy_of(unique(batch$episodes$candidate))
   new_worker_task(
-    "batch", recipe, server_versions(vector_env$client), part = part, num_envs = num_envs,
-    arguments = arguments
+    "batch", recipe, server_versions(vector_env$client), num_envs = num_envs,
+    part = c(list(policy = policy), batch, arguments)
   )
 }
 

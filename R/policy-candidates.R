@@ -60,3 +60,158 @@ check_candidate_weights <- function(weights, count, call = rlang::caller_env()) 
 format.gym_policy_candidates <- function(x, ...) {
   paste0(count_of(nrow(x$weights), "candidate"), " of ", format(x$policy))
 }
+
+# Several policies that play side by side ----------------------------------------------
+
+#' Give the policy of some candidates
+#'
+#' @param candidates Their numbers, in increasing order.
+#' @return A policy that has these candidates alone; of a single one the policy itself.
+#' @noRd
+policy_subset <- function(policy, candidates) UseMethod("policy_subset")
+
+#' @exportS3Method
+policy_subset.default <- function(policy, candidates) policy
+
+#' @exportS3Method
+policy_subset.gym_policy_candidates <- function(policy, candidates) {
+  policy$weights <- policy$weights[candidates, , drop = FALSE]
+  if (nrow(policy$weights) == 1L) {
+    with_weights(policy$policy, policy$weights[1L, ])
+  } else {
+    policy
+  }
+}
+
+#' @exportS3Method
+policy_subset.gym_policy_list <- function(policy, candidates) {
+  policies <- unclass(policy)[candidates]
+  if (length(policies) == 1L) policies[[1L]] else policy_list(policies)
+}
+
+#' Give the policy that acts for rows of observations
+#'
+#' @param candidate Which candidate acts for each row.
+#' @return A policy for [act_batch()].
+#' @noRd
+policy_rows <- function(policy, candidate) UseMethod("policy_rows")
+
+#' @exportS3Method
+policy_rows.default <- function(policy, candidate) policy
+
+# How many candidates there are, `NULL` for a policy that is none of several.
+count_candidates <- function(policy) {
+  if (inherits(policy, "gym_policy_candidates")) {
+    nrow(policy$weights)
+  } else if (inherits(policy, "gym_policy_list")) {
+    length(policy)
+  }
+}
+
+# Their names, which must tell them apart; `NULL` where they have none.
+candidate_names <- function(policy) {
+  names <- if (inherits(policy, "gym_policy_candidates")) {
+    rownames(policy$weights)
+  } else if (inherits(policy, "gym_policy_list")) {
+    names(policy)
+  }
+  if (length(names) && all(nzchar(names)) && !anyDuplicated(names)) names
+}
+
+# Networks with weights of their own ----------------------------------------------------
+
+new_candidates <- function(policy, weights) {
+  structure(
+    list(policy = policy, weights = weights), class = c("gym_policy_candidates", "gym_policy")
+  )
+}
+
+#' @exportS3Method
+policy_bind.gym_policy_candidates <- function(policy, env, call = rlang::caller_env()) {
+  policy$policy <- policy_bind(policy$policy, env, call)
+  policy
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_candidates <- function(policy, candidate) {
+  network <- policy$policy
+  ends <- cumsum(lengths(network$weights))
+  layers <- Map(
+    function(from, to) policy$weights[candidate, from:to, drop = FALSE],
+    c(0L, ends[-length(ends)]) + 1L, ends
+  )
+  structure(list(network = network, layers = layers), class = c("gym_policy_rows", "gym_policy"))
+}
+
+#' @exportS3Method
+act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
+  network <- policy$network
+  signal <- network_inputs(network$observation_space, number_rows(observation))
+  signal <- normalized(signal, network$moments)
+  for (layer in seq_along(policy$layers)) {
+    signal <- with_bias(signal, network)
+    signal <- activate(sum_weighted(signal, policy$layers[[layer]]), network$activation[[layer]])
+  }
+  network_action(network$action_space, signal, network, one = FALSE)
+}
+
+#' Sum inputs with weights of their own for each row
+#'
+#' @param weights In each row the weight matrix of a layer, column after column: all
+#'   outputs of the first input, then those of the next.
+#' @return A matrix with one column for each output.
+#' @noRd
+sum_weighted <- function(signal, weights) {
+  n <- nrow(signal)
+  inputs <- ncol(signal)
+  outputs <- ncol(weights) %/% inputs
+  terms <- signal[, rep(seq_len(inputs), each = outputs)] * weights
+  sums <- .rowSums(terms, n * outputs, inputs)
+  dim(sums) <- c(n, outputs)
+  sums
+}
+
+# Lists --------------------------------------------------------------------------------
+
+policy_list <- function(policies) {
+  structure(policies, class = c("gym_policy_list", "gym_policy"))
+}
+
+#' @exportS3Method
+policy_bind.gym_policy_list <- function(policy, env, call = rlang::caller_env()) {
+  policy_list(lapply(unclass(policy), policy_bind, env = env, call = call))
+}
+
+#' @export
+format.gym_policy_list <- function(x, ...) {
+  few <- unclass(x)[seq_len(min(length(x), 4L))]
+  texts <- vapply(few, policy_label, "")
+  if (!is.null(candidate_names(x))) {
+    texts <- paste0(names(few), ifelse(names(few) == texts, "", paste0(" (", texts, ")")))
+  }
+  more <- if (length(x) > 4L) paste("and", length(x) - 4L, "more")
+  noun <- if (length(x) == 1L) " policy: " else " policies: "
+  paste0(length(x), noun, paste(c(texts, more), collapse = "; "))
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_list <- function(policy, candidate) {
+  structure(
+    list(policies = unclass(policy), rows = split(seq_along(candidate), candidate)),
+    class = c("gym_policy_list_rows", "gym_policy")
+  )
+}
+
+#' @exportS3Method
+act_batch.gym_policy_list_rows <- function(policy, observation, n, vector_env) {
+  observed <- vector_env$observation_space
+  actions <- Map(
+    function(candidate, rows) {
+      own <- batch_rows(observed, observation, rows)
+      act_batch(policy$policies[[candidate]], own, length(rows), vector_env)
+    },
+    as.integer(names(policy$rows)), policy$rows
+  )
+  together <- bind_batches(vector_env$action_space, actions)
+  batch_rows(vector_env$action_space, together, order(unlist(policy$rows)))
+}

@@ -1,11 +1,10 @@
 # The rule as a table: for each batch "candidate:episode ...".
-batches <- function(...) {
-  cut <- cut_batches(...)
-  found <- list()
-  while (!is.null(one <- cut(length(found) + 1))) {
-    found[[length(found) + 1L]] <- paste0(one$candidate, ":", one$episode, collapse = " ")
-  }
-  unlist(found)
+batches <- function(size, candidates, episodes) {
+  candidate <- rep(seq_len(candidates), each = episodes)
+  episode <- rep(seq_len(episodes), candidates)
+  numbers <- batch_numbers(size, candidate, episode)
+  each <- split(paste0(candidate, ":", episode), numbers)
+  unname(vapply(each, paste, "", collapse = " "))
 }
 
 test_that("a batch has as many whole candidates as there is room for", {
@@ -24,7 +23,11 @@ test_that("a candidate with more episodes than a batch has is cut into batches o
 })
 
 test_that("what remembers is played in one batch", {
-  expect_identical(batches(Inf, candidates = 2, episodes = 2), "1:1 1:2 2:1 2:2")
+  vector_env <- as_vector_env(fake_environment())
+  count <- function() length(draw_batches(vector_env, new_history(2L, 40L, new_streams(1))))
+  expect_gt(count(), 1L)
+  vector_env$remembers <- "NormalizeReward"
+  expect_identical(count(), 1L)
 })
 
 test_that("the first batches are the same however many candidates there are", {
@@ -40,10 +43,7 @@ play_in_order <- function(make, policy, order) {
   vector_env$call <- rlang::current_env()
   policy <- policy_bind(policy, vector_env)
   history <- new_history(1L, 5L * vector_env$batch_size, new_streams(1))
-  tasks <- list()
-  while (!is.null(task <- next_batch(vector_env, history))) {
-    tasks[[length(tasks) + 1L]] <- task
-  }
+  tasks <- draw_batches(vector_env, history)
   played <- vector("list", length(tasks))
   for (i in order(rep(seq_along(tasks), length.out = length(tasks)))[order]) {
     played[[i]] <- play_batch(
@@ -93,15 +93,13 @@ test_that("a batch that was interrupted in the middle and played again is as if 
   expect_identical(rollout(env, drawing, 8, seed = 1, steps = TRUE), whole)
 })
 
-test_that("seeds are drawn batch after batch, and all at once only to be common to candidates", {
+test_that("the seeds of a candidate's episodes are the same however many there are", {
   vector_env <- as_vector_env(fake_environment())
-  seeds <- function(candidates) {
-    history <- new_history(candidates, 1000L, new_streams(1), common_seeds = TRUE)
-    first <- draw_episode_seeds(vector_env, history, list(episode = 1:2))
-    list(drawn = c(first, draw_episode_seeds(vector_env, history, list(episode = 3L))),
-         kept = length(history$seeds))
+  seeds <- function(candidates, episodes) {
+    history <- new_history(candidates, episodes, new_streams(1), common_seeds = TRUE)
+    batches <- draw_batches(vector_env, history)
+    unlist(lapply(batches, function(batch) batch$episodes$seed))
   }
-  expect_identical(seeds(1L)$kept, 0L)
-  expect_identical(seeds(2L)$kept, 1000L)
-  expect_identical(seeds(1L)$drawn, seeds(2L)$drawn)
+  expect_identical(seeds(1L, 10L)[1:3], seeds(1L, 3L))
+  expect_identical(seeds(2L, 3L), rep(seeds(1L, 3L), 2))
 })

@@ -93,17 +93,15 @@ test_that("a server that describes environments makes no instance to look at", {
   expect_identical(made(), 3L)
 })
 
-test_that("an older server is asked once whether an environment has a vector implementation", {
+test_that("neither does an older one, which plays all in sub-environments with seeds of their own", {
   local_functions(plays_rollouts = function(...) FALSE)
   client <- local_server()
   made <- count_instances()
-  play <- function(...) rollout("FrozenLake-v1", policy_random(), 2, client = client, ...)
-  play()
+  for (id in c("FrozenLake-v1", "CartPole-v1")) {
+    played <- rollout(id, policy_random(), 2, seed = 1, client = client)
+    expect_identical(anyDuplicated(played$episodes$seed), 0L)
+  }
   expect_identical(made(), 2L)
-  play()
-  expect_identical(made(), 3L)
-  play(is_slippery = FALSE)
-  expect_identical(made(), 5L)
 })
 
 test_that("there are as many sub-environments as fit a mebibyte of observations, 16 to 256", {

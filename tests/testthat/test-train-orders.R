@@ -1,7 +1,6 @@
 # As play_batches(), but the batches are played in another order than they were drawn.
 shuffled_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...) {
-  batches <- list()
-  while (!is.null(batch <- next_batch(vector_env, history))) batches <- c(batches, list(batch))
+  batches <- draw_batches(vector_env, history)
   order <- sample(length(batches))
   counted$batches <- max(counted$batches, length(batches))
   counted$shuffled <- counted$shuffled + is.unsorted(order)
