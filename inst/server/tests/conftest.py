@@ -27,7 +27,7 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    # In this process, where a test can look inside; test_worker_backend.py tests the others.
+    # In this process, where a test can look inside; test_isolated_instance.py tests the others.
     app = create_app(
         Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
     )
@@ -294,14 +294,13 @@ def watch(app):
     def watch(url):
         instance = app._instances.get(url.rsplit("/", 1)[1])
         drawn = []
-        env = instance._backend.env
-        draw = env.draw
+        draw = instance.draw
 
         def counting(sub_env):
             drawn.append(sub_env)
             return draw(sub_env)
 
-        env.draw = counting
+        instance.draw = counting
         return instance, drawn
 
     return watch

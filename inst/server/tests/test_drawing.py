@@ -93,7 +93,7 @@ def test_car_racing_moves_on_the_render_thread(app, create, client, installed, m
     if not installed("CarRacing-v3"):
         pytest.skip("not installed")
     url = create("CarRacing-v3")
-    env = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.unwrapped
+    env = app._instances.get(url.rsplit("/", 1)[1]).gym_env.unwrapped
     threads = set()
     for name in ("reset", "step", "render"):
         original = getattr(env, name)

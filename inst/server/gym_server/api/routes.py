@@ -196,7 +196,7 @@ def env_step(call: Call) -> dict | Ready:
 )
 def env_action_space_info(call: Call) -> dict:
     """Describe the action space."""
-    return {"info": call.instance.action_space_info}
+    return {"info": call.instance.space_info("action_space")}
 
 
 @ROUTES.declare(
@@ -207,7 +207,7 @@ def env_action_space_info(call: Call) -> dict:
 )
 def env_observation_space_info(call: Call) -> dict:
     """Describe the observation space."""
-    return {"info": call.instance.observation_space_info}
+    return {"info": call.instance.space_info("observation_space")}
 
 
 @ROUTES.declare(
@@ -230,7 +230,7 @@ def env_action_space_sample(call: Call) -> dict:
 def env_action_space_contains(call: Call) -> dict:
     """Tell whether a value is an action."""
     value = parse_path_value(call.path["x"])
-    return {"member": call.instance.action_contains({"value": value})}
+    return {"member": call.instance.contains("action_space", {"value": value})}
 
 
 _VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the description right?")
@@ -245,7 +245,7 @@ _VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the descriptio
 )
 def env_action_space_contains_posted(call: Call) -> dict:
     """Tell whether a value is an action, or a description the action space's."""
-    return {"member": call.instance.action_contains(call.body)}
+    return {"member": call.instance.contains("action_space", call.body)}
 
 
 @ROUTES.declare(
@@ -257,7 +257,7 @@ def env_action_space_contains_posted(call: Call) -> dict:
 )
 def env_observation_space_contains(call: Call) -> dict:
     """Tell whether a value is an observation, or a description the observation space's."""
-    return {"member": call.instance.observation_contains(call.body)}
+    return {"member": call.instance.contains("observation_space", call.body)}
 
 
 @ROUTES.declare(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -26,25 +26,6 @@ class Standing(NamedTuple):
     step: int
     episode_return: float
     ended: bool
-
-
-class Statistics(Protocol):
-    """Counts episodes.
-
-    Attributes:
-        returns: of the last episodes that ended, in any sub-environment.
-    """
-
-    returns: deque[float]
-
-    def begin(self, mask: np.ndarray | None) -> None:
-        """Count the episodes that begin in the sub-environments of a mask; None for all."""
-
-    def step(self, reward: Any, done: Any, which: np.ndarray | None) -> None:
-        """Count a step of some sub-environments, one row for each; None for all of them."""
-
-    def of(self, sub_env: int) -> Standing:
-        """Return where the episode of a sub-environment stands."""
 
 
 class EpisodeStatistics:
@@ -72,7 +53,7 @@ class EpisodeStatistics:
         self._return = 0.0
         self._ended = False
 
-    def step(self, reward: float, done: bool, which: np.ndarray | None = None) -> None:
+    def step(self, reward: float, done: bool) -> None:
         """Count a step; what an environment does after an episode's end is no part of it."""
         if self._ended:
             return
@@ -152,7 +133,7 @@ def _any(flags: np.ndarray) -> bool:
     return b"\1" in flags.tobytes()
 
 
-def facts_of(statistics: Statistics, sub_env: int) -> dict:
+def facts_of(statistics: EpisodeStatistics | VectorEpisodeStatistics, sub_env: int) -> dict:
     """Return the statistics of a sub-environment's episodes as JSON values for its watchers."""
     standing = statistics.of(sub_env)
     return {

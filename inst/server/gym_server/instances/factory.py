@@ -11,11 +11,9 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import model_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
-from gym_server.instances.environment import Environment
-from gym_server.instances.instance import Instance
-from gym_server.instances.local import LocalBackend
-from gym_server.instances.single import SingleEnvironment
-from gym_server.instances.vector import VectorEnvironment
+from gym_server.instances.local import LocalInstance
+from gym_server.instances.single import SingleInstance
+from gym_server.instances.vector import VectorInstance
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.make import make_vector_env
 
@@ -27,7 +25,7 @@ def make_instance(
     renderer: RenderThread,
     undo: contextlib.ExitStack,
     reservation: MemoryReservation,
-) -> Instance:
+) -> LocalInstance:
     """Create an instance whose environment runs in this process.
 
     Args:
@@ -40,7 +38,7 @@ def make_instance(
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
-            and ``LocalBackend``.
+            and ``LocalInstance``.
     """
     if config.num_envs is None:
         env = make.make_env(
@@ -54,14 +52,10 @@ def make_instance(
         undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
         reservation.reserve(make.ask(model_bytes, env), "Its transition model")
         wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
-        return _instance(SingleEnvironment(wrapped, config, renderer), config, renderer)
+        return SingleInstance(wrapped, config, renderer)
     sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer, reservation)
     undo.push(_closing_quietly(sub_envs.close))
-    return _instance(VectorEnvironment(sub_envs, mode, config), config, renderer)
-
-
-def _instance(env: Environment, config: EnvConfig, renderer: RenderThread) -> Instance:
-    return Instance(LocalBackend(env, config, renderer), config, renderer)
+    return VectorInstance(sub_envs, mode, config, renderer)
 
 
 def _closing_quietly(close: Callable[[], object]) -> Callable[..., None]:

@@ -1,4 +1,4 @@
-"""One environment on the server, with its lock and its viewer, whatever runs it."""
+"""One environment on the server: what all have in common, whatever process runs them."""
 
 from __future__ import annotations
 
@@ -12,53 +12,62 @@ from typing import TYPE_CHECKING
 
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
-from gym_server.instances.backend import Backend, Seed
-from gym_server.instances.lock import InstanceLock
 from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads.lock import InstanceLock
 from gym_server.viewing.viewer import Viewer
-from gym_server.viewing.watchable import Moves
+from gym_server.viewing.watchable import Watchable
 
 if TYPE_CHECKING:
     import numpy as np
 
 log = logging.getLogger(__name__)
 
+Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
+
 # How often it is looked at what a monitor writes: less often than the shortest episodes end.
 _MEASURE_SECONDS = 1.0
 
 
-class Instance:
+class Instance(Watchable):
     """One environment that a client has created.
 
-    Every method that moves the environment waits for its lock; one that waited while the
-    instance was being closed raises ``unknown_instance``, or why it was closed.
+    ``LocalInstance`` plays it in this process, ``IsolatedInstance`` in one of its own. What differs
+    is in their methods of the names that begin with an underscore here; those are called by a
+    thread that has the lock.
+
+    Every method that resets, steps or draws the environment waits for its lock; one that waited
+    while the instance was being closed raises ``unknown_instance``, or why it was closed.
 
     Attributes:
         instance_id: given when the instance is listed, "" before.
-        lock: what a thread needs to move the environment, or to look at it.
+        env_id: what the environment can be created by again.
+        config: what its client wanted.
         viewer: shows it to watchers.
-        renderer: the process's render thread.
+        steps: how many steps its sub-environments have taken.
+        can_be_killed: whether ``kill()`` ends every call on it, so that none can be stuck.
     """
 
-    def __init__(self, backend: Backend, config: EnvConfig, renderer: RenderThread) -> None:
-        """Take over an environment.
+    env_id: str
+    can_be_killed: bool
+
+    def __init__(self, config: EnvConfig, renderer: RenderThread) -> None:
+        """Prepare the lock and the viewer.
 
         Args:
-            backend: what runs it.
-            config: what its client wanted.
+            config: what its client wants.
             renderer: the process's render thread.
         """
         self.instance_id = ""
-        self._backend = backend
-        self._config = config
+        self.config = config
         self.renderer = renderer
         self.lock = InstanceLock(
-            lambda: unknown_instance(self.instance_id), backend.close_abandoned, renderer
+            lambda: unknown_instance(self.instance_id), self._close_abandoned, renderer.began
         )
-        self.viewer = Viewer(self, backend.fps)
+        self.viewer = Viewer(self)
+        self.steps = 0
         self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
@@ -67,7 +76,7 @@ class Instance:
         self._measured = 0.0
         self._monitor_full: GymServerError | None = None
 
-    # Moves ----------------------------------------------------------------------------------
+    # Resets and steps -----------------------------------------------------------------------
 
     def reset(
         self,
@@ -104,7 +113,7 @@ class Instance:
         with self.lock:
             if self._monitored is not None:
                 self._stop_full_monitor(*self._monitored)
-            return self._backend.reset(seed, options, form, mask)
+            return self._reset(seed, options, form, mask)
 
     def step(
         self,
@@ -134,19 +143,19 @@ class Instance:
         Raises:
             GymServerError: ``reset_needed`` (also for a sub-environment that ended and is not
                 reset by itself), ``action_not_in_space``, ``invalid_parameter`` or
-                ``not_supported``, each before the environment moves; ``environment_error``.
+                ``not_supported``, each before the environment is stepped; ``environment_error``.
         """
         if mask is not None and self._is_single:
             _refuse_mask("step_mask", mask)
         if in_real_time or self._in_real_time:
             self.viewer.pace()
         with self.lock:
-            return self._backend.step(action, form, mask)
+            return self._step(action, form, mask)
 
     def sample_action(self) -> object:
         """Draw an action, for each sub-environment, from the action space's own generator."""
         with self.lock:
-            return self._backend.sample_action()
+            return self._sample_action()
 
     # Looks ----------------------------------------------------------------------------------
 
@@ -158,18 +167,14 @@ class Instance:
         """
         self.check_sub_env(sub_env)
         with self.lock:
-            return self._backend.render(sub_env)
+            return self._render(sub_env)
 
     def check_sub_env(self, sub_env: int) -> None:
         """Raise ``invalid_parameter`` for a sub-environment that does not exist."""
-        num_envs = self._config.num_envs or 1
+        num_envs = self.config.num_envs or 1
         if sub_env >= num_envs:
             last = f"an integer from 0 to {num_envs - 1}" if num_envs > 1 else "0"
             raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
-
-    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
-        return self._backend.look(sub_env)
 
     def transition_model(self) -> dict | Ready:
         """Tell how an environment moves that has a table of it.
@@ -189,52 +194,26 @@ class Instance:
                 "create it without num_envs",
             )
         with self.lock:
-            return self._backend.transition_model()
-
-    @property
-    def moves(self) -> Moves:
-        """How often the environment has begun to move."""
-        return self._backend.moves
-
-    @property
-    def draws_when_stepped(self) -> bool:
-        """Whether its steps run on the render thread."""
-        return self._backend.draws_when_stepped
-
-    @property
-    def draws_on_render_thread(self) -> bool:
-        """Whether its frames are drawn on the render thread."""
-        return self._backend.draws_on_render_thread
+            return self._transition_model()
 
     # At any time ----------------------------------------------------------------------------
 
-    @property
-    def env_id(self) -> str:
-        """What the environment can be created by again."""
-        return self._backend.env_id
+    def space_info(self, name: str) -> dict:
+        """Return the description of a space, of sub-environments that of the batched one.
 
-    @property
-    def action_space_info(self) -> dict:
-        """The description of the action space, of sub-environments that of the batched one."""
-        return self._backend.action_space_info
+        Args:
+            name: "action_space" or "observation_space".
+        """
+        raise NotImplementedError
 
-    @property
-    def observation_space_info(self) -> dict:
-        """The description of the observation space, batched as for actions."""
-        return self._backend.observation_space_info
+    def contains(self, name: str, claim: dict) -> bool:
+        """Answer a client's "contains"; see ``spaces.contains()``.
 
-    def action_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; a value has an entry for each sub-environment."""
-        return self._backend.action_contains(claim)
-
-    def observation_contains(self, claim: dict) -> bool:
-        """Answer a client's "contains"; a value has an entry for each sub-environment."""
-        return self._backend.observation_contains(claim)
-
-    @property
-    def steps(self) -> int:
-        """How many steps were taken, all sub-environments together."""
-        return self._backend.steps
+        Args:
+            name: of the space, as for ``space_info()``.
+            claim: a value has an entry for each sub-environment.
+        """
+        raise NotImplementedError
 
     def list_entry(self) -> dict:
         """Return what the list of instances shows of it."""
@@ -242,8 +221,8 @@ class Instance:
         return {
             "instance_id": self.instance_id,
             "env_id": self.env_id,
-            "name": self._config.name,
-            "num_envs": self._config.num_envs,
+            "name": self.config.name,
+            "num_envs": self.config.num_envs,
             "age_seconds": now - self._created,
             "idle_seconds": now - self.lock.used,
             "steps": self.steps,
@@ -252,7 +231,7 @@ class Instance:
 
     def about(self) -> dict:
         """Return all that is known of the instance, without waiting for its environment."""
-        about = self._backend.about()
+        about = self._about()
         entry = self.list_entry()
         # The entry comes last, because what the process of an isolated environment sends has an
         # entry of that process, which knows neither the id nor the watchers. It also comes first,
@@ -262,8 +241,23 @@ class Instance:
     @property
     def busy_since(self) -> float | None:
         """Since when a call has waited for the environment, in the clock's seconds, or None."""
-        since = (self.lock.busy_since, self._backend.busy_since)
+        since = (self.lock.busy_since, self.query_since)
         return min((one for one in since if one is not None), default=None)
+
+    @property
+    def query_since(self) -> float | None:
+        """Since when a call that needs no lock has waited, in the clock's seconds, or None."""
+        return None
+
+    @property
+    def grown(self) -> int:
+        """By how many bytes drawing and seeds have made the server's process grow."""
+        return 0
+
+    @property
+    def pids(self) -> Sequence[int]:
+        """The processes that run it, beside the server's."""
+        raise NotImplementedError
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -281,9 +275,7 @@ class Instance:
         with self.lock:
             path, disk_use = root.resolve(directory), root.disk_use
             disk_use.check(path, emptied=force)
-            self._backend.start_monitor(
-                self.instance_id, root, directory, force, resume, video_every
-            )
+            self._start_monitor(root, directory, force, resume, video_every)
             self._monitored, self._monitor_full = (path, disk_use), None
             self._measure_monitor()
 
@@ -295,17 +287,7 @@ class Instance:
                 ``monitor_directory`` when something could not be written.
         """
         with self.lock, self._monitor_ends():
-            self._backend.close_monitor()
-
-    @property
-    def grown(self) -> int:
-        """By how many bytes drawing has made the server's process grow."""
-        return self._backend.grown
-
-    @property
-    def pids(self) -> Sequence[int]:
-        """The processes that run it, beside the server's."""
-        return self._backend.pids
+            self._close_monitor()
 
     @contextlib.contextmanager
     def _monitor_ends(self) -> Iterator[None]:
@@ -335,7 +317,7 @@ class Instance:
         except GymServerError as full:
             log.warning("%s", full.message)
             with contextlib.suppress(GymServerError), self._monitor_ends():
-                self._backend.close_monitor()
+                self._close_monitor()
             self._monitor_full = full
 
     # Beginning and end ----------------------------------------------------------------------
@@ -351,7 +333,7 @@ class Instance:
             self.viewer.end(why)
             on_end(why)
 
-        self._backend.report_end(end)
+        self._report_end(end)
 
     def close(self) -> None:
         """Finish the monitor and close the environment; waiting calls get an error."""
@@ -360,7 +342,7 @@ class Instance:
             self.lock.closed = True
             self.viewer.end(why)
             with self._monitor_ends():
-                self._backend.close(why)
+                self._close(why)
 
     def abandon(self, why: GymServerError) -> int | None:
         """Close the instance without waiting for its lock: a call on it has taken too long.
@@ -371,22 +353,73 @@ class Instance:
         Returns:
             The thread that is stuck in the environment and cannot answer for itself, or None.
         """
-        if self._backend.can_be_killed:
-            self._backend.kill(why)
+        if self.can_be_killed:
+            self.kill(why)
             self.viewer.end(why)
             return None
         stuck = self.lock.abandon(why)
         self.viewer.end(why)
-        self._backend.kill(why)
+        self.kill(why)
         if stuck is None:
             # The call has just come back.
             threading.Thread(target=self._close_abandoned_when_free, daemon=True).start()
             return None
         return None if self.renderer.abandon(stuck, why) else stuck
 
+    def kill(self, why: GymServerError) -> None:
+        """Kill the processes that the environment runs in, if it has any of its own.
+
+        Args:
+            why: the error for the calls that this ends.
+        """
+        raise NotImplementedError
+
     def _close_abandoned_when_free(self) -> None:
         with self.lock.when_free():
-            self._backend.close_abandoned()
+            self._close_abandoned()
+
+    # What differs ---------------------------------------------------------------------------
+
+    def _reset(
+        self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
+    ) -> dict | Ready:
+        raise NotImplementedError
+
+    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict | Ready:
+        raise NotImplementedError
+
+    def _sample_action(self) -> object:
+        raise NotImplementedError
+
+    def _render(self, sub_env: int) -> np.ndarray:
+        raise NotImplementedError
+
+    def _transition_model(self) -> dict | Ready:
+        raise NotImplementedError
+
+    def _start_monitor(
+        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
+    ) -> None:
+        raise NotImplementedError
+
+    def _close_monitor(self) -> None:
+        """Stop recording and finish the files, if it is recorded."""
+        raise NotImplementedError
+
+    def _about(self) -> dict:
+        """Return what is known of the environment, without waiting for it."""
+        raise NotImplementedError
+
+    def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        raise NotImplementedError
+
+    def _close(self, why: GymServerError) -> None:
+        """Finish the monitor and close the environment; the reason is for calls that come late."""
+        raise NotImplementedError
+
+    def _close_abandoned(self) -> None:
+        """Close what was abandoned, once the call that took too long has come back."""
+        raise NotImplementedError
 
 
 def _refuse_mask(name: str, mask: np.ndarray | None) -> None:

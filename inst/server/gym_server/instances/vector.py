@@ -13,38 +13,37 @@ from gymnasium.vector import AutoresetMode
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.make import ask
 from gym_server.envs.outcomes import checked_info
-from gym_server.errors import GymServerError, invalid_parameter, wrong_length
-from gym_server.instances.environment import env_id_of
-from gym_server.instances.episode_statistics import Statistics, VectorEpisodeStatistics
+from gym_server.errors import GymServerError, invalid_parameter, reset_needed, wrong_length
+from gym_server.instances.episode_statistics import VectorEpisodeStatistics
+from gym_server.instances.local import LocalInstance
 from gym_server.json_values import plain
 from gym_server.protocol.answers import AnswerForm
+from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.entry_point import EntryPointEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
 
-class VectorEnvironment:
-    """A vector environment; see ``Environment`` for the methods."""
+class VectorInstance(LocalInstance):
+    """A vector environment, whose sub-environments run in this process or in workers."""
 
-    # Some sub-environments may have moved then, and others not.
-    fails_as_a_whole = True
+    statistics: VectorEpisodeStatistics
 
-    def __init__(self, env: EntryPointEnv | SubEnvs, mode: str, config: EnvConfig) -> None:
+    def __init__(
+        self, env: EntryPointEnv | SubEnvs, mode: str, config: EnvConfig, renderer: RenderThread
+    ) -> None:
         """Take over a vector environment.
 
         Args:
             env: the environment.
             mode: its vectorization_mode.
             config: what the client wanted.
+            renderer: the process's render thread.
 
         Raises:
             GymServerError: ``unsupported_space``.
         """
-        self.gym_env: Any = env
-        self.env_id = env_id_of(config, env)
-        self._num_envs = env.num_envs
-        self.action_space = env.action_space
-        self.observation_space = env.observation_space
         self.single_action_space = env.single_action_space
         self.single_observation_space = env.single_observation_space
         if _has_empty_part(self.single_action_space):
@@ -54,20 +53,19 @@ class VectorEnvironment:
                 f"{spaces.brief_space(self.single_action_space)}",
                 "an empty Tuple or Dict is the reason; create the environment without num_envs",
             )
-        self.vectorization_mode: str | None = mode
+        super().__init__(env, config, renderer)
+        self._num_envs = env.num_envs
+        self.vectorization_mode = mode
         self.num_workers = env.num_workers
-        self.autoreset_mode: str | None = env.autoreset_mode.value
+        self.autoreset_mode = env.autoreset_mode.value
         self.draws_when_stepped = env.draws_when_stepped
         self.drawing = env.drawing
         self.draws_on_render_thread = env.render_mode == "rgb_array" and env.draws_in_process
-        self.statistics: Statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
+        self.statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
 
     # Reset ----------------------------------------------------------------------------------
 
-    def check_reset(
-        self, seed: Any, options: dict | None, mask: np.ndarray | None, was_reset: bool
-    ) -> None:
-        """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
+    def _check_reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> None:
         self._check_seed(seed)
         argument_limits.check_reset_options(self.gym_env, options)
         if options and "reset_mask" in options:
@@ -77,7 +75,7 @@ class VectorEnvironment:
                 "reset_mask is a parameter of its own",
             )
         if mask is not None:
-            self._check_reset_mask(mask, was_reset)
+            self._check_reset_mask(mask)
 
     def _check_seed(self, seed: int | tuple | None) -> None:
         if not isinstance(seed, tuple):
@@ -96,11 +94,11 @@ class VectorEnvironment:
                         "autoreset_mode 'Disabled' none begins an episode by itself",
                     )
 
-    def _check_reset_mask(self, mask: np.ndarray, was_reset: bool) -> None:
+    def _check_reset_mask(self, mask: np.ndarray) -> None:
         self._check_mask("reset_mask", mask)
         if not self.gym_env.runs_each:
             raise self._not_supported("reset_mask")
-        if not was_reset:
+        if not self._was_reset:
             raise GymServerError(
                 "reset_needed",
                 "reset() with a mask needs sub-environments that have been reset",
@@ -123,27 +121,37 @@ class VectorEnvironment:
             "create the environment with vectorization_mode 'sync'",
         )
 
-    def reset(self, seed: Any, options: dict | None, mask: np.ndarray | None, infos: bool) -> tuple:
-        """Reset all sub-environments, or those of a mask."""
-        start: tuple = self.gym_env.reset(seed, options, mask, infos)
+    def _reset_env(
+        self, seed: Any, options: dict | None, mask: np.ndarray | None, form: AnswerForm
+    ) -> tuple:
+        start: tuple = self.gym_env.reset(seed, options, mask, form.infos)
         return start
-
-    def begin_episodes(self, mask: np.ndarray | None) -> None:
-        """Leave it to the environment, which knows what has begun."""
 
     # Step -----------------------------------------------------------------------------------
 
-    def select(self, mask: np.ndarray | None) -> tuple[np.ndarray | None, int]:
-        """Return which sub-environments a mask selects, None for all, and how many they are."""
-        if mask is None:
-            return None, self._num_envs
+    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
+        if not self._was_reset:
+            raise reset_needed("step()")
+        which = None if mask is None else self._select(mask)
+        rows = self._num_envs if which is None else len(which)
+        decoded = self._actions.read(action, rows)
+        self._check_running(which)
+        try:
+            return ask(self._step_env, which, decoded, form)
+        except GymServerError as failure:
+            # Some sub-environments may have taken the step, and others not.
+            self._was_reset = False
+            self._actions.explain(failure, action, rows)
+            raise
+
+    def _select(self, mask: np.ndarray) -> np.ndarray:
+        """Return which sub-environments a mask selects."""
         self._check_mask("step_mask", mask)
         if not self.gym_env.runs_each:
             raise self._not_supported("step_mask")
-        which = np.flatnonzero(mask)
-        return which, len(which)
+        return np.flatnonzero(mask)
 
-    def check_running(self, which: np.ndarray | None) -> None:
+    def _check_running(self, which: np.ndarray | None) -> None:
         """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
         if self.gym_env.autoreset_mode is not AutoresetMode.DISABLED:
             return
@@ -157,43 +165,19 @@ class VectorEnvironment:
                 "reset with a reset_mask, or step the others with a step_mask",
             )
 
-    def step(self, which: np.ndarray | None, action: Any, infos: bool) -> tuple:
-        """Step all sub-environments, or some."""
-        outcome: tuple = self.gym_env.step(which, action, infos)
-        return outcome
-
-    def read_outcome(
-        self, which: np.ndarray | None, reward: Any, terminated: Any, truncated: Any
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return rewards, terminated, truncated and done as arrays."""
+    def _step_env(self, which: np.ndarray | None, action: object, form: AnswerForm) -> dict:
+        """Take a step; return arrays where ``Parts`` are wanted, else lists."""
+        outcome = self._begin(self.gym_env.step, which, action, form.infos)
+        observation, reward, terminated, truncated, info = outcome
         terminated = np.asarray(terminated, dtype=bool)
         truncated = np.asarray(truncated, dtype=bool)
         reward = _reward(reward).reshape(terminated.shape)
-        return reward, terminated, truncated, terminated | truncated
-
-    def count(self, which: np.ndarray | None, reward: np.ndarray, done: np.ndarray) -> int:
-        """Count a step of those that took part in it; return how many they are."""
-        moved = self.gym_env.moved
-        if moved is not None:
-            which = np.flatnonzero(moved) if which is None else which[moved]
-            reward, done = reward[moved], done[moved]
-        self.statistics.step(reward, done, which)
-        return len(reward)
-
-    def answer(
-        self,
-        observation: object,
-        reward: np.ndarray,
-        terminated: np.ndarray,
-        truncated: np.ndarray,
-        done: np.ndarray,
-        info: dict,
-        form: AnswerForm,
-    ) -> dict:
-        """Return the answer to a step: arrays where ``Parts`` are wanted, else lists."""
+        done = terminated | truncated
+        self._count(which, reward, done)
+        self._observation = observation
         final = self._take_final(info, form) if info else {}
         answer = {
-            "observation": self.encode(observation, form),
+            "observation": self._encode(observation, form),
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
@@ -208,6 +192,15 @@ class VectorEnvironment:
             for name, value in answer.items()
         }
 
+    def _count(self, which: np.ndarray | None, reward: np.ndarray, done: np.ndarray) -> None:
+        """Count a step of the sub-environments that took part in it."""
+        stepped = self.gym_env.moved
+        if stepped is not None:
+            which = np.flatnonzero(stepped) if which is None else which[stepped]
+            reward, done = reward[stepped], done[stepped]
+        self.statistics.step(reward, done, which)
+        self.steps += len(reward)
+
     def _take_final(self, info: dict, form: AnswerForm) -> dict:
         """Take the last observations of the sub-environments that were reset out of an info."""
         if "final_obs" not in info:
@@ -218,19 +211,17 @@ class VectorEnvironment:
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {
-            "final_obs": self.encode(batch, form, "final_obs"),
+            "final_obs": self._encode(batch, form, "final_obs"),
             "final_sub_envs": rows.tolist(),
         }
 
     # Values ---------------------------------------------------------------------------------
 
-    def encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
-        """Return a batch of observations as JSON values or as ``Parts``."""
+    def _encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
         if form.tensors and self._write_tensors:
             return self._write_tensors[name](observation, form.by_column)
         return self._write_json(observation)
 
-    # Made once, and only for a space that LocalBackend has found to be supported.
     @cached_property
     def _write_json(self) -> Callable[[Any], object]:
         return spaces.batch_json_writer(self.single_observation_space)
@@ -241,12 +232,10 @@ class VectorEnvironment:
         names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
         return {name: spaces.batch_tensor_writer(space, name) for name in names}
 
-    def encode_action(self, action: Any) -> object:
-        """Return one action for each sub-environment as JSON values."""
-        return spaces.encode_sub_envs(self.single_action_space, action)
+    def _sample_action(self) -> object:
+        return spaces.encode_sub_envs(self.single_action_space, self.gym_env.action_space.sample())
 
-    def decode(self, space: Space, value: object) -> object:
-        """Return the members of a space in a list that has one for each sub-environment."""
+    def _decode(self, space: Space, value: object) -> object:
         return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
 
     @property
@@ -259,9 +248,8 @@ class VectorEnvironment:
         """Whether an episode ended that only a reset of the client's follows."""
         return bool(self.gym_env.ended.any())
 
-    def observed(self, sub_env: int, observation: Any) -> object:
-        """Return the last observation of a sub-environment."""
-        return self.gym_env.observed(sub_env, observation)
+    def _observed(self, sub_env: int) -> object:
+        return self.gym_env.observed(sub_env, self._observation)
 
     def draw(self, sub_env: int) -> object:
         """Draw a sub-environment."""
@@ -269,12 +257,13 @@ class VectorEnvironment:
 
     # The end --------------------------------------------------------------------------------
 
-    def close(self) -> None:
-        """Close all sub-environments."""
+    def _close_monitor(self) -> None:
+        """Do nothing: monitors record single environments."""
+
+    def _close_env(self) -> None:
         self.gym_env.close()
 
-    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """From now on report when a process that they run in ends by itself, or if it has."""
+    def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         self.gym_env.report_end(on_end)
 
     def kill(self, why: GymServerError) -> None:

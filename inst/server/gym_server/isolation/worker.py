@@ -1,7 +1,7 @@
 """The process of an isolated environment: it creates it and does what the server asks.
 
 The process has an ordinary ``Instance`` of the environment, with a render thread and a monitor of
-its own; the server has an ``Instance`` with a ``WorkerBackend``, which asks this one.
+its own; the server has an ``IsolatedInstance``, which asks this one.
 """
 
 from __future__ import annotations
@@ -26,9 +26,8 @@ from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, answer_to
-from gym_server.instances.backend import Seed
 from gym_server.instances.factory import make_instance
-from gym_server.instances.instance import Instance
+from gym_server.instances.instance import Instance, Seed
 from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_directory import claim
 from gym_server.monitoring.monitor_files import MonitorFiles
@@ -212,17 +211,11 @@ class _Methods:
     def about(self) -> dict:
         return self._instance.about()
 
-    def action_space_info(self) -> dict:
-        return self._instance.action_space_info
+    def space_info(self, name: str) -> dict:
+        return self._instance.space_info(name)
 
-    def observation_space_info(self) -> dict:
-        return self._instance.observation_space_info
-
-    def action_contains(self, claim: dict) -> bool:
-        return self._instance.action_contains(claim)
-
-    def observation_contains(self, claim: dict) -> bool:
-        return self._instance.observation_contains(claim)
+    def contains(self, name: str, claim: dict) -> bool:
+        return self._instance.contains(name, claim)
 
 
 def _end(why: GymServerError) -> None:

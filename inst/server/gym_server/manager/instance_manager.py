@@ -26,8 +26,8 @@ from gym_server.errors import (
 )
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
+from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.isolation.policy import Isolation
-from gym_server.isolation.worker_backend import WorkerBackend
 from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
 from gym_server.manager.rollouts import Rollouts
@@ -230,11 +230,11 @@ class InstanceManager:
         )
         # An interrupt must wait until the process has started; see ``SubEnvs``.
         with interrupted_by(lambda: None):
-            backend = WorkerBackend(config, settings)
-            undo.callback(backend.kill, shutting_down())
-            creation.kill = backend.kill
-        backend.create(creation.share.reservation)
-        return Instance(backend, config, self._renderer)
+            instance = IsolatedInstance(config, settings, self._renderer)
+            undo.callback(instance.kill, shutting_down())
+            creation.kill = instance.kill
+        instance.create(creation.share.reservation)
+        return instance
 
     def registered(self, search: str | None) -> list[dict]:
         """Return what can be created; see ``registry.search()``."""

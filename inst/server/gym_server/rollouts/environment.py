@@ -17,7 +17,7 @@ from gym_server.budget import Budget
 from gym_server.envs import make, registry, wrappers
 from gym_server.envs.drawing_on_demand import save_drawing
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.instances.environment import env_id_of
+from gym_server.instances.local import env_id_of
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
 from gym_server.vector_envs.make import make_own_implementation

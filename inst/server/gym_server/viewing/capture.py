@@ -1,4 +1,4 @@
-"""Capture what an environment shows between two of its moves, without delaying it for long.
+"""Capture what an environment shows between two resets or steps, without delaying it for long.
 
 A capture needs two things that others need, too: the environment's lock, which a step takes, and
 the render thread, where other environments are drawn, closed and, some of them, stepped.
@@ -29,14 +29,14 @@ class Capture(NamedTuple):
     """An environment at one moment.
 
     Attributes:
-        moves: how often it had moved.
+        resets_and_steps: how many of it had begun.
         facts: the JSON values of ``Watchable.look()``.
         frame: the picture, or None.
-        began: since when it could not move, in the clock's seconds.
+        began: since when it could not be stepped, in the clock's seconds.
         seconds: for how long it could not.
     """
 
-    moves: int
+    resets_and_steps: int
     facts: dict
     frame: np.ndarray | None
     began: float
@@ -93,9 +93,9 @@ def _look_if_free(watchable: Watchable, sub_env: int) -> Capture | None:
 
 
 def _look(watchable: Watchable, sub_env: int, began: float) -> Capture:
-    moves = watchable.moves.count
+    begun = watchable.resets_and_steps
     facts, frame = watchable.look(sub_env)
-    return Capture(moves, facts, frame, began, time.monotonic() - began)
+    return Capture(begun, facts, frame, began, time.monotonic() - began)
 
 
 @contextlib.contextmanager

@@ -3,7 +3,7 @@
 A watcher asks for a newer frame than the one it has (a long poll), and the thread of that request
 draws the environment, for all watchers who wait. So the drawing stops when nobody asks any more,
 a watcher that reads slowly delays only itself, and the thread that steps the environment does no
-more than count its moves.
+more than count its resets and steps.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SHARE = 0.2
 # The same where the steps wait for real time anyway.
 _PACED_SHARE = 0.5
 
-# A watcher gets an answer after this long, also when nothing has moved; proxies wait longer.
+# A watcher gets an answer after this long, also when nothing has happened; proxies wait longer.
 _LONGEST_WAIT = 15.0
 
 # How long after its last request a watcher counts as still watching.
@@ -53,29 +53,28 @@ class Frame(NamedTuple):
 
     Attributes:
         number: no other frame of this environment has it.
-        moves: how often the environment had moved.
+        resets_and_steps: how many of the environment had begun.
         body: the answer for watchers, JSON.
         used: when it was last asked for, in the clock's seconds.
     """
 
     number: int
-    moves: int
+    resets_and_steps: int
     body: bytes
     used: float
 
 
 class Viewer:
-    """Shows one environment to its watchers, and keeps its pace where that is wanted."""
+    """Shows one environment to its watchers, and keeps its pace where that is wanted.
 
-    def __init__(self, watchable: Watchable, fps: object) -> None:
-        """Show nothing yet.
+    Attributes:
+        fps: how many steps a second to show; see ``usable_fps()``.
+    """
 
-        Args:
-            watchable: what is watched.
-            fps: the environment's render_fps, see ``usable_fps()``.
-        """
+    def __init__(self, watchable: Watchable) -> None:
+        """Show nothing yet of what is watched."""
         self._watchable = watchable
-        self.fps = usable_fps(fps)
+        self.fps = _USUAL_FPS
         # Guards what follows; never held while drawing, sending or waiting for the environment.
         self._changed = threading.Condition()
         self._frames: dict[int, Frame] = {}
@@ -99,7 +98,7 @@ class Viewer:
 
         Returns:
             The frame as JSON: the values of ``Watchable.look()``, a "number" and a "frame", a PNG
-            in Base64. The frame that it has seen already when nothing moves for long; only the
+            in Base64. The frame that it has seen already when nothing happens for long; only the
             "state" when the environment cannot be drawn for long.
 
         Raises:
@@ -152,8 +151,8 @@ class Viewer:
                 if self._ended is not None:
                     raise self._ended
                 now = time.monotonic()
-                frame = self._frames.get(sub_env)
-                stale = frame is None or frame.moves != self._watchable.moves.count
+                frame, begun = self._frames.get(sub_env), self._watchable.resets_and_steps
+                stale = frame is None or frame.resets_and_steps != begun
                 due = now >= self._due
                 if frame is not None:
                     new = frame.number != after and not (stale and due)
@@ -168,23 +167,23 @@ class Viewer:
                     raise Busy
                 if stale and not self._drawing:
                     self._changed.wait(min(self._due, deadline) - now)
-                elif self._drawing or self._waits_for_move(frame):
+                elif self._drawing or self._waits_for_step(frame):
                     self._changed.wait(deadline - now)
 
-    def _waits_for_move(self, frame: Frame | None) -> bool:
-        """Arrange to be called at the next move; return False when that may have come already.
+    def _waits_for_step(self, frame: Frame | None) -> bool:
+        """Arrange to be called at the next reset or step; return False when it may have come.
 
-        1. A watcher finds that its frame shows the last move.
-        2. The environment moves; nobody is to be called yet.
-        3. The watcher arranges to be called, and would wait for a move that has been.
+        1. A watcher finds that its frame shows the last step.
+        2. The environment is stepped; nobody is to be called yet.
+        3. The watcher arranges to be called, and would wait for a step that has been taken.
 
-        So the moves are compared once more after 3.
+        So the steps are compared once more after 3.
         """
-        self._watchable.moves.on_next = self._on_move
-        return frame is not None and frame.moves == self._watchable.moves.count
+        self._watchable.on_next = self._on_step
+        return frame is not None and frame.resets_and_steps == self._watchable.resets_and_steps
 
-    def _on_move(self) -> None:
-        """Wake the threads that wait for a move."""
+    def _on_step(self) -> None:
+        """Wake the threads that wait for a reset or a step."""
         with self._changed:
             self._changed.notify_all()
 
@@ -203,7 +202,7 @@ class Viewer:
             self._due = captured.began + max(_LEAST_SECONDS, wait)
             self._numbers += 1
             now = time.monotonic()
-            self._frames[sub_env] = Frame(self._numbers, captured.moves, body, now)
+            self._frames[sub_env] = Frame(self._numbers, captured.resets_and_steps, body, now)
             old = [key for key, one in self._frames.items() if one.used < now - _KEPT_SECONDS]
             for other in old:
                 del self._frames[other]
@@ -214,7 +213,7 @@ class Viewer:
     # For the instance -----------------------------------------------------------------------
 
     def pace(self) -> None:
-        """Sleep until the environment's next move is due, when somebody watches."""
+        """Sleep until the environment's next step is due, when somebody watches."""
         if not self.is_watched:
             return
         with self._changed:

@@ -3,69 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads.lock import InstanceLock
 
 if TYPE_CHECKING:
     import numpy as np
 
 
-class Moves:
-    """Counts how often an environment has begun to move.
+class Watchable:
+    """An environment that can be watched.
 
     Attributes:
-        count: how often.
-        on_next: called once when the environment moves the next time; None for nothing.
+        lock: what a thread needs to play the environment, or to look at it.
+        renderer: the process's render thread.
+        draws_when_stepped: whether its steps run on the render thread.
+        draws_on_render_thread: whether its frames are drawn on the render thread.
+        resets_and_steps: how many resets and steps of it have begun.
+        on_next: called once when the next one begins; None for nothing.
     """
 
-    __slots__ = ("count", "on_next")
+    lock: InstanceLock
+    renderer: RenderThread
+    draws_when_stepped: bool
+    draws_on_render_thread: bool
+    resets_and_steps = 0
+    on_next: Callable[[], None] | None = None
 
-    def __init__(self) -> None:
-        """Start at 0."""
-        self.count = 0
-        self.on_next: Callable[[], None] | None = None
-
-    def begin(self) -> None:
-        """Count a move that begins."""
-        self.count += 1
+    def begin_reset_or_step(self) -> None:
+        """Count a reset or a step that begins."""
+        self.resets_and_steps += 1
         if self.on_next is not None:
             call, self.on_next = self.on_next, None
             call()
-
-
-class Lock(Protocol):
-    """What keeps an environment from moving while it is looked at."""
-
-    def acquire(self, timeout: float) -> bool:
-        """Wait for it so many seconds; return whether the caller has it now."""
-
-    def release(self) -> None:
-        """Let the environment move again."""
-
-
-class Watchable(Protocol):
-    """An environment that can be watched."""
-
-    @property
-    def lock(self) -> Lock:
-        """What a thread needs to look at it."""
-
-    @property
-    def moves(self) -> Moves:
-        """How often it has moved."""
-
-    @property
-    def renderer(self) -> RenderThread:
-        """The process's render thread."""
-
-    @property
-    def draws_on_render_thread(self) -> bool:
-        """Whether a frame of it is drawn on the render thread."""
-
-    @property
-    def draws_when_stepped(self) -> bool:
-        """Whether its steps run on the render thread."""
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; the caller has the lock.
@@ -74,3 +45,4 @@ class Watchable(Protocol):
             JSON values, among them the observation where there is no frame and the reason why
             there is none; the frame or None.
         """
+        raise NotImplementedError

@@ -131,6 +131,6 @@ def test_sub_envs_return_what_the_environment_gave(client, sub_envs, app, mode):
         over = done if mode == "NextStep" else np.zeros(3, dtype=bool)
         if mode == "SameStep":
             so_far[done] = 0
-    statistics = app._instances.get(url.rsplit("/", 1)[1])._backend.env.statistics
+    statistics = app._instances.get(url.rsplit("/", 1)[1]).statistics
     assert len(returns) > 10
     assert list(statistics.returns) == pytest.approx(returns)

@@ -8,7 +8,7 @@ from running import descendants
 
 from gym_server.api.app import Config, create_app
 from gym_server.errors import GymServerError
-from gym_server.isolation.worker_backend import WorkerBackend
+from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager.limits import Limits, Room, Watchers
 from gym_server.vector_envs.sub_envs import SubEnvs
 
@@ -179,8 +179,10 @@ def test_processes_that_nobody_asked_for_are_no_more_than_there_is_room_for(limi
 def test_what_an_isolated_environment_tells_of_its_processes_frees_no_room(
     limited, monkeypatch, told
 ):
-    about = WorkerBackend.about
-    monkeypatch.setattr(WorkerBackend, "about", lambda self: {**about(self), "num_workers": told})
+    about = IsolatedInstance._about
+    monkeypatch.setattr(
+        IsolatedInstance, "_about", lambda self: {**about(self), "num_workers": told}
+    )
     client = limited(isolate="all", max_processes=4)
     assert ask_for_processes(client, 2).status_code == 200
     assert refused(make(client), "too_many_processes")

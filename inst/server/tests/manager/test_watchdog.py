@@ -16,7 +16,7 @@ from faulty_envs import HangsWhere
 from running import descendants, is_running, is_stopped
 
 from gym_server.api.app import Config, create_app
-from gym_server.isolation.worker_backend import WorkerBackend
+from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager import watchdog
 from gym_server.manager.limits import Limits
 
@@ -205,7 +205,7 @@ def test_sub_envs_in_processes_end_with_it(impatient_later, eventually):
     client = app.test_client()
     fields = {"num_envs": 2, "vectorization_mode": "async"}
     url = created(client, "faulty_envs:Hanging-v0", **fields)
-    processes = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.pids
+    processes = app._instances.get(url.rsplit("/", 1)[1]).gym_env.pids
     client.post(f"{url}/reset/")
     be_impatient()
     answer = client.post(f"{url}/step/", json={"action": [0, 0]})
@@ -409,7 +409,7 @@ def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, field
 def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
     started = []
 
-    class StartsSlowly(WorkerBackend):
+    class StartsSlowly(IsolatedInstance):
         def __init__(self, *args):
             end = time.monotonic() + 0.8
             while time.monotonic() < end:
@@ -417,7 +417,7 @@ def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
             super().__init__(*args)
             started.append(self._worker.pid)
 
-    monkeypatch.setattr("gym_server.manager.instance_manager.WorkerBackend", StartsSlowly)
+    monkeypatch.setattr("gym_server.manager.instance_manager.IsolatedInstance", StartsSlowly)
     limits = Limits(max_call_seconds=0.3)
     app = create_app(Config(limits=limits, isolate="all"))
     try:

@@ -147,7 +147,7 @@ def test_videos_are_made_of_every_nth_episode(client, create, monitor_dir):
 
 def test_a_video_has_all_frames_and_none_is_kept(app, client, faulty, monitor_dir, monkeypatch):
     url = faulty("Drawing", length=50)
-    env = app._instances.get(url.rsplit("/", 1)[1])._backend.env.gym_env.unwrapped
+    env = app._instances.get(url.rsplit("/", 1)[1]).gym_env.unwrapped
     drawn = []
 
     def render(draw=env.render):

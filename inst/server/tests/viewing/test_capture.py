@@ -15,14 +15,13 @@ def occupied(app, client, faulty, watch):
     url = faulty("Drawing")
     instance, _ = watch(url)
     begun, over = threading.Event(), threading.Event()
-    env = instance._backend.env
-    draw = env.draw
+    draw = instance.draw
 
     def for_long():
         begun.set()
         over.wait(30)
 
-    env.draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
+    instance.draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
     client.post(f"{url}/reset/")
     threads = []
 
@@ -115,7 +114,7 @@ def test_who_is_stepped_all_the_time_is_seen(
 
     urls = [faulty("Drawing", seconds=seconds, length=10**6) for _ in range(2)]
     for url in urls:
-        watch(url)[0]._backend.draws_when_stepped = draws_when_stepped
+        watch(url)[0].draws_when_stepped = draws_when_stepped
         client.post(f"{url}/reset/")
     players = [in_background(play_on, url)[0] for url in urls]
     number, end = 0, time.monotonic() + 60

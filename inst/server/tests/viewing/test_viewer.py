@@ -133,8 +133,7 @@ def test_the_observation_of_a_sub_env_is_its_own_when_only_others_stepped(app, c
     before = client.post(f"{url}/reset/", json={"seed": 1}).json["observation"]
     fields = {"action": [[0] * 4] * 2, "step_mask": [True, False, True]}
     after = client.post(f"{url}/step/", json=fields).json["observation"]
-    backend = instance._backend
-    seen = [backend.env.observed(i, backend._observation).tolist() for i in range(3)]
+    seen = [instance._observed(i).tolist() for i in range(3)]
     assert seen == [after[0], before[1], after[1]]
 
 
@@ -228,14 +227,13 @@ def test_pictures_keep_their_distance(client, faulty, watch, monkeypatch):
 def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch):
     url = faulty("Drawing")
     instance, drawn = watch(url)
-    env = instance._backend.env
-    draw = env.draw
+    draw = instance.draw
 
     def slowly(sub_env):
         time.sleep(0.05)
         return draw(sub_env)
 
-    env.draw = slowly
+    instance.draw = slowly
     client.post(f"{url}/reset/")
     number = state(client, url)["number"]
     began = time.monotonic()

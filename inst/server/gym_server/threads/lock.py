@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 
 from gym_server.errors import GymServerError
-from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.in_progress import InProgress
 
 
@@ -25,7 +24,7 @@ class InstanceLock:
         self,
         unknown: Callable[[], GymServerError],
         close_abandoned: Callable[[], None],
-        renderer: RenderThread | None = None,
+        drawing_since: Callable[[int], float | None] = lambda thread: None,
     ) -> None:
         """Make a lock that no thread has.
 
@@ -33,11 +32,12 @@ class InstanceLock:
             unknown: returns the error for an environment that its owner closed.
             close_abandoned: closes the environment; called in a thread that comes back after the
                 lock was taken away from it.
-            renderer: the render thread that threads with the lock may wait for.
+            drawing_since: returns since when the job has been running that a thread waits for the
+                render thread to do; see ``RenderThread.began()``.
         """
         self._unknown = unknown
         self._close_abandoned = close_abandoned
-        self._renderer = renderer
+        self._drawing_since = drawing_since
         self._lock = threading.Lock()
         # The thread that has the lock, and since when. The thread that ends this work, its own or
         # the watchdog's, releases the lock.
@@ -94,7 +94,7 @@ class InstanceLock:
         The work of a thread that waits for the render thread has not begun.
         """
         for thread, since in self._held.items():
-            began = self._renderer.began(thread) if self._renderer else None
+            began = self._drawing_since(thread)
             return since if began is None else began
         return None
 

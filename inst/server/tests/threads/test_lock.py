@@ -6,8 +6,8 @@ import time
 import pytest
 
 from gym_server.errors import GymServerError, unknown_instance
-from gym_server.instances.lock import InstanceLock
 from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads.lock import InstanceLock
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def test_it_tells_since_when_it_is_taken(lock):
 
 def test_who_waits_for_the_render_thread_has_not_begun(eventually):
     renderer = RenderThread()
-    lock = InstanceLock(lambda: unknown_instance("12345678"), lambda: None, renderer)
+    lock = InstanceLock(lambda: unknown_instance("12345678"), lambda: None, renderer.began)
     occupied, may_end = threading.Event(), threading.Event()
 
     def occupy():
