@@ -26,7 +26,7 @@ def crowded(monkeypatch):
     # On a busy machine those that were evicted take longer to end, and more would be evicted.
     monkeypatch.setattr(connections_module, "_MOMENT_SECONDS", 5)
     app = create_app()
-    server = Server(app, bind("127.0.0.1", 0), 2**20, Budget(2**24), on_stop=app.end_watching)
+    server = Server(app, bind("127.0.0.1", 0), 2**20, Budget(2**24))
     running = threading.Thread(target=server.run, args=(5,))
     running.start()
     connections = []

@@ -1,22 +1,23 @@
-"""The Flask application: it has the services, checks requests, and finds their routes.
+"""The Flask application: it has the services, checks requests, and hands them to their routes.
 
-Of Flask it uses the test client, and the answers to requests that have no route.
+Flask has the map of the routes, answers requests that have none, and gives tests its client. Its
+own dispatch takes longer than many a step, so a request that has a route goes there directly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
-from http import HTTPStatus
 from pathlib import Path
 
-from flask import Flask, Response
+import flask
+from flask import Flask
 
 from gym_server.api.access import Access, Guard
 from gym_server.api.calls import Services
-from gym_server.api.endpoint import Endpoint, failure, kept_bytes
+from gym_server.api.endpoint import Endpoint, failure
 from gym_server.api.exactly_once import ExactlyOnce
-from gym_server.api.routes import ROUTES
+from gym_server.api.routes import ROOMS, ROUTES
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
@@ -35,15 +36,8 @@ from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.processes.pool import pool
 from gym_server.processes.set_up import OWN_MB
-from gym_server.protocol import answers
-from gym_server.protocol.answers import Answer
 from gym_server.rendering.render_thread import RenderThread
-
-# A status line, headers and a body.
-WsgiAnswer = tuple[str, list[tuple[str, str]], bytes]
-
-_STATUS_LINES = {status.value: f"{status.value} {status.phrase}" for status in HTTPStatus}
-_NO_CONTENT = HTTPStatus.NO_CONTENT.value
+from gym_server.response import Response
 
 
 @dataclass(frozen=True)
@@ -83,11 +77,11 @@ class GymApp(Flask):
     """The application, which must be closed at the end.
 
     Attributes:
-        answer_for: sends a status, headers and a body to the client of a thread that is stuck in
-            an environment; set by the owner of the connections.
+        answer_for: sends a response to the client of a thread that is stuck in an environment; set
+            by the owner of the connections.
     """
 
-    answer_for: Callable[[int, str, list[tuple[str, str]], bytes], None]
+    answer_for: Callable[[int, Response], None]
 
     def __init__(self, config: Config) -> None:
         """Set up the services and the routes."""
@@ -107,6 +101,8 @@ class GymApp(Flask):
         self._guard = Guard(config.access, watch_keys)
         pool.most_mb = config.limits.max_memory_mb + OWN_MB
         self._rollouts = Rollouts(config.limits.rollout_processes)
+        self._exactly_once = ExactlyOnce(self._instances.lives)
+        self._router = Router(self, ROOMS)
         services = Services(
             self._instances,
             self._rollouts,
@@ -116,76 +112,62 @@ class GymApp(Flask):
             ROUTES,
             watch_keys if config.access.token is not None else None,
         )
-        exactly_once: ExactlyOnce[Answer] = ExactlyOnce(self._instances.lives, kept_bytes)
-        self._exactly_once = exactly_once
-        self._router = Router(ROUTES)
-        self._endpoints = {}
-        for route in ROUTES:
-            self._endpoints[route] = Endpoint(route, services, exactly_once, config.max_body_bytes)
-            # With these rules Flask makes the answers to requests that have no route.
-            self.add_url_rule(
-                route.path,
-                endpoint=route.handler.__name__,
-                methods=[route.method],
-                provide_automatic_options=False,
-                strict_slashes=False,
-            )
-        self.register_error_handler(Exception, lambda error: _response(failure(error, None)))
-        self.answer_for = lambda *_: None
-        self._watchdog = Watchdog(
-            self._instances,
-            self._rollouts,
-            config.limits,
-            self._abandon,
-            exactly_once.forget_in_time,
-        )
+        self._endpoints = {
+            route: Endpoint(route, services, self._exactly_once, config.max_body_bytes)
+            for route in ROUTES
+        }
+        self.register_error_handler(Exception, lambda error: _for_flask(failure(error)))
+        self.answer_for = lambda thread, response: None
+        self._watchdog = Watchdog(self._instances, self._rollouts, config.limits, self._abandon)
 
-    def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
-        """Answer a request by WSGI."""
+    def respond(self, environ: dict) -> Response:
+        """Answer a request, which is given in WSGI's words."""
         match = self._router.match(environ)
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
-            status, headers, body = _wsgi(_refused(refusal, environ, match))
-            start_response(status, headers)
-            return (body,)
-        if match is None:
-            # Flask answers by 404, 405, or a redirection where there are slashes too many.
-            return super().wsgi_app(environ, start_response)
-        status, headers, body = _wsgi(self._endpoints[match.route].answer(environ, match))
-        # In capitals, as Flask writes it and classic clients show it.
-        start_response(status.upper(), headers)
-        return (body,)
+            return _refused(refusal, environ, match)
+        if match is not None:
+            return self._endpoints[match.route].respond(environ, match)
+        # 404, 405, or a redirection where there are slashes too many.
+        with self.request_context(environ):
+            found = self.full_dispatch_request()
+        others = [(name, value) for name, value in found.headers if not name.startswith("Content-")]
+        return Response(found.status_code, found.data, found.content_type or "", tuple(others))
 
-    def admit(self, environ: dict) -> WsgiAnswer | None:
-        """Return the answer that refuses a request before its body has come; None to admit it."""
+    def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
+        """Answer a request by WSGI, as Flask's test client asks."""
+        response = _for_flask(self.respond(environ))
+        return response(environ, start_response)
+
+    def admit(self, environ: dict) -> Response | None:
+        """Return the response that refuses a request before its body has come; None to admit it."""
         try:
             self._guard.check(environ, self._router.match(environ))
         except GymServerError as refusal:
-            return _wsgi(failure(refusal, None))
+            return failure(refusal)
         return None
 
     def recognizes(self, environ: dict) -> bool:
         """Tell whether a request comes from a client that may use this server at all."""
         return self._guard.recognizes(environ, self._router.match(environ))
 
-    def refuse(self, status: int, reason: str) -> WsgiAnswer:
-        """Return the answer to a request that does not get as far as the application.
+    def refuse(self, status: int, reason: str) -> Response:
+        """Return the response to a request that does not get as far as the application.
 
         Args:
             status: 400, 413 or 503.
             reason: what is wrong with the request, for 400.
         """
         refusals = {413: body_too_large, 503: busy_receiving}
-        refusal = refusals[status]() if status in refusals else malformed_request(reason)
-        return _wsgi(failure(refusal, None))
+        return failure(refusals[status]() if status in refusals else malformed_request(reason))
 
     def _abandon(self, thread: int, why: GymServerError) -> None:
         """Abandon the call of a thread that is stuck in an environment, and answer it."""
-        answer = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
-        self.answer_for(thread, *_wsgi(answer or failure(why, None)))
+        response = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
+        self.answer_for(thread, response or failure(why))
 
-    def end_watching(self) -> None:
+    def begin_stop(self) -> None:
         """Answer those who would otherwise wait for longer than the stop may take."""
         self._instances.end_watching()
         self._rollouts.end()
@@ -204,35 +186,25 @@ def create_app(config: Config | None = None) -> GymApp:
     return GymApp(config or Config())
 
 
-def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Answer:
+def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Response:
     """Answer a request that may not pass; people get the reason on the page that they asked for."""
-    wants_page = "text/html" in environ.get("HTTP_ACCEPT", "")
     if (
         match is not None
         and match.route.refusal_page is not None
         and match.callers is not Callers.TOKEN
         and refusal.code == "unauthorized"
-        and wants_page
+        and "text/html" in environ.get("HTTP_ACCEPT", "")
     ):
-        page = answers.answer(match.route.refusal_page(match.path, refusal.status), None)
+        page = match.route.refusal_page(match.path, refusal.status)
         return page._replace(headers=(*page.headers, *refusal.headers))
-    return failure(refusal, None)
+    return failure(refusal)
 
 
 def _refuse_to_stop() -> None:
     raise shutdown_disabled()
 
 
-def _wsgi(answer: Answer) -> WsgiAnswer:
-    """Return an answer in WSGI's words."""
-    headers = [("Content-Type", answer.content_type)]
-    if answer.status != _NO_CONTENT:
-        headers.append(("Content-Length", str(len(answer.body))))
-    headers += answer.headers
-    return _STATUS_LINES[answer.status], headers, answer.body
-
-
-def _response(answer: Answer) -> Response:
-    response = Response(answer.body, answer.status, content_type=answer.content_type)
-    response.headers.extend(answer.headers)
-    return response
+def _for_flask(response: Response) -> flask.Response:
+    made = flask.Response(response.body, response.status, content_type=response.content_type)
+    made.headers.extend(response.headers)
+    return made

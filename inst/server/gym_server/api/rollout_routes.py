@@ -10,18 +10,19 @@ import numpy as np
 
 from gym_server.api import fields, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import Table
+from gym_server.api.routing import Room
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, answer_to, invalid_parameter
-from gym_server.protocol.answers import Content, dumps
+from gym_server.protocol.answers import dumps
 from gym_server.protocol.bodies import loads_file
 from gym_server.protocol.fields import OBJECT, Field, Kind
 from gym_server.protocol.safetensors import Tensor
+from gym_server.response import Response
 from gym_server.rollouts.environment import GROUP
 from gym_server.rollouts.task import Keep, Unit
 from gym_server.rollouts.tensors import content
 
-ROUTES = Table()
+ROOM = Room("rollouts")
 
 _KEPT = ("moments", "steps", "next_observation")
 
@@ -39,7 +40,7 @@ _KEEP = Kind(
 )
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "POST",
     "/v1/rollouts/",
     Field("env_id", fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
@@ -67,7 +68,7 @@ _KEEP = Kind(
     tensor_body=loads_file,
     schema=schemas.json_object({"env_id": schemas.TEXT, "processes": schemas.COUNT}),
 )
-def rollouts(call: Call) -> dict | Content:
+def rollouts(call: Call) -> dict | Response:
     """Play whole episodes with a policy that is data."""
     given = call.fields
     config = EnvConfig(

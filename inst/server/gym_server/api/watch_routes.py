@@ -7,11 +7,11 @@ from pathlib import Path
 from gym_server import viewing
 from gym_server.api import fields, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import INSTANCE, Callers, Table
+from gym_server.api.routing import INSTANCE, Callers, Room
 from gym_server.api.watch_keys import KEY_SECONDS
 from gym_server.errors import GymServerError
-from gym_server.protocol.answers import JSON, Content
 from gym_server.protocol.fields import Field
+from gym_server.response import JSON, Response
 
 _PAGE = Path(viewing.__file__).parent / "page"
 _WATCH = INSTANCE + "watch/"
@@ -35,10 +35,10 @@ _PAGE_HEADERS = (
 )
 
 
-ROUTES = Table()
+ROOM = Room("watch")
 
 
-def page(url: str, status: int) -> Content:
+def page(url: str, status: int) -> Response:
     """Return the watch page; its script then asks for the state, and shows errors in words.
 
     Args:
@@ -48,12 +48,11 @@ def page(url: str, status: int) -> Content:
     # The page names its files relative to its own address, so that it works below any proxy's
     # folder, and that address may lack the last slash.
     here = "" if url.endswith("/") else "watch/"
-    return Content(
-        _read("watch.html").replace(b"{here}", here.encode()), _HTML, status, _PAGE_HEADERS
-    )
+    html = _read("watch.html").replace(b"{here}", here.encode())
+    return Response(status, html, _HTML, _PAGE_HEADERS)
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "GET",
     _WATCH,
     answer="a page for a browser",
@@ -61,7 +60,7 @@ def page(url: str, status: int) -> Content:
     content_type=_HTML,
     refusal_page=page,
 )
-def env_watch(call: Call) -> Content:
+def env_watch(call: Call) -> Response:
     """Show an environment live to people."""
     try:
         _ = call.instance
@@ -74,7 +73,7 @@ def env_watch(call: Call) -> Content:
     return page(call.url, status)
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "POST",
     _WATCH + "key/",
     answer="key: opens the page as watch/?key=KEY, without a token, and seconds: how long after "
@@ -92,34 +91,34 @@ def env_watch_key(call: Call) -> dict:
     return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "GET",
     _WATCH + "watch.css/",
     answer="how the page looks",
     callers=Callers.EVERYONE,
     content_type=_CSS,
 )
-def env_watch_style(call: Call) -> Content:
+def env_watch_style(call: Call) -> Response:
     """Return the watch page's style sheet."""
-    return Content(_read("watch.css"), _CSS, headers=_PAGE_HEADERS)
+    return Response(200, _read("watch.css"), _CSS, headers=_PAGE_HEADERS)
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "GET",
     _WATCH + "<script>.js/",
     answer="what the page does",
     callers=Callers.EVERYONE,
     content_type=_JAVASCRIPT,
 )
-def env_watch_script(call: Call) -> Content:
+def env_watch_script(call: Call) -> Response:
     """Return one of the watch page's scripts."""
     name = call.path["script"]
     if name not in _SCRIPTS:
         raise GymServerError("not_found", f"The watch page has no script {name}.js")
-    return Content(_read(f"{name}.js"), _JAVASCRIPT, headers=_PAGE_HEADERS)
+    return Response(200, _read(f"{name}.js"), _JAVASCRIPT, headers=_PAGE_HEADERS)
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "GET",
     _WATCH + "state/",
     Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
@@ -134,16 +133,16 @@ def env_watch_script(call: Call) -> Content:
     grows=True,
     schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
-def env_watch_state(call: Call) -> Content:
+def env_watch_state(call: Call) -> Response:
     """Wait for a new frame; frames are drawn only for those who wait here."""
     sub_env = call.fields["sub_env"] or 0
     call.instance.check_sub_env(sub_env)
     with call.services.watchers.one_more():
         body = call.instance.viewer.next_frame(sub_env, call.fields["after"])
-    return Content(body, JSON, headers=(_NO_STORE,))
+    return Response(200, body, JSON, headers=(_NO_STORE,))
 
 
-@ROUTES.declare(
+@ROOM.declare(
     "GET",
     _WATCH + "presence/",
     answer="watched: true",

@@ -101,16 +101,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_paths=None if is_private else options.allow_path,
         )
     )
-    server = Server(
-        app,
-        listener,
-        max_body_bytes,
-        Budget(_LARGEST_BODIES * max_body_bytes),
-        app.end_watching,
-        app.admit,
-        app.recognizes,
-        app.refuse,
-    )
+    server = Server(app, listener, max_body_bytes, Budget(_LARGEST_BODIES * max_body_bytes))
     stop.server = server
     app.answer_for = server.answer_for
     _stop_on_signals(stop)

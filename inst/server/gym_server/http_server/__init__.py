@@ -1,4 +1,4 @@
-"""A small HTTP/1.1 server for a WSGI application, which knows nothing of the application.
+"""A small HTTP/1.1 server, which knows of its application what ``interface`` says.
 
 Why it exists:
 
@@ -10,7 +10,7 @@ Why it exists:
       ==================  ===================  =====================
       application         this server          waitress 3.0.2
       ==================  ===================  =====================
-      a bare WSGI one     24 (42,000)          146 (6,800)
+      a bare one          24 (42,000)          146 (6,800)
       Flask, one route    139 (7,200)          246 (4,100)
       ==================  ===================  =====================
 

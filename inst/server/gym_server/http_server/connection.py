@@ -8,16 +8,17 @@ import io
 import os
 import socket
 import struct
-import sys
 import threading
 import time
-from collections.abc import Callable
 from functools import lru_cache
+from http import HTTPStatus
 
 from httptools import HttpParserError
 
-from gym_server.http_server.interface import Answer, Refuse, Share, refuse_in_plain_text
+from gym_server.budget import Share
+from gym_server.http_server.interface import Application
 from gym_server.http_server.request_parser import Request, RequestParser
+from gym_server.response import Response
 
 # Seconds that a connection may be idle.
 _IDLE_SECONDS = 3600.0
@@ -85,35 +86,24 @@ class Connection:
     def __init__(
         self,
         client: socket.socket,
-        app: Callable,
+        app: Application,
         base_environ: dict,
         max_body_bytes: int,
         bodies: Share,
-        admit: Callable[[dict], Answer | None] = lambda environ: None,
-        recognizes: Callable[[dict], bool] = lambda environ: True,
-        refuse: Refuse = refuse_in_plain_text,
     ) -> None:
         """Take over a connected socket.
 
         Args:
             client: the socket.
-            app: a WSGI application.
+            app: the application.
             base_environ: what is the same in the environment of each request.
             max_body_bytes: the size of the largest body.
             bodies: the memory that large bodies hold until they are answered.
-            admit: is given the environment that WSGI would be given, before a large body is read;
-                returns the answer that refuses the request, or None to let it pass.
-            recognizes: is given the same; tells whether its client may stay connected. It is asked
-                until it says so. Other clients get one answer and have less time.
-            refuse: makes the answer to a request that does not reach the application.
         """
         self._socket = client
         self._app = app
         self._base_environ = base_environ
-        self._parser = RequestParser(max_body_bytes, self._send, self._refusal, bodies, refuse)
-        self._admit = admit
-        self._recognizes = recognizes
-        self._refuse = refuse
+        self._parser = RequestParser(max_body_bytes, self._send, self._refusal, bodies, app.refuse)
         self._is_recognized = False
         # When its time is over if it is not recognized until then, in the clock's seconds.
         self._due = time.monotonic() + _UNRECOGNIZED_SECONDS
@@ -185,19 +175,19 @@ class Connection:
                 if self._parser.began or not self._is_recognized or silent > _IDLE_SECONDS:
                     raise
 
-    def _refusal(self, request: Request) -> Answer | None:
-        """Return the answer that refuses a request, before its large body has come."""
+    def _refusal(self, request: Request) -> Response | None:
+        """Return the response that refuses a request, before its large body has come."""
         try:
             environ = {**self._base_environ, **request.environ()}
         except HttpParserError as error:
-            return self._refuse(400, str(error))
-        refusal = self._admit(environ)
+            return self._app.refuse(400, str(error))
+        refusal = self._app.admit(environ)
         if refusal is None and not self._is_recognized:
             self._recognize(environ)
         return refusal
 
     def _recognize(self, environ: dict) -> None:
-        if self._recognizes(environ):
+        if self._app.recognizes(environ):
             self._is_recognized = True
             self._wait_at_most(_REST_SECONDS)
 
@@ -207,7 +197,7 @@ class Connection:
     def _answer(self, request: Request) -> bool:
         """Answer one request; return whether another may follow."""
         self._unanswered.append(request)
-        status, headers, body = self._respond(request)
+        response = self._respond(request)
         if request.held_bytes:
             self._parser.release(request)
         try:
@@ -216,12 +206,13 @@ class Connection:
             # It took so long that answer_for() has answered.
             return False
         keep = request.keep_alive and self._is_recognized and not self._stopping
-        self._sends_no_store = _NO_STORE in headers
+        self._sends_no_store = _NO_STORE in response.headers
+        head, body = _head(response, keep), b"" if request.method == "HEAD" else response.body
         # In one piece, where that is not much to copy: what follows the head would come later.
         if len(body) <= _COPIED_BYTES:
-            self._send(_head(status, headers, keep) + body)
+            self._send(head + body)
         else:
-            self._send(_head(status, headers, keep), body)
+            self._send(head, body)
         self._sends_no_store = False
         return keep
 
@@ -248,7 +239,7 @@ class Connection:
                 self.waiting_since = time.monotonic()
         self._wait_at_most(_REST_SECONDS)
 
-    def answer_for(self, status: str, headers: list[tuple[str, str]], body: bytes) -> None:
+    def answer_for(self, response: Response) -> None:
         """Answer on behalf of the serving thread, which is stuck in the application; then close.
 
         Both threads may come to answer the same request:
@@ -260,11 +251,6 @@ class Connection:
         4. The thread that took it out sends its answer. If that is the serving thread,
            ``answer_for()`` does nothing. If it is the other, that closes the socket, and the
            serving thread, if the application ever comes back, finds the list empty and ends.
-
-        Args:
-            status: as for WSGI.
-            headers: as for WSGI.
-            body: what follows them.
         """
         try:
             request = self._unanswered.pop()
@@ -272,30 +258,20 @@ class Connection:
             return
         with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
             self._socket.settimeout(_STUCK_ANSWER_SECONDS)
-            data = b"" if request.method == "HEAD" else body
-            self._socket.sendall(_head(status, headers, keep=False) + data)
+            body = b"" if request.method == "HEAD" else response.body
+            self._socket.sendall(_head(response, keep=False) + body)
             self._socket.shutdown(socket.SHUT_WR)
 
-    def _respond(self, request: Request) -> Answer:
+    def _respond(self, request: Request) -> Response:
         if request.refusal is not None:
             return request.refusal
         try:
             environ = self._environ(request)
         except HttpParserError as error:
-            return self._refuse(400, str(error))
+            return self._app.refuse(400, str(error))
         if not self._is_recognized:
             self._recognize(environ)
-        started: list = []
-        result = self._app(
-            environ,
-            lambda status, headers, exc_info=None: started.extend((status, headers)),
-        )
-        try:
-            body = b"".join(result)
-        finally:
-            if hasattr(result, "close"):
-                result.close()
-        return started[0], started[1], b"" if request.method == "HEAD" else body
+        return self._app.respond(environ)
 
     def _environ(self, request: Request) -> dict:
         # A client that plays sends the same head with each step.
@@ -307,7 +283,6 @@ class Connection:
             **self._last_environ,
             "CONTENT_LENGTH": str(len(body)),
             "wsgi.input": io.BytesIO(body),
-            "wsgi.errors": sys.stderr,
             "gym_server.is_connected": self._is_connected,
         }
 
@@ -371,15 +346,21 @@ class Connection:
                 self._socket.shutdown(socket.SHUT_RD)
 
 
-def _head(status: str, headers: list[tuple[str, str]], keep: bool) -> bytes:
+# In capitals, as Flask writes it and classic clients show it.
+_STATUS_LINES = {one.value: f"HTTP/1.1 {one.value} {one.phrase.upper()}" for one in HTTPStatus}
+
+
+def _head(response: Response, keep: bool) -> bytes:
     """Return what comes before the body."""
-    head = [f"HTTP/1.1 {status}"]
-    head += [f"{name}: {value}" for name, value in headers]
-    head.append(f"Date: {_date(int(time.time()))}")
+    head = f"{_STATUS_LINES[response.status]}\r\nContent-Type: {response.content_type}\r\n"
+    if response.status != HTTPStatus.NO_CONTENT:
+        head += f"Content-Length: {len(response.body)}\r\n"
+    for name, value in response.headers:
+        head += f"{name}: {value}\r\n"
+    head += f"Date: {_date(int(time.time()))}\r\n"
     if not keep:
-        head.append("Connection: close")
-    head.append("\r\n")
-    return "\r\n".join(head).encode("latin-1")
+        head += "Connection: close\r\n"
+    return f"{head}\r\n".encode("latin-1")
 
 
 @lru_cache(maxsize=2)

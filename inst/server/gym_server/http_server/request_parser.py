@@ -7,7 +7,8 @@ from urllib.parse import unquote_to_bytes
 
 from httptools import HttpParserError, HttpParserUpgrade, HttpRequestParser, parse_url
 
-from gym_server.http_server.interface import Answer, Refuse, Share, refuse_in_plain_text
+from gym_server.budget import Share
+from gym_server.response import Response
 
 _LARGEST_HEAD_BYTES = 2**16
 
@@ -39,7 +40,7 @@ class Request:
         version: of HTTP, such as "1.1".
         keep_alive: whether the client wants the connection to stay.
         was_checked: whether it was asked whether the request is admitted.
-        refusal: the answer, if the request is not handed to the application.
+        refusal: the response, if the request is not handed to the application.
     """
 
     def __init__(self) -> None:
@@ -53,7 +54,7 @@ class Request:
         self.version = ""
         self.keep_alive = False
         self.was_checked = False
-        self.refusal: Answer | None = None
+        self.refusal: Response | None = None
 
     def same_head(self, other: Request) -> bool:
         """Tell whether another request has the same head."""
@@ -126,19 +127,19 @@ class RequestParser:
         self,
         max_body_bytes: int,
         send: Callable[[bytes], None],
-        refusal: Callable[[Request], Answer | None],
+        refusal: Callable[[Request], Response | None],
         bodies: Share,
-        refuse: Refuse = refuse_in_plain_text,
+        refuse: Callable[[int, str], Response],
     ) -> None:
         """Begin to read.
 
         Args:
             max_body_bytes: the size of the largest body.
             send: sends what has to be sent before a request is complete.
-            refusal: returns the answer that refuses a request whose large body is still to come,
+            refusal: returns the response that refuses a request whose large body is still to come,
                 or None to let it pass.
             bodies: the memory that large bodies hold.
-            refuse: makes the answer to a request that cannot be read, or that is too large.
+            refuse: see ``Application.refuse()``.
         """
         self._max_body_bytes = max_body_bytes
         self._send = send
@@ -203,7 +204,7 @@ class RequestParser:
             return request.plain_head() + data[upgrade.args[0] :]
         return b""
 
-    def _end_with(self, refusal: Answer) -> None:
+    def _end_with(self, refusal: Response) -> None:
         """Answer what has come so far, after which the connection closes."""
         self._request.refusal = refusal
         self._request.keep_alive = False
@@ -292,7 +293,7 @@ class RequestParser:
         else:
             self._discard_body(self._refuse(503, ""))
 
-    def _discard_body(self, refusal: Answer) -> None:
+    def _discard_body(self, refusal: Response) -> None:
         """Throw away what comes of the body; its sender gets the answer at its end."""
         self._request.refusal = refusal
         self._request.body = b""

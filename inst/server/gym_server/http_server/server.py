@@ -11,12 +11,13 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
 
+from gym_server.budget import Budget
 from gym_server.http_server import connections
 from gym_server.http_server.connection import Connection
 from gym_server.http_server.connections import Connections
-from gym_server.http_server.interface import Answer, Budget, Refuse, refuse_in_plain_text
+from gym_server.http_server.interface import Application
+from gym_server.response import Response
 
 log = logging.getLogger(__name__)
 
@@ -66,34 +67,20 @@ class Server:
 
     def __init__(
         self,
-        app: Callable,
+        app: Application,
         listener: socket.socket,
         max_body_bytes: int,
         bodies: Budget,
-        on_stop: Callable[[], None] = lambda: None,
-        admit: Callable[[dict], Answer | None] = lambda environ: None,
-        recognizes: Callable[[dict], bool] = lambda environ: True,
-        refuse: Refuse = refuse_in_plain_text,
     ) -> None:
         """Prepare; ``run()`` serves.
 
         Args:
-            app: a WSGI application.
+            app: the application.
             listener: a listening socket, as ``bind()`` returns it.
             max_body_bytes: the size of the largest request body.
             bodies: the memory for the bodies of all requests; small ones take none of it.
-            on_stop: called when the stop has come and requests are still under way.
-            admit: is given WSGI's environment of a request whose large body is still to come;
-                returns the answer that refuses it, or None.
-            recognizes: tells by the same whether a client may stay connected; it is asked until it
-                says so.
-            refuse: makes the answer to a request that does not reach the application.
         """
         self._app = app
-        self._on_stop = on_stop
-        self._admit = admit
-        self._recognizes = recognizes
-        self._refuse = refuse
         self._listener = listener
         self._max_body_bytes = max_body_bytes
         self._bodies = bodies
@@ -102,11 +89,7 @@ class Server:
             "SCRIPT_NAME": "",
             "SERVER_NAME": host,
             "SERVER_PORT": str(self.port),
-            "wsgi.version": (1, 0),
             "wsgi.url_scheme": "http",
-            "wsgi.multithread": True,
-            "wsgi.multiprocess": False,
-            "wsgi.run_once": False,
         }
         self._connections = Connections()
         self._warned = -math.inf
@@ -141,22 +124,13 @@ class Server:
         self._listener.close()
         self._wake.close()
         self._waker.close()
-        self._on_stop()
+        self._app.begin_stop()
         return self._connections.drain(grace, _HALF_SENT_SECONDS)
 
-    def answer_for(
-        self, thread: int, status: str, headers: list[tuple[str, str]], body: bytes
-    ) -> None:
-        """Answer on behalf of a thread that is stuck in the application.
-
-        Args:
-            thread: its identity.
-            status: as for WSGI.
-            headers: as for WSGI.
-            body: what follows them.
-        """
+    def answer_for(self, thread: int, response: Response) -> None:
+        """Answer on behalf of a thread that is stuck in the application."""
         for connection in self._connections.served_by(thread):
-            connection.answer_for(status, headers, body)
+            connection.answer_for(response)
             self._connections.remove(connection)
 
     def _accept(self) -> None:
@@ -178,9 +152,6 @@ class Server:
             {**self._base_environ, "REMOTE_ADDR": address[0]},
             self._max_body_bytes,
             self._bodies.share(),
-            self._admit,
-            self._recognizes,
-            self._refuse,
         )
         if not self._connections.add(connection, address[0]):
             self._warn(f"No more connections from {address[0]}: all that it has are at work")

@@ -35,8 +35,7 @@ from gym_server.processes import messages, start
 from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
 from gym_server.processes.set_up import OWN_MB, set_up_process
-from gym_server.protocol import answers
-from gym_server.protocol.answers import AnswerForm, Ready
+from gym_server.protocol.answers import AnswerForm, Ready, response_to
 from gym_server.rendering.render_thread import RenderThread
 
 log = logging.getLogger(__name__)
@@ -225,8 +224,8 @@ def _end(why: GymServerError) -> None:
 
 
 def _ready(result: dict | Ready, steps: int = 0) -> Ready:
-    answer = answers.answer(result, None)
-    return Ready(answer.body, answer.content_type, steps)
+    response = response_to(result, None)
+    return Ready(response.body, response.content_type, steps)
 
 
 class _Resolved:

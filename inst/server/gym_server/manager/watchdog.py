@@ -40,7 +40,6 @@ class Watchdog:
         rollouts: Rollouts,
         limits: Limits,
         answer_for: Callable[[int, GymServerError], None],
-        forget: Callable[[], None],
     ) -> None:
         """Start to watch.
 
@@ -49,13 +48,11 @@ class Watchdog:
             rollouts: the episodes to watch.
             limits: how long things may take.
             answer_for: answers for a thread that cannot any more.
-            forget: drops answers that nobody will ask for again.
         """
         self._instances = instances
         self._rollouts = rollouts
         self._limits = limits
         self._answer_for = answer_for
-        self._forget = forget
         self._gave_back = self._measured = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
@@ -83,7 +80,6 @@ class Watchdog:
         if time.monotonic() > self._measured + _MEASURE_SECONDS:
             self._instances.evict_largest(self._rollouts)
             self._measured = time.monotonic()
-        self._forget()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
             garbage, self._instances.left_garbage = self._instances.left_garbage, False
             memory.give_back(garbage)

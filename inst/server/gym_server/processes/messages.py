@@ -21,8 +21,9 @@ import numpy as np
 
 from gym_server.errors import GymServerError
 from gym_server.processes.pipe import MalformedMessageError, Pipe
-from gym_server.protocol.answers import JSON, Ready, dumps
+from gym_server.protocol.answers import Ready, dumps
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
+from gym_server.response import JSON
 
 # The number of the call, the kind of the result, and the length of its text; of an answer, which
 # has none, how many steps were taken for it.

@@ -1,4 +1,4 @@
-"""Answers: what a route returns becomes a status, a body of strict JSON or safetensors, headers."""
+"""What a route returns becomes a response: a body of strict JSON, or of safetensors."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from gym_server.protocol.safetensors import (
     quoted,
 )
 from gym_server.protocol.safetensors import join as join_tensors
+from gym_server.response import JSON, Response
 
-JSON = "application/json"
 HTML = "text/html"
 
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
@@ -83,24 +83,6 @@ class AnswerForm(NamedTuple):
 JSON_FORM = AnswerForm()
 
 
-class Answer(NamedTuple):
-    """An answer as it goes out, and is stored for a repetition."""
-
-    status: int
-    body: bytes
-    content_type: str = JSON
-    headers: tuple[tuple[str, str], ...] = ()
-
-
-class Content(NamedTuple):
-    """A result that is bytes already."""
-
-    data: bytes
-    content_type: str
-    status: int = 200
-    headers: tuple[tuple[str, str], ...] = ()
-
-
 class Ready(NamedTuple):
     """A body from the process of an environment, to which only the request is to be added.
 
@@ -115,37 +97,37 @@ class Ready(NamedTuple):
     steps: int = 0
 
 
-def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Content:
+def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Response:
     """Return a frame as a file of one tensor."""
     file = join_tensors({"frame": Tensor.of(frame, form.by_column)}, b"")
-    return Content(file, COLUMN_TENSORS if form.by_column else TENSORS)
+    return Response(200, file, COLUMN_TENSORS if form.by_column else TENSORS)
 
 
-def answer(
-    result: dict | Content | Ready | None, request_id: RequestId | None, status: int = 200
-) -> Answer:
-    """Put a route's result into an answer.
+def response_to(
+    result: dict | Response | Ready | None, request_id: RequestId | None, status: int = 200
+) -> Response:
+    """Make a response of a route's result.
 
     Args:
-        result: a JSON object, whose observations may be tensors, a content of its own, a body
-            that is ready, or None for an answer without content (204).
+        result: a JSON object, whose observations may be tensors, a response already, a body that
+            is ready, or None for no content (204).
         request_id: what the client called its request, echoed when given.
-        status: the HTTP status of a JSON answer.
+        status: the HTTP status of a JSON object.
     """
-    if isinstance(result, Content):
-        return Answer(result.status, result.data, result.content_type, result.headers)
+    if isinstance(result, Response):
+        return result
     if isinstance(result, Ready):
-        return Answer(status, _with_request(result, request_id), result.content_type)
+        return Response(status, _with_request(result, request_id), result.content_type)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default type here.
-        return Answer(204, b"", "text/html; charset=utf-8", headers)
+        return Response(204, b"", "text/html; charset=utf-8", headers)
     if isinstance(observation := result.get("observation"), Parts):
         content_type = COLUMN_TENSORS if observation.by_column else TENSORS
-        return Answer(status, _dumps_tensors(request_id, **result), content_type)
+        return Response(status, _dumps_tensors(request_id, **result), content_type)
     if request_id is not None:
         result = {**result, "request": request_id._asdict()}
-    return Answer(status, dumps(result))
+    return Response(status, dumps(result))
 
 
 def _with_request(ready: Ready, request_id: RequestId | None) -> bytes:

@@ -39,13 +39,18 @@ class Field:
     required: bool = False
 
 
-def read(body: dict, fields: Iterable[Field]) -> dict:
+def read(body: dict, fields: Iterable[Field], values: dict[str, Any] | None = None) -> dict:
     """Return the fields' values from a request's body; None for those that are absent.
+
+    Args:
+        body: the body.
+        fields: what it may hold.
+        values: takes the values, one after the other: when one is refused, it has those before.
 
     Raises:
         GymServerError: ``missing_parameter``, ``invalid_parameter``, ``not_supported``.
     """
-    values: dict[str, Any] = {}
+    values = {} if values is None else values
     for field in fields:
         value = body.get(field.name)
         if value is None or (field.kind.empty_is_absent and value in ("", [])):

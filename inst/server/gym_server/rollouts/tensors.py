@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gym_server.protocol.answers import Content
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor, write
+from gym_server.response import Response
 
 
 def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
@@ -23,9 +23,9 @@ def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
     return tensors
 
 
-def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Content:
+def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Response:
     """Return tensors as the body of an answer."""
     if by_column:
         tensors = {name: Tensor.of(one.array(), by_column) for name, one in tensors.items()}
     file = write(tensors, metadata)
-    return Content(file, COLUMN_TENSORS if by_column else TENSORS)
+    return Response(200, file, COLUMN_TENSORS if by_column else TENSORS)

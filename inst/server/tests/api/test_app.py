@@ -125,7 +125,7 @@ def test_no_flood_of_keys_makes_a_step_be_taken_twice(app, client, faulty):
         flood(app, "/v1/envs/0/step/", once(f"flood{number}", 1, action=0))
         # Nor one of calls that the instance refuses.
         flood(app, f"{url}/step/", once(f"refused{number}", 1, action=9))
-    app._exactly_once.forget()
+    app._exactly_once._drop_gone()
     assert client.post(f"{url}/step/", json=once("victim", 2, action=0)).data == first.data
     assert client.get(url).json["steps"] == 1
 
@@ -140,7 +140,7 @@ def flood(app, path, fields):
         "CONTENT_LENGTH": str(len(body)),
         "wsgi.input": io.BytesIO(body),
     }
-    app.wsgi_app(environ, lambda status, headers: None)
+    app.respond(environ)
 
 
 def test_a_guessed_key_with_a_huge_number_blocks_nobody(client, faulty):

@@ -5,6 +5,7 @@ import pytest
 from gym_server.api.exactly_once import ExactlyOnce, Outcome
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import RequestId
+from gym_server.response import Response
 
 
 class Counter:
@@ -16,7 +17,12 @@ class Counter:
 
     def __call__(self):
         self.calls += 1
-        return Outcome(self.calls, self.did_something, self.instance_id)
+        return outcome(self.calls, self.did_something, self.instance_id)
+
+
+def outcome(text, *what, size=0):
+    """Return an outcome whose response says a text, and has so many bytes."""
+    return Outcome(Response(200, bytes(size), str(text)), *what)
 
 
 class Once(ExactlyOnce):
@@ -27,9 +33,11 @@ class Once(ExactlyOnce):
         super().__init__(self.living.__contains__, **limits)
 
     def answer(self, request_id, content, act, instance_id="i"):
+        """Return the text of the response, as a number where it is one."""
         if isinstance(act, Counter) and act.instance_id is None:
             act.instance_id = instance_id
-        return super().answer(request_id, instance_id, content, act)
+        text = self.respond(request_id, instance_id, content, len(content), act).content_type
+        return int(text) if text.isdigit() else text
 
 
 def conflict(*arguments):
@@ -106,7 +114,7 @@ def test_a_key_does_not_wait_for_another():
     began, may_end = threading.Event(), threading.Event()
     slow = threading.Thread(
         target=once.answer,
-        args=(RequestId("a", 1), "step", lambda: Outcome((began.set(), may_end.wait(10)))),
+        args=(RequestId("a", 1), "step", lambda: outcome((began.set(), may_end.wait(10)))),
     )
     slow.start()
     assert began.wait(10)
@@ -119,7 +127,7 @@ def test_what_was_refused_before_anything_moved_leaves_nothing():
     once, refuse, act = Once(), Counter(did_something=False), Counter()
     for number in range(3):
         assert once.answer(RequestId("a", 2**62), "step", refuse) == number + 1
-    assert not once._calls
+    assert not once._table
     assert once.answer(RequestId("a", 1), "step", act) == 1
     once.answer(RequestId("a", 2), "step", refuse)
     # What the key did before is still known.
@@ -134,7 +142,7 @@ def test_a_repetition_that_waits_for_what_is_refused_is_done():
     def refuse():
         began.set()
         assert may_end.wait(10)
-        return Outcome("refused", False)
+        return outcome("refused", False)
 
     answers = []
     threads = [
@@ -172,37 +180,33 @@ def test_creations_have_no_order():
 
 
 def test_the_last_call_on_a_living_instance_and_its_creation_are_never_forgotten():
-    once, created, stepped = Once(forget_after=0, most_gone=0), Counter(instance_id="i"), Counter()
+    once, created, stepped = Once(kept_seconds=0, most_gone=0, most_keys=2), Counter(), Counter()
+    created.instance_id = "i"
     once.answer(NUMBER_1, "create", created, None)
     once.answer(NUMBER_1, "step", Counter())
     once.answer(RequestId("b", 1), "step", stepped)
-    once.forget()
+    # Another key's call has been idle for so long that it makes room.
+    refuse = Counter(did_something=False)
+    once.answer(RequestId("c", 1), "step", refuse)
+    assert set(once._table["i"]) == {"b"}
     assert once.answer(NUMBER_1, "create", created, None) == 1
     assert once.answer(RequestId("b", 1), "step", stepped) == 1
     assert (created.calls, stepped.calls) == (1, 1)
-    # Another key's call before it has been idle for so long that nothing is repeated any more.
-    assert set(once._calls["i"]) == {"b"}
 
 
-def test_of_instances_that_are_gone_only_so_many_keys_are_kept():
-    once, living = Once(living=["i", "mine"], most_gone=2), Counter()
+def test_what_is_known_of_instances_that_are_gone_is_dropped_when_many_rows_have_come():
+    once, living = Once(living=["i", "mine"], most_gone=3), Counter()
     once.answer(NUMBER_1, "step", living, "mine")
-    for key in "abcd":
-        once.answer(RequestId(key, 1), "close", Counter())
+    once.answer(NUMBER_1, "create", Counter(instance_id="i"), None)
+    once.answer(NUMBER_1, "step", Counter())
     once.living.remove("i")
-    once.forget()
-    assert set(once._calls["i"]) == {"c", "d"}
+    assert set(once._table) == {"mine", None, "i"}
+    once.answer(NUMBER_1, "create", Counter(instance_id="j"), None)
+    once.answer(RequestId("b", 1), "create", Counter(instance_id="mine"), None)
+    assert set(once._table) == {"mine", None}
+    assert set(once._table[None]) == {RequestId("b", 1)}
     assert once.answer(NUMBER_1, "step", living, "mine") == 1
     assert living.calls == 1
-
-
-def test_idle_keys_of_an_instance_that_is_gone_are_forgotten():
-    once = Once(forget_after=0)
-    once.answer(NUMBER_1, "create", Counter(instance_id="i"), None)
-    once.answer(NUMBER_1, "close", Counter())
-    once.living.clear()
-    once.forget()
-    assert not once._calls
 
 
 def test_an_instance_takes_only_so_many_keys_and_goes_on_with_those():
@@ -217,15 +221,16 @@ def test_an_instance_takes_only_so_many_keys_and_goes_on_with_those():
 
 
 def test_a_key_that_is_in_use_is_not_forgotten():
-    once, act = Once(forget_after=0, most_gone=0), Counter()
+    once, act = Once(living=[], most_gone=0), Counter()
 
     def meanwhile():
-        once.forget()
-        return Outcome("slow", True, "i")
+        once.answer(RequestId("other", 1), "step", Counter(), "j")
+        return outcome("slow", True, "i")
 
-    once.living.clear()
-    once.answer(NUMBER_1, "step", meanwhile)
-    assert once.answer(NUMBER_1, "step", act) == "slow"
+    once.answer(NUMBER_1, "step", Counter())
+    assert once.answer(RequestId("a", 2), "step", meanwhile) == "slow"
+    assert once.answer(RequestId("a", 2), "step", act) == "slow"
+    assert act.calls == 0
 
 
 def test_what_never_comes_back_is_answered_by_another_thread():
@@ -235,7 +240,7 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     def stuck():
         began.set()
         assert may_end.wait(10)
-        return Outcome("too late")
+        return outcome("too late")
 
     thread = threading.Thread(target=once.answer, args=(RequestId("a", 1), "step", stuck))
     thread.start()
@@ -245,9 +250,11 @@ def test_what_never_comes_back_is_answered_by_another_thread():
         target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
     )
     waiting.start()
-    assert once.abandon(thread.ident, lambda request_id: f"abandoned {request_id.number}") == (
-        "abandoned 1"
-    )
+
+    def refuse(request_id):
+        return Response(504, b"", f"abandoned {request_id.number}")
+
+    assert once.abandon(thread.ident, refuse).content_type == "abandoned 1"
     waiting.join(10)
     assert repetition == ["abandoned 1"]
     assert once.answer(RequestId("a", 2), "step", act) == 1
@@ -258,34 +265,18 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     assert once.abandon(thread.ident, str) is None
 
 
-def test_what_all_keep_together_is_bounded():
-    once = Once(
-        living="ijk",
-        size=lambda content, answer: 0 if answer is None else len(content) + answer,
-        most_bytes=250,
-    )
-    once.answer(RequestId("first", 1), "", lambda: Outcome(80), "i")
+def test_what_all_keep_together_is_bounded_and_nothing_is_done_again():
+    once = Once(living="ijk", most_bytes=320)
+    once.answer(RequestId("first", 1), "", lambda: outcome("first", size=80), "i")
     for instance_id, size in zip("ijk", (90, 70, 150), strict=True):
-        done = Outcome(size, True, instance_id)
-        once.answer(NUMBER_1, "x" * 10, lambda done=done: done, instance_id)
-    once.forget()
+        once.answer(
+            NUMBER_1, "x" * 10, lambda size=size: outcome(size, True, size=size), instance_id
+        )
     act = Counter()
-    # The largest of the last ones had to go as well: it is not done again all the same.
+    # The largest one had to go.
     assert [once.answer(NUMBER_1, "x" * 10, act, one) for one in "ij"] == [90, 70]
-    assert conflict(once, RequestId("first", 1), "", act, "i")
+    assert once.answer(RequestId("first", 1), "", act, "i") == "first"
     assert conflict(once, NUMBER_1, "x" * 10, act, "k")
     assert act.calls == 0
     assert once.answer(RequestId("a", 2), "step", act, "k") == 1
-
-
-def test_what_is_kept_is_looked_through_from_time_to_time_and_when_much_came(monkeypatch):
-    looks = []
-    once = Once(size=lambda content, answer: 100, most_bytes=8 * 250)
-    monkeypatch.setattr(once, "forget", lambda: looks.append(1))
-    for number in range(1, 6):
-        once.answer(RequestId("a", number), "step", Counter())
-        once.forget_in_time()
-    assert len(looks) == 1
-    monkeypatch.setattr("gym_server.api.exactly_once._SEARCH_SECONDS", 0.0)
-    once.forget_in_time()
-    assert len(looks) == 2
+    assert once._bytes == sum(row.size for rows in once._table.values() for row in rows.values())

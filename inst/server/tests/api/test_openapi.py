@@ -6,7 +6,7 @@ import pytest
 
 from gym_server.api.openapi import document
 from gym_server.api.routes import ROUTES
-from gym_server.protocol.answers import JSON
+from gym_server.response import JSON
 
 
 def test_the_document_names_every_route(client):

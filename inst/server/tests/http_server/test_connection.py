@@ -12,6 +12,7 @@ import pytest
 from gym_server.budget import Budget
 from gym_server.http_server import connection as connection_module
 from gym_server.http_server.connection import Connection
+from gym_server.response import Response
 
 GET = b"GET /%s HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 POST = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n"
@@ -19,12 +20,21 @@ LARGE = 2**24
 ROOM = 2**18
 
 
-def app(environ, start_response):
-    """Answer with as many bytes as the path says."""
-    size = int(environ["PATH_INFO"].strip("/") or 0)
-    environ["wsgi.input"].read()
-    start_response("200 OK", [("Content-Length", str(size))])
-    return [bytes(size)]
+class App:
+    """Answers with as many bytes as the path says."""
+
+    def __init__(self, recognizes):
+        self.recognizes = recognizes
+
+    def respond(self, environ):
+        environ["wsgi.input"].read()
+        return Response(200, bytes(int(environ["PATH_INFO"].strip("/") or 0)))
+
+    def admit(self, environ):
+        return None
+
+    def refuse(self, status, reason):
+        return Response(status, reason.encode(), headers=(("Retry-After", "5"),))
 
 
 @pytest.fixture
@@ -40,7 +50,9 @@ def converse(short_timeouts):
     listener = socket.create_server(("127.0.0.1", 0))
     clients, threads = [], []
 
-    def converse(budget=None, most=2**20, seen=lambda connection: None, **how):
+    def converse(
+        budget=None, most=2**20, seen=lambda connection: None, recognizes=lambda environ: True
+    ):
         client = socket.socket()
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         client.settimeout(20)
@@ -48,7 +60,7 @@ def converse(short_timeouts):
         accepted, _ = listener.accept()
         environ = {"wsgi.url_scheme": "http", "SERVER_NAME": "x"}
         bodies = (budget or Budget(ROOM)).share()
-        connection = Connection(accepted, app, environ, most, bodies, **how)
+        connection = Connection(accepted, App(recognizes), environ, most, bodies)
         seen(connection)
         thread = threading.Thread(target=connection.serve)
         thread.start()

@@ -4,8 +4,13 @@ import pytest
 
 from gym_server.budget import Budget
 from gym_server.http_server.request_parser import RequestParser
+from gym_server.response import Response
 
 CHUNKED = b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
+
+
+def refuse(status, reason):
+    return Response(status, reason.encode())
 
 
 @pytest.fixture
@@ -15,7 +20,7 @@ def sent():
 
 @pytest.fixture
 def parser(sent):
-    return RequestParser(2**20, sent.append, lambda request: None, Budget(2**20).share())
+    return RequestParser(2**20, sent.append, lambda request: None, Budget(2**20).share(), refuse)
 
 
 def test_a_body_in_small_chunks_takes_its_own_size(parser):
@@ -38,7 +43,7 @@ def test_a_body_in_one_piece_is_not_copied(parser):
 
 
 def test_requests_without_a_large_body_take_no_memory(sent):
-    parser = RequestParser(2**20, sent.append, lambda request: None, Budget(0).share())
+    parser = RequestParser(2**20, sent.append, lambda request: None, Budget(0).share(), refuse)
     (request,) = parser.feed(CHUNKED + b"ffff\r\n" + bytes(0xFFFF) + b"\r\n0\r\n\r\n")
     assert request.refusal is None
 
@@ -72,7 +77,7 @@ def test_a_head_has_at_most_100_lines(parser):
     (request,) = parser.feed(b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 100 + b"\r\n")
     assert request.refusal is None and len(request.headers) == 100
     (request,) = parser.feed(b"GET / HTTP/1.1\r\n" + b"a:\r\n" * 1000)
-    assert request.refusal[0].startswith("400") and b"more than 100 lines" in request.refusal[2]
+    assert request.refusal.status == 400 and b"more than 100 lines" in request.refusal.body
     assert len(request.headers) == 101
 
 
@@ -81,4 +86,4 @@ def test_a_head_that_comes_in_pieces_is_no_larger_for_that(parser, begun):
     piece = b"y" * 40_000
     assert parser.feed(begun + piece) == []
     (request,) = parser.feed(piece + (b"\r\n\r\n" if b"X" in begun else b" HTTP/1.1\r\n\r\n"))
-    assert request.refusal[0].startswith("400") and b"65536 bytes" in request.refusal[2]
+    assert request.refusal.status == 400 and b"65536 bytes" in request.refusal.body

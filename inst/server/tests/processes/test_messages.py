@@ -16,8 +16,9 @@ from gym_server.processes.messages import (
     value_message,
 )
 from gym_server.processes.pipe import ConnectionPipe, MalformedMessageError, Pipe
-from gym_server.protocol.answers import JSON, Ready
+from gym_server.protocol.answers import Ready
 from gym_server.protocol.safetensors import TENSORS
+from gym_server.response import JSON
 
 
 @pytest.fixture(params=[Pipe, ConnectionPipe])

@@ -1,7 +1,7 @@
 import json
 
 from gym_server.protocol import answers
-from gym_server.protocol.answers import answer, dumps
+from gym_server.protocol.answers import dumps, response_to
 from gym_server.protocol.fields import RequestId
 
 
@@ -39,6 +39,6 @@ def test_half_a_surrogate_pair_travels():
 
 def test_answers_echo_the_request():
     request = RequestId("k", 3)
-    assert json.loads(answer({"a": 1}, request).body)["request"] == {"key": "k", "number": 3}
-    assert answer(None, request).headers == (("Gym-Request", "k 3"),)
-    assert answer({"a": 1}, None).body == b'{"a":1}'
+    assert json.loads(response_to({"a": 1}, request).body)["request"] == {"key": "k", "number": 3}
+    assert response_to(None, request).headers == (("Gym-Request", "k 3"),)
+    assert response_to({"a": 1}, None).body == b'{"a":1}'

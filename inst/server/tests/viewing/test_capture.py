@@ -87,7 +87,7 @@ def test_who_waits_for_others_drawing_hears_of_the_end(app, client, create, occu
     occupied()
     watcher, answers = in_background(app.test_client().get, f"{url}/watch/state/")
     eventually(lambda: waits_for_its_turn(app))
-    app.end_watching()
+    app.begin_stop()
     watcher.join(5)
     assert answers[0].json["code"] == "shutting_down"
 

@@ -305,7 +305,7 @@ def test_at_the_end_all_watchers_are_sent_away(app, client, create):
         number = state(client, url)["number"]
         waiting.append(in_background(app.test_client().get, f"{url}/watch/state/?after={number}"))
     time.sleep(0.2)
-    app.end_watching()
+    app.begin_stop()
     for thread, answers in waiting:
         thread.join(5)
         assert (answers[0].status_code, answers[0].json["code"]) == (503, "shutting_down")

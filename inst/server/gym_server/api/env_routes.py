@@ -1,0 +1,223 @@
+"""The routes of environments: creating, resetting, stepping, drawing and closing them."""
+
+from __future__ import annotations
+
+from gym_server.api import fields, schemas
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, Room
+from gym_server.envs.config import EnvConfig
+from gym_server.protocol.answers import Ready, frame_tensor
+from gym_server.protocol.bodies import loads_tensors
+from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
+from gym_server.rendering.png import png
+from gym_server.response import Response
+
+ROOM = Room("envs")
+
+
+@ROOM.declare(
+    "POST",
+    "/v1/envs/",
+    Field("env_id", fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field(
+        "seed",
+        fields.SEED,
+        "Seeds the action space, and the first reset unless that has a seed; with num_envs also a "
+        "list of one for each sub-environment.",
+    ),
+    Field(
+        "render_mode",
+        TEXT,
+        "rgb_array (the default where it is supported), or human: the same, but while somebody "
+        "watches it moves in real time.",
+    ),
+    Field("kwargs", OBJECT, "Handed to the environment."),
+    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field(
+        "num_envs", fields.POSITIVE, "How many sub-environments; absent for a single environment."
+    ),
+    Field(
+        "vectorization_mode",
+        fields.VECTORIZATION_MODE,
+        "What runs the sub-environments; absent for the fastest that can do what is asked.",
+    ),
+    Field(
+        "num_workers",
+        fields.NUM_WORKERS,
+        "How many processes run the sub-environments; 0 for the server's own, absent to let the "
+        "server choose.",
+    ),
+    Field(
+        "autoreset_mode",
+        fields.AUTORESET_MODE,
+        "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
+        "NextStep.",
+    ),
+    Field("name", fields.NAME, "What its owner calls it; shown wherever it is listed."),
+    answer="instance_id",
+    once=True,
+    grows=True,
+    schema=schemas.json_object({"instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}),
+)
+def env_create(call: Call) -> dict:
+    """Create an environment."""
+    fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
+    return {"instance_id": call.services.instances.create(EnvConfig(**fields))}
+
+
+@ROOM.declare(
+    "GET",
+    "/v1/envs/",
+    answer="all_envs: env_id by instance_id",
+    schema=schemas.json_object(
+        {"all_envs": {"type": "object", "additionalProperties": schemas.TEXT}}
+    ),
+)
+def env_list_all(call: Call) -> dict:
+    """List the environments."""
+    return {"all_envs": call.services.instances.env_ids()}
+
+
+@ROOM.declare(
+    "GET",
+    "/v1/instances/",
+    answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
+    "watched of each, the oldest first",
+    schema=schemas.json_object(
+        {"instances": {"type": "array", "items": schemas.json_object(schemas.LISTED_INSTANCE)}}
+    ),
+)
+def instance_list(call: Call) -> dict:
+    """List the environments, with who uses them how much."""
+    return {"instances": call.services.instances.list()}
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE,
+    answer="all about the environment; needs_reset also after done",
+    schema=schemas.json_object(schemas.ABOUT_INSTANCE),
+)
+def env_about(call: Call) -> dict:
+    """Tell all about an environment."""
+    return call.instance.about()
+
+
+@ROOM.declare(
+    "POST",
+    INSTANCE + "reset/",
+    Field(
+        "seed",
+        fields.RESET_SEED,
+        "Seeds the environment and its action space; with sub-environments also a list of one for "
+        "each. One of these may be a list: the first for now, the others for the episodes that the "
+        "sub-environment begins by itself. After the last one it rests: in a step it returns its "
+        "last observation and the reward 0.",
+    ),
+    Field("options", OBJECT, "The environment's own."),
+    Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
+    fields.INFO,
+    answer="observation, info; with sub-environments one row for each",
+    once=True,
+    tensors=True,
+    schema=schemas.json_object(
+        {"observation": schemas.ANYTHING, "info": {"type": "object"}}, request=schemas.REQUEST
+    ),
+)
+def env_reset(call: Call) -> dict | Ready:
+    """Start an episode."""
+    fields = call.fields
+    if isinstance(fields["seed"], tuple):
+        call.services.instances.account.check()
+    return call.instance.reset(
+        fields["seed"], fields["options"], call.wanted_form, fields["reset_mask"]
+    )
+
+
+@ROOM.declare(
+    "POST",
+    INSTANCE + "step/",
+    Field(
+        "action",
+        ANYTHING,
+        "A member of the action space, a Box's bounds aside; with sub-environments one for each "
+        "that steps.",
+        required=True,
+    ),
+    Field(
+        "render",
+        BOOLEAN,
+        "Whether people want to see it: while somebody watches, the step waits until real time "
+        "has come so far.",
+    ),
+    Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
+    fields.INFO,
+    fields.FINAL_OBS,
+    answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
+    "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
+    "reset at once",
+    once=True,
+    tensors=True,
+    tensor_body=loads_tensors,
+    schema=schemas.json_object(
+        {
+            "observation": schemas.ANYTHING,
+            "reward": schemas.NUMBERS,
+            "done": schemas.FLAGS,
+            "terminated": schemas.FLAGS,
+            "truncated": schemas.FLAGS,
+            "info": {"type": "object"},
+        },
+        request=schemas.REQUEST,
+    ),
+)
+def env_step(call: Call) -> dict | Ready:
+    """Take one step."""
+    fields = call.fields
+    return call.instance.step(
+        fields["action"], call.wanted_form, fields["step_mask"], fields["render"] or False
+    )
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "render/",
+    Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
+    answer="the current frame",
+    grows=True,
+    content_type="image/png",
+    tensors=True,
+)
+def env_render(call: Call) -> Response:
+    """Draw the current state."""
+    frame = call.instance.render(call.fields["sub_env"] or 0)
+    if call.form.tensors:
+        return frame_tensor(frame, call.form)
+    return Response(200, png(frame), "image/png")
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "model/",
+    answer="model: num_states and num_actions, both numbered from 0; start, the probability of "
+    "each state to be the first of an episode; state, action, next_state, probability, reward and "
+    "terminated, each with one element for each transition of a probability above 0, by state and "
+    "action. A limit of time is no part of it",
+    grows=True,
+    schema=schemas.json_object({"model": schemas.TRANSITION_MODEL}),
+)
+def env_model(call: Call) -> dict | Ready:
+    """Tell the transition model of an environment that has a table of it."""
+    return call.instance.transition_model()
+
+
+@ROOM.declare("POST", INSTANCE + "close/", once=True, ends_instance=True)
+def env_close(call: Call) -> None:
+    """Close an environment."""
+    call.services.instances.close(call.path["instance_id"])
+
+
+@ROOM.declare("DELETE", INSTANCE, once=True, ends_instance=True)
+def env_delete(call: Call) -> None:
+    """Close an environment, as its route close/ does."""
+    env_close(call)

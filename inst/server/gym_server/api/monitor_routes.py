@@ -1,0 +1,37 @@
+"""The routes of monitors, which record episodes."""
+
+from __future__ import annotations
+
+from gym_server.api import fields
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, Room
+from gym_server.protocol.fields import BOOLEAN, TEXT, Field
+
+ROOM = Room("monitors")
+
+
+@ROOM.declare(
+    "POST",
+    INSTANCE + "monitor/start/",
+    Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
+    Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
+    Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
+    Field("video_callable", fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    grows=True,
+)
+def env_monitor_start(call: Call) -> None:
+    """Record the episodes that start from now on."""
+    fields = call.fields
+    call.instance.start_monitor(
+        call.services.monitor_root,
+        fields["directory"],
+        bool(fields["force"]),
+        bool(fields["resume"]),
+        fields["video_callable"] or 0,
+    )
+
+
+@ROOM.declare("POST", INSTANCE + "monitor/close/")
+def env_monitor_close(call: Call) -> None:
+    """Finish the monitor's files; without a monitor there is nothing to do."""
+    call.instance.close_monitor()

@@ -1,0 +1,83 @@
+"""The routes of the spaces of actions and of observations."""
+
+from __future__ import annotations
+
+from gym_server.api import schemas
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, Room
+from gym_server.protocol.bodies import parse_path_value
+from gym_server.protocol.fields import ANYTHING, Field
+
+ROOM = Room("spaces")
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "action_space/",
+    answer="info: the space",
+    schema=schemas.SPACE_INFO,
+)
+def env_action_space_info(call: Call) -> dict:
+    """Describe the action space."""
+    return {"info": call.instance.space_info("action_space")}
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "observation_space/",
+    answer="info: the space",
+    schema=schemas.SPACE_INFO,
+)
+def env_observation_space_info(call: Call) -> dict:
+    """Describe the observation space."""
+    return {"info": call.instance.space_info("observation_space")}
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "action_space/sample/",
+    answer="action",
+    schema=schemas.json_object({"action": schemas.ANYTHING}),
+)
+def env_action_space_sample(call: Call) -> dict:
+    """Draw an action."""
+    return {"action": call.instance.sample_action()}
+
+
+@ROOM.declare(
+    "GET",
+    INSTANCE + "action_space/contains/<x>/",
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
+def env_action_space_contains(call: Call) -> dict:
+    """Tell whether a value is an action."""
+    value = parse_path_value(call.path["x"])
+    return {"member": call.instance.contains("action_space", {"value": value})}
+
+
+_VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the description right?")
+
+
+@ROOM.declare(
+    "POST",
+    INSTANCE + "action_space/contains/",
+    _VALUE,
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
+def env_action_space_contains_posted(call: Call) -> dict:
+    """Tell whether a value is an action, or a description the action space's."""
+    return {"member": call.instance.contains("action_space", call.body)}
+
+
+@ROOM.declare(
+    "POST",
+    INSTANCE + "observation_space/contains/",
+    _VALUE,
+    answer="member: true or false",
+    schema=schemas.MEMBER,
+)
+def env_observation_space_contains(call: Call) -> dict:
+    """Tell whether a value is an observation, or a description the observation space's."""
+    return {"member": call.instance.contains("observation_space", call.body)}
