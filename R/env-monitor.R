@@ -6,13 +6,11 @@
 #' or closing the environment, ends the monitor and finishes its files; where there
 #' is no monitor it does nothing.
 #'
-#' @section Files: The first monitor in a directory writes `episodes.csv`, videos with the
-#'   number of their episode, `rl-video-episode-0.mp4`, and `gym-monitor.json`, a list
-#'   of these files. One that starts while another writes there, in this process of the server
-#'   or in another one, has files of its own, named by its `instance_id`:
-#'   `episodes-1a2b3c4d.csv`, `rl-video-1a2b3c4d-episode-0.mp4` and
-#'   `gym-monitor-1a2b3c4d.json`. `list.files(directory, "^episodes.*csv$")` finds all
-#'   tables.
+#' @section Files: A monitor has a directory of its own, with the table, `episodes.csv`, and
+#'   videos with the number of their episode, `rl-video-episode-0.mp4`. When another monitor
+#'   writes in `directory`, of this server or of another one, that is a directory below it with
+#'   the name of the `instance_id`, such as `1a2b3c4d`.
+#'   `list.files(directory, "^episodes[.]csv$", recursive = TRUE)` finds all tables.
 #' @inheritParams env_reset
 #' @param directory Where the server writes, a string: a path below the server's
 #'   directory for monitors (its option `--monitor-dir`), or, for a server on
@@ -24,8 +22,8 @@
 #'   closed, or ended with their server. Files of monitors that still write, and all other
 #'   files, are never touched. Default `FALSE`.
 #' @param resume Whether to go on counting where an earlier monitor stopped: this
-#'   instance's, where it has files of its own, else the first one's. Default `FALSE`: a
-#'   directory with files of monitors that are gone is refused.
+#'   instance's, where it has a directory below, else the first one's. Default `FALSE`: a
+#'   directory with the files of a monitor that is gone is refused.
 #' @param video_callable Which episodes to record as videos: `FALSE`, the
 #'   default, for none, `TRUE` for each, or a whole number n for every n-th,
 #'   beginning with the first. Needs the server's extra `video` (the Python

@@ -275,9 +275,23 @@ class Instance(Watchable):
         with self.lock:
             path, disk_use = root.resolve(directory), root.disk_use
             disk_use.check(path, emptied=force)
-            self._start_monitor(root, directory, force, resume, video_every)
+            self.record(path, directory, force, resume, video_every)
             self._monitored, self._monitor_full = (path, disk_use), None
             self._measure_monitor()
+
+    def record(
+        self, path: Path, directory: str, force: bool, resume: bool, video_every: int
+    ) -> None:
+        """Record the episodes that start from now on; the caller has the lock.
+
+        Args:
+            path: the directory that is allowed; see ``take_directory()``, also for the next three.
+            directory: as the client names it.
+            force: whether to delete what is there.
+            resume: whether to go on counting.
+            video_every: record a video of each episode whose number this divides; 0 for none.
+        """
+        raise NotImplementedError
 
     def close_monitor(self) -> None:
         """Stop recording and finish the files, if it is recorded.
@@ -395,11 +409,6 @@ class Instance(Watchable):
         raise NotImplementedError
 
     def _transition_model(self) -> dict | Ready:
-        raise NotImplementedError
-
-    def _start_monitor(
-        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
-    ) -> None:
         raise NotImplementedError
 
     def _close_monitor(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -20,8 +21,8 @@ from gym_server.errors import GymServerError, reset_needed
 from gym_server.instances.episode_statistics import EpisodeStatistics
 from gym_server.instances.local import LocalInstance
 from gym_server.json_values import plain
-from gym_server.monitoring.monitor import Monitor
-from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.monitoring.monitor import Monitor, require_video
+from gym_server.monitoring.monitor_directory import take_directory
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
@@ -123,25 +124,20 @@ class SingleInstance(LocalInstance):
 
     # Monitors -------------------------------------------------------------------------------
 
-    def _start_monitor(
-        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
+    def record(
+        self, path: Path, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
+        """Record the episodes that start from now on; see ``Instance.record()``."""
         if self._monitor is not None:
             raise GymServerError(
                 "monitor_active",
                 f"Instance {self.instance_id} is already monitored",
                 "close that monitor first",
             )
-        self._monitor = Monitor.start(
-            self.gym_env,
-            root,
-            directory,
-            self.instance_id,
-            force,
-            resume,
-            video_every,
-            lambda: self.draw(0),
-        )
+        if video_every:
+            require_video(self.gym_env)
+        taken = take_directory(path, directory, self.instance_id, force, resume)
+        self._monitor = Monitor(self.gym_env, taken, video_every, lambda: self.draw(0))
 
     def _close_monitor(self) -> None:
         monitor, self._monitor = self._monitor, None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from gym_server.envs.config import EnvConfig
@@ -11,7 +12,6 @@ from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance, Seed
 from gym_server.isolation.worker import WorkerSettings, serve_instance
-from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.processes.messages import Result
 from gym_server.processes.worker_process import WorkerProcess
 from gym_server.protocol.answers import AnswerForm, Ready
@@ -155,12 +155,12 @@ class IsolatedInstance(Instance):
 
     # Monitors -------------------------------------------------------------------------------
 
-    def _start_monitor(
-        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
+    def record(
+        self, path: Path, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        path = root.resolve(directory)
+        """Record the episodes that start from now on; see ``Instance.record()``."""
         how = (directory, force, resume, video_every)
-        self._ask("start_monitor", self.instance_id, path, *how)
+        self._ask("record", self.instance_id, path, *how)
 
     def _close_monitor(self) -> None:
         self._ask("close_monitor")

@@ -28,9 +28,6 @@ from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError, answer_to
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance, Seed
-from gym_server.monitoring.disk_use import DiskUse
-from gym_server.monitoring.monitor_directory import claim
-from gym_server.monitoring.monitor_files import MonitorFiles
 from gym_server.processes import messages, start
 from gym_server.processes.messages import read_call, refusal_message, value_message
 from gym_server.processes.pipe import Pipe
@@ -193,10 +190,10 @@ class _Methods:
     def transition_model(self) -> Ready:
         return _ready(self._instance.transition_model())
 
-    def start_monitor(self, instance_id: str, path: Path, *args: Any) -> None:
+    def record(self, instance_id: str, path: Path, *args: Any) -> None:
         self._instance.instance_id = instance_id
-        root: Any = _Resolved(path)
-        self._instance.start_monitor(root, *args)
+        with self._instance.lock:
+            self._instance.record(path, *args)
 
     def close_monitor(self) -> None:
         self._instance.close_monitor()
@@ -226,18 +223,3 @@ def _end(why: GymServerError) -> None:
 def _ready(result: dict | Ready, steps: int = 0) -> Ready:
     response = response_to(result, None)
     return Ready(response.body, response.content_type, steps)
-
-
-class _Resolved:
-    """Stands for the server's ``MonitorRoot``, which has allowed the directory already."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        # The server looks after that.
-        self.disk_use = DiskUse(math.inf)
-
-    def resolve(self, directory: str) -> Path:
-        return self._path
-
-    def claim(self, directory: str, *how: Any) -> MonitorFiles:
-        return claim(self._path, directory, *how)

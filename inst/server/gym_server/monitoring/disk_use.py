@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import threading
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from gym_server.errors import GymServerError
 # Every file takes whole blocks.
 _BLOCK_BYTES = 4096
 
-_WRITTEN_BY_MONITORS = ("episodes", "gym-monitor", "rl-video")
+_WRITTEN_BY_MONITORS = ("episodes", "rl-video")
+
+_INSTANCE_ID = re.compile("[0-9a-f]{8}")
 
 
 class DiskUse:
@@ -57,12 +60,19 @@ class DiskUse:
             )
 
 
+def own_directories(path: Path) -> list[Path]:
+    """Return the directories below one of those monitors that found another one writing there."""
+    return [path / name for name in os.listdir(path) if _INSTANCE_ID.fullmatch(name)]
+
+
 def _size(path: Path) -> int:
-    blocks = 1
-    # Somebody may just have removed the directory, or one of its files.
+    blocks = 0
+    # Somebody may just have removed a directory, or one of its files.
     with contextlib.suppress(OSError):
-        for name in os.listdir(path):
-            if name.startswith(_WRITTEN_BY_MONITORS):
-                with contextlib.suppress(OSError):
-                    blocks += -(-os.lstat(path / name).st_size // _BLOCK_BYTES)
+        for directory in (path, *own_directories(path)):
+            blocks += 1
+            with contextlib.suppress(OSError):
+                for name in os.listdir(directory):
+                    if name.startswith(_WRITTEN_BY_MONITORS):
+                        blocks += -(-os.lstat(directory / name).st_size // _BLOCK_BYTES)
     return blocks * _BLOCK_BYTES

@@ -11,13 +11,10 @@ import gymnasium
 
 from gym_server.envs.outcomes import reward_number
 from gym_server.errors import GymServerError
-from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.monitoring.monitor_files import MonitorFiles, refuse
+from gym_server.monitoring.monitor_directory import TABLE, MonitorDirectory
 from gym_server.monitoring.video import Video
 
 log = logging.getLogger(__name__)
-
-COLUMNS = ("episode", "return", "length", "seconds")
 
 
 class Monitor:
@@ -34,14 +31,22 @@ class Monitor:
     def __init__(
         self,
         env: gymnasium.Env,
-        files: MonitorFiles,
+        directory: MonitorDirectory,
         video_every: int,
         draw: Callable[[], object],
     ) -> None:
-        """Take over files after their ``take()``; see ``start()``."""
+        """Start to record the episodes that begin from now on.
+
+        Args:
+            env: the environment; it is recorded, never closed.
+            directory: what ``take_directory()`` returned.
+            video_every: record a video of each episode whose number this divides; 0 for none. See
+                ``require_video()``.
+            draw: draws the environment.
+        """
         self._env = env
-        self._files = files
-        self._rows = csv.writer(files.table, lineterminator="\n")
+        self._directory = directory
+        self._rows = csv.writer(directory.table, lineterminator="\n")
         self._video_every = video_every
         self._draw = draw
         self._video: Video | None = None
@@ -49,55 +54,15 @@ class Monitor:
         self._episodes = 0
         self._failure: Exception | None = None
 
-    @classmethod
-    def start(
-        cls,
-        env: gymnasium.Env,
-        root: MonitorRoot,
-        directory: str,
-        instance_id: str,
-        force: bool,
-        resume: bool,
-        video_every: int,
-        draw: Callable[[], object],
-    ) -> Monitor:
-        """Start to record the episodes that begin from now on.
-
-        Args:
-            env: the environment; it is recorded, never closed.
-            root: where monitors may write.
-            directory: where this one writes, created when it is missing.
-            instance_id: the environment's; see ``MonitorRoot.claim()``, also for the next two.
-            force: first delete what monitors left there that are gone.
-            resume: go on counting where the earlier monitor ended.
-            video_every: record a video of each episode whose number this divides; 0 for none.
-            draw: draws the environment.
-
-        Raises:
-            GymServerError: ``video_unavailable`` or ``monitor_directory``; nothing is changed.
-        """
-        if video_every:
-            _require_video(env)
-        files = root.claim(directory, instance_id, force, resume)
-        try:
-            files.begin(COLUMNS)
-        except OSError as error:
-            files.leave()
-            raise refuse(directory, error.strerror or str(error)) from error
-        except BaseException:
-            files.leave()
-            raise
-        return cls(env, files, video_every, draw)
-
     def reset(self, *, seed: int | None, options: dict | None) -> tuple:
         """Reset the environment and start to record an episode."""
         self._finish_video()
         self._episode = None
-        number = self._files.next_episode
+        number = self._directory.next_episode
         result = self._env.reset(seed=seed, options=options)
         if self._video_every and number % self._video_every == 0:
             self._record(self._start_video, number)
-        self._files.next_episode = number + 1
+        self._directory.next_episode = number + 1
         self._episode = number
         self._return = 0.0
         self._length = 0
@@ -125,13 +90,13 @@ class Monitor:
         """
         self._finish_video()
         try:
-            self._files.release()
+            self._directory.release()
         except OSError as error:
             self._remember(error)
         if self._failure is not None:
             raise GymServerError(
                 "monitor_directory",
-                f"What was recorded in {self._files.path} is incomplete: {self._failure}",
+                f"What was recorded in {self._directory.path} is incomplete: {self._failure}",
             ) from self._failure
 
     @property
@@ -143,8 +108,8 @@ class Monitor:
     def about(self) -> dict:
         """Return where the monitor writes, and how many episodes it has written."""
         return {
-            "directory": str(self._files.path),
-            "table": self._files.table_name,
+            "directory": str(self._directory.path),
+            "table": TABLE,
             "episodes": self._episodes,
         }
 
@@ -155,17 +120,16 @@ class Monitor:
         try:
             self._rows.writerow(row)
             # So that the file has every episode that is done, for readers and after a crash.
-            self._files.table.flush()
+            self._directory.table.flush()
             self._episodes += 1
         except OSError as error:
             self._remember(error)
         self._finish_video()
 
     def _start_video(self, number: int, frame: object) -> None:
-        name = self._files.video_name(number)
-        self._files.add(name)
-        fps = self._env.metadata.get("render_fps", 30)
-        self._video = Video(self._files.path / name, fps, frame)
+        self._directory.check()
+        path = self._directory.path / f"rl-video-episode-{number}.mp4"
+        self._video = Video(path, self._env.metadata.get("render_fps", 30), frame)
         self._video.add(frame)
 
     def _record(self, add: Callable[..., None], *args: object) -> None:
@@ -188,10 +152,11 @@ class Monitor:
     def _remember(self, error: Exception) -> None:
         # The step or reset that ends an episode was taken and must be answered; close() raises.
         self._failure = self._failure or error
-        log.error("A monitor in %s lost something", self._files.path, exc_info=error)
+        log.error("A monitor in %s lost something", self._directory.path, exc_info=error)
 
 
-def _require_video(env: gymnasium.Env) -> None:
+def require_video(env: gymnasium.Env) -> None:
+    """Raise ``video_unavailable`` where no videos of an environment can be made."""
     if env.render_mode != "rgb_array":
         raise GymServerError(
             "video_unavailable",

@@ -1,17 +1,30 @@
-"""Directories that monitors write: which are allowed, and which files a monitor gets there."""
+"""Directories that monitors write: which are allowed, and what a monitor finds and writes there."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 import os
+import re
+import stat
 import tempfile
 import threading
-from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import TextIO
 
-from gym_server.monitoring.disk_use import DiskUse
-from gym_server.monitoring.monitor_files import MonitorFiles, files_in, refuse
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+from gym_server.monitoring.disk_use import DiskUse, own_directories
+from gym_server.monitoring.file_lock import try_lock
+
+TABLE = "episodes.csv"
+_HEADER = "episode,return,length,seconds\n"
+
+# As Gymnasium's RecordVideo has it.
+_VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
+
+# A greater number was not counted by a monitor, and names of files could become too long.
+_MOST_EPISODES = 10**15
 
 
 class MonitorRoot:
@@ -43,40 +56,25 @@ class MonitorRoot:
                 self._allowed.append(Path("/tmp"))
         self._lock = threading.Lock()
 
-    def claim(self, directory: str, instance_id: str, force: bool, resume: bool) -> MonitorFiles:
-        """Give one monitor files of its own in a directory.
-
-        Args:
-            directory: as the client names it.
-            instance_id: the recorded instance's, for the names of its files while another
-                monitor has the plain ones.
-            force: delete what monitors left there that are gone.
-            resume: keep it, and go on counting; ``force`` goes first.
-
-        Raises:
-            GymServerError: ``monitor_directory``.
-        """
-        return claim(self.resolve(directory), directory, instance_id, force, resume)
-
     def resolve(self, directory: str) -> Path:
-        """Return where a directory is, for ``claim()``.
+        """Return where a directory is that a client names, for ``take_directory()``.
 
         Raises:
             GymServerError: ``monitor_directory`` for one that monitors may not write.
         """
         if "\0" in directory:
-            raise refuse(directory, "it contains a NUL")
+            raise _refuse(directory, "it contains a NUL")
         if ".." in PurePosixPath(directory).parts or ".." in PureWindowsPath(directory).parts:
-            raise refuse(directory, "it climbs")
+            raise _refuse(directory, "it climbs")
         try:
             # Links are followed before the comparison, so that none leads out.
             own = self._find_root()
             path = Path(own, directory).resolve()
             allowed = [root.resolve() for root in (own, *self._allowed)]
         except (OSError, RuntimeError, ValueError) as error:
-            raise refuse(directory, str(error)) from error
+            raise _refuse(directory, str(error)) from error
         if not any(root in path.parents for root in allowed):
-            raise refuse(directory, "it is outside the directory that this server may write")
+            raise _refuse(directory, "it is outside the directory that this server may write")
         return path
 
     def close(self) -> None:
@@ -92,68 +90,214 @@ class MonitorRoot:
             return self._root
 
 
-def claim(path: Path, directory: str, instance_id: str, force: bool, resume: bool) -> MonitorFiles:
-    """Give one monitor files of its own in a resolved directory; see ``MonitorRoot.claim()``."""
+class MonitorDirectory:
+    """The directory of one monitor, with its table and its videos.
+
+    A monitor that writes has the table locked. The system releases the lock when the process ends,
+    so a directory whose table can be locked is that of a monitor that is gone.
+
+    Attributes:
+        path: the directory.
+        next_episode: the number of the episode that begins next.
+        table: the table, open for appending, while the directory is taken.
+    """
+
+    table: TextIO
+
+    def __init__(self, path: Path) -> None:
+        """Name the directory; ``take()`` takes it."""
+        self.path = path
+        self.next_episode = 0
+        self._is_new = False
+
+    def take(self) -> bool:
+        """Take the directory, unless a monitor writes there.
+
+        Raises:
+            OSError: the table cannot be opened or locked.
+        """
+        path = self.path / TABLE
+        while True:
+            self._is_new = not path.exists()
+            with contextlib.ExitStack() as undo:
+                table = undo.enter_context(
+                    open(path, "a+", encoding="ascii", errors="replace", newline="", opener=_opener)
+                )
+                if not try_lock(table):
+                    return False
+                # Else the monitor that had it has deleted it after it was opened here.
+                if _is_at(table, path):
+                    undo.pop_all()
+                    self.table = table
+                    return True
+
+    def leave(self) -> None:
+        """Give the directory back as it was."""
+        # While it is locked, so that no other monitor has it; Windows deletes no open file.
+        if os.name == "nt":
+            self.table.close()
+        if self._is_new:
+            (self.path / TABLE).unlink(missing_ok=True)
+        self.table.close()
+
+    def release(self) -> None:
+        """Finish the table.
+
+        Raises:
+            OSError: it is not there any more, or cannot be written.
+        """
+        with self.table:
+            self.check()
+
+    def check(self) -> None:
+        """Raise FileNotFoundError where the table was taken away: others may write there by now."""
+        if not _is_at(self.table, self.path / TABLE):
+            raise FileNotFoundError(f"{TABLE} was taken away")
+
+    def prepare(self, force: bool, resume: bool) -> None:
+        """Keep what an earlier monitor left, delete it or refuse; then begin the table.
+
+        Raises:
+            OSError: something cannot be read, written or deleted.
+            GymServerError: ``monitor_directory``.
+        """
+        videos = self.videos()
+        if force:
+            for name in videos:
+                (self.path / name).unlink()
+            self.table.truncate(0)
+        elif self._size and not resume:
+            raise _refuse(
+                self.path,
+                "it holds the files of an earlier monitor",
+                "take force = true to delete them, or resume = true to go on counting",
+            )
+        elif self._size:
+            numbers = [int(number) for number in videos.values()] + self._episodes()
+            self.next_episode = max((number + 1 for number in numbers), default=0)
+        if not self._size:
+            self.table.write(_HEADER)
+            self.table.flush()
+
+    def empty(self) -> None:
+        """Delete what a monitor left that is gone, and the directory unless it holds more."""
+        for name in self.videos():
+            (self.path / name).unlink()
+        self._is_new = True
+        self.leave()
+        with contextlib.suppress(OSError):
+            self.path.rmdir()
+
+    def videos(self) -> dict[str, str]:
+        """Return the names of earlier videos, each with the number of its episode.
+
+        Raises:
+            GymServerError: ``monitor_directory`` where files of such names are not a monitor's.
+        """
+        found = {
+            match[0]: match[1] for match in map(_VIDEO.fullmatch, os.listdir(self.path)) if match
+        }
+        self.table.seek(0)
+        is_ours = self._size > 0 and self.table.readline() == _HEADER
+        foreign = [TABLE] * (self._size > 0) + sorted(found)
+        if foreign and not is_ours:
+            raise _refuse(
+                self.path,
+                f"it holds {foreign[0]}, which no monitor of this server wrote",
+                "move that file away, or take another directory",
+            )
+        for name in (TABLE, *found):
+            if not stat.S_ISREG((self.path / name).lstat().st_mode):
+                raise _refuse(self.path, f"{name} is no ordinary file")
+        return found
+
+    @property
+    def _size(self) -> int:
+        return os.fstat(self.table.fileno()).st_size
+
+    def _episodes(self) -> list[int]:
+        """Return the numbers in the table, whose header was read."""
+        try:
+            numbers = [int(line.split(",")[0]) for line in self.table.read().splitlines() if line]
+            if not all(0 <= number <= _MOST_EPISODES for number in numbers):
+                raise ValueError("it holds what is no episode's number")
+        except ValueError as error:
+            raise _refuse(
+                self.path,
+                f"{TABLE} is damaged: {error}",
+                "mend that file, or move it away, or take another directory",
+            ) from error
+        return numbers
+
+
+def take_directory(
+    path: Path, directory: str, instance_id: str, force: bool, resume: bool
+) -> MonitorDirectory:
+    """Give a monitor a directory of its own.
+
+    Args:
+        path: what ``MonitorRoot.resolve()`` returned.
+        directory: as the client names it.
+        instance_id: the recorded instance's: while another monitor writes in the directory, this
+            one has a directory of this name below it.
+        force: delete what monitors left there that are gone.
+        resume: keep it, and go on counting; ``force`` goes first.
+
+    Raises:
+        GymServerError: ``monitor_directory``.
+    """
     try:
         path.mkdir(parents=True, exist_ok=True)
         if path.resolve() != path:
-            raise refuse(directory, "it leads elsewhere")
-        files = _take(path, instance_id, resume and not force)
+            raise _refuse(directory, "it leads elsewhere")
+        taken = _take(path, path / instance_id, resume and not force)
         try:
-            _prepare(files, force, resume)
+            taken.prepare(force, resume)
+            if force and taken.path == path:
+                _empty_those_of_gone_monitors(path)
         except BaseException:
-            files.leave()
+            taken.leave()
             raise
     except OSError as error:
-        raise refuse(directory, error.strerror or str(error)) from error
-    return files
+        raise _refuse(directory, error.strerror or str(error)) from error
+    return taken
 
 
-def _take(path: Path, instance_id: str, resume: bool) -> MonitorFiles:
-    plain, own = MonitorFiles(path), MonitorFiles(path, instance_id)
-    # An instance goes on with what it began under its own name.
-    for files in (own, plain) if resume and own.were_written else (plain, own):
-        if files.take():
-            return files
-    raise refuse(path, "another monitor writes there")
+def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
+    # An instance goes on with what it began in a directory of its own.
+    for one in (own, path) if resume and own.exists() else (path, own):
+        one.mkdir(exist_ok=True)
+        taken = MonitorDirectory(one)
+        if taken.take():
+            return taken
+    raise _refuse(path, "another monitor writes there")
 
 
-def _prepare(files: MonitorFiles, force: bool, resume: bool) -> None:
-    """Keep what earlier monitors left, delete it or refuse."""
-    files.read_manifest()
-    files.check()
-    others = [other for other in files_in(files.path) if other.table_name != files.table_name]
-    if force:
-        for other in others:
-            _delete_if_gone(other)
-        files.empty()
-    elif not resume and (files.left_behind() or any(map(_is_left_behind, others))):
-        raise refuse(
-            files.path,
-            "it holds the files of an earlier monitor",
-            "take force = true to delete them, or resume = true to go on counting",
-        )
+def _empty_those_of_gone_monitors(path: Path) -> None:
+    for one in own_directories(path):
+        other = MonitorDirectory(one)
+        if other.take():
+            other.empty()
 
 
-def _delete_if_gone(files: MonitorFiles) -> None:
-    with _taken_if_gone(files) as is_gone:
-        if is_gone:
-            files.delete()
+def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServerError:
+    """A directory cannot be used by a monitor."""
+    return GymServerError(
+        "monitor_directory",
+        f"The directory {brief(str(directory))} cannot be used: {reason}",
+        hint or "name a directory relative to the server's --monitor-dir, such as 'cartpole-1'",
+    )
 
 
-def _is_left_behind(files: MonitorFiles) -> bool:
-    with _taken_if_gone(files) as is_gone:
-        return is_gone and bool(files.left_behind())
+def _opener(path: str, flags: int) -> int:
+    # Follow no link, and do not wait for a reader of a pipe of that name.
+    careful = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    return os.open(path, flags | careful, 0o666)
 
 
-@contextlib.contextmanager
-def _taken_if_gone(files: MonitorFiles) -> Iterator[bool]:
-    """Take the files of another monitor for a moment; yield whether it is gone."""
-    is_gone = files.take()
+def _is_at(file: TextIO, path: Path) -> bool:
+    """Tell whether an open file is the one at a path."""
     try:
-        if is_gone:
-            files.read_manifest()
-        yield is_gone
-    finally:
-        if is_gone:
-            files.leave()
+        return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
+    except FileNotFoundError:
+        return False

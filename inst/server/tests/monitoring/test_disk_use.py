@@ -67,7 +67,7 @@ def test_a_full_monitor_stops_recording_and_says_so(limited, monitor_dir, isolat
 
 
 def test_closing_an_environment_says_it_too(limited):
-    client = limited(12 * KIB)
+    client = limited(8 * KIB)
     url = created(client)
     start(client, url, "run")
     play(client, url)
@@ -77,10 +77,10 @@ def test_closing_an_environment_says_it_too(limited):
 
 
 def test_the_limit_is_that_of_all_monitors_and_of_what_they_leave(limited, monitor_dir):
-    client = limited(30 * KIB)
+    client = limited(20 * KIB)
     for directory in ("a", "b", "c"):
         url = created(client)
-        # The directory, the table and the list.
+        # The directory and the table.
         assert start(client, url, directory).status_code == 204
         client.post(f"{url}/close/")
     url = created(client)

@@ -1,4 +1,3 @@
-import json
 import os
 import tempfile
 from pathlib import Path
@@ -6,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.monitoring.monitor_directory import MonitorRoot, take_directory
 
 
 @pytest.fixture
@@ -15,51 +14,51 @@ def root(monitor_dir):
 
 
 @pytest.fixture(autouse=True)
-def claimed():
-    """Give back at the end whatever a test has claimed."""
-    CLAIMED.clear()
+def taken():
+    """Give back at the end whatever a test has taken."""
+    TAKEN.clear()
     yield
-    for files in CLAIMED:
-        files.table.close()
+    for directory in TAKEN:
+        directory.table.close()
 
 
-CLAIMED = []
+TAKEN = []
 
 
-def claim(root, directory, force=False, resume=False, instance_id="0123abcd"):
-    files = root.claim(str(directory), instance_id, force, resume)
-    CLAIMED.append(files)
-    files.begin(["episode"])
-    return files
+def take(root, directory, force=False, resume=False, instance_id="0123abcd"):
+    name = str(directory)
+    TAKEN.append(take_directory(root.resolve(name), name, instance_id, force, resume))
+    return TAKEN[-1]
 
 
 def refused(root, directory, **options):
     with pytest.raises(GymServerError) as caught:
-        claim(root, directory, **options)
+        take(root, directory, **options)
     assert caught.value.code == "monitor_directory"
     assert caught.value.hint
     return caught.value.message
 
 
 def fill(root, directory="run", episodes=(0,), videos=()):
-    claimed = claim(root, directory, resume=True)
+    taken = take(root, directory, resume=True)
     for number in episodes:
-        claimed.table.write(f"{number}\n")
-        claimed.next_episode = number + 1
-    for name in videos:
-        claimed.add(name)
-        (claimed.path / name).write_text("video")
-    claimed.release()
-    return claimed.path
+        taken.table.write(f"{number},1.0,1,0.1\n")
+    for number in videos:
+        (taken.path / f"rl-video-episode-{number}.mp4").write_text("video")
+    taken.release()
+    return taken.path
+
+
+HEADER = "episode,return,length,seconds\n"
 
 
 def test_a_relative_directory_lies_below_the_root(root, monitor_dir):
-    assert claim(root, "a/b").path == monitor_dir / "a" / "b"
+    assert take(root, "a/b").path == monitor_dir / "a" / "b"
     assert (monitor_dir / "a" / "b").is_dir()
 
 
 def test_an_absolute_directory_may_lie_below_the_root(root, monitor_dir):
-    assert claim(root, monitor_dir / "run").path == monitor_dir / "run"
+    assert take(root, monitor_dir / "run").path == monitor_dir / "run"
 
 
 @pytest.mark.parametrize(
@@ -80,14 +79,14 @@ def test_the_temporary_directory_is_only_allowed_where_it_is_said(monitor_dir, r
     with tempfile.TemporaryDirectory() as directory:
         refused(root, Path(directory, "run"))
         trusting = MonitorRoot(monitor_dir, allow_temporary=True)
-        assert claim(trusting, Path(directory, "run")).path.is_dir()
+        assert take(trusting, Path(directory, "run")).path.is_dir()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the classic examples' path")
 def test_the_classic_examples_directory_is_accepted(monitor_dir):
     trusting = MonitorRoot(monitor_dir, allow_temporary=True)
     with tempfile.TemporaryDirectory(dir="/tmp") as directory:
-        assert claim(trusting, f"{directory}/random-agent-results").path.is_dir()
+        assert take(trusting, f"{directory}/random-agent-results").path.is_dir()
     refused(trusting, "/tmp")
     refused(trusting, "/tmp/../etc/gym")
 
@@ -102,9 +101,9 @@ def test_a_link_that_leads_out_is_refused(root, monitor_dir, tmp_path):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links")
-@pytest.mark.parametrize("name", ["episodes.csv", "gym-monitor.json"])
+@pytest.mark.parametrize("name", ["episodes.csv", "rl-video-episode-0.mp4"])
 def test_a_file_that_became_a_link_is_not_followed(root, tmp_path, name):
-    path = fill(root)
+    path = fill(root, videos=[0])
     (tmp_path / "precious").write_text("precious")
     (path / name).unlink()
     (path / name).symlink_to(tmp_path / "precious")
@@ -129,37 +128,34 @@ def test_a_file_in_the_way_is_refused(root, monitor_dir):
 def test_the_files_of_an_earlier_monitor_are_kept_unless_the_client_decides(root):
     path = fill(root)
     assert "earlier monitor" in refused(root, "run")
-    assert (path / "episodes.csv").read_text() == "episode\n0\n"
+    assert (path / "episodes.csv").read_text() == HEADER + "0,1.0,1,0.1\n"
 
 
 def test_resume_goes_on_counting(root):
     fill(root, episodes=[0, 1, 3])
-    claimed = claim(root, "run", resume=True)
-    assert claimed.next_episode == 4
-    claimed.release()
-    assert claim(root, "run", resume=True).next_episode == 4
+    taken = take(root, "run", resume=True)
+    assert taken.next_episode == 4
+    taken.release()
+    assert take(root, "run", resume=True).next_episode == 4
 
 
-def test_resume_goes_on_counting_after_a_server_was_killed(root):
-    path = fill(root, episodes=[0])
-    with open(path / "episodes.csv", "a") as table:
-        table.write("1\n2\n")
-    assert claim(root, "run", resume=True).next_episode == 3
+def test_resume_counts_an_episode_of_which_there_is_a_video_only(root):
+    fill(root, episodes=[0], videos=[0, 2])
+    assert take(root, "run", resume=True).next_episode == 3
 
 
 def test_resuming_nothing_begins_at_0(root):
-    assert claim(root, "run", resume=True).next_episode == 0
+    assert take(root, "run", resume=True).next_episode == 0
 
 
 def test_force_deletes_what_monitors_wrote_and_nothing_else(root):
-    path = fill(root, videos=["rl-video-episode-0.mp4"])
+    path = fill(root, videos=[0])
     for name in ("notes.txt", "my-episodes.csv", "holiday.mp4"):
         (path / name).write_text("mine")
-    claimed = claim(root, "run", force=True)
-    assert claimed.next_episode == 0
+    taken = take(root, "run", force=True)
+    assert taken.next_episode == 0
     assert sorted(os.listdir(path)) == [
         "episodes.csv",
-        "gym-monitor.json",
         "holiday.mp4",
         "my-episodes.csv",
         "notes.txt",
@@ -176,68 +172,19 @@ def test_a_file_of_that_name_from_elsewhere_is_never_touched(root, monitor_dir, 
     assert os.listdir(monitor_dir / "run") == [name]
 
 
-def test_a_forged_list_deletes_nothing(root, monitor_dir):
-    path = fill(root)
-    (monitor_dir / "precious.csv").write_text("precious")
-    (path / "notes.txt").write_text("mine")
-    manifest = json.loads((path / "gym-monitor.json").read_text())
-    manifest["files"] += ["../precious.csv", "notes.txt", str(monitor_dir / "precious.csv")]
-    (path / "gym-monitor.json").write_text(json.dumps(manifest))
-    claim(root, "run", force=True)
-    assert (monitor_dir / "precious.csv").exists()
-    assert (path / "notes.txt").exists()
+def test_a_table_that_only_looks_like_one_protects_what_lies_beside_it(root, monitor_dir):
+    (monitor_dir / "run").mkdir()
+    (monitor_dir / "run" / "episodes.csv").write_text("episode,return\n0,1\n")
+    (monitor_dir / "run" / "rl-video-episode-0.mp4").write_text("mine")
+    assert "episodes.csv" in refused(root, "run", force=True)
+    assert (monitor_dir / "run" / "rl-video-episode-0.mp4").read_text() == "mine"
 
 
 @pytest.mark.parametrize("row", ["\u00e9pisode", "one,2", "-5", "9" * 30, "9" * 5000, "\0"])
 def test_a_damaged_table_is_refused(root, row):
     path = fill(root)
-    (path / "episodes.csv").write_text(f"episode\n{row}\n", encoding="utf-8")
+    (path / "episodes.csv").write_text(f"{HEADER}{row}\n", encoding="utf-8")
     assert "episodes.csv is damaged" in refused(root, "run", resume=True)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="links")
-def test_writing_the_list_follows_no_link(root, monitor_dir, tmp_path):
-    (monitor_dir / "run").mkdir()
-    (tmp_path / "precious").write_text("precious")
-    (monitor_dir / "run" / "gym-monitor.json.new").symlink_to(tmp_path / "precious")
-    claim(root, "run")
-    assert (tmp_path / "precious").read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "[]",
-        "{}",
-        '{"files": 1}',
-        "[" * 100_000,
-        *(
-            f'{{"files": ["episodes.csv"], "next_episode": {number}}}'
-            for number in ("Infinity", "NaN", "1e999", "-1", "1" + "0" * 100, "null", '"x"')
-        ),
-    ],
-    ids=lambda text: text[-20:],
-)
-@pytest.mark.parametrize("options", [{"resume": True}, {"force": True}], ids=str)
-def test_a_list_that_cannot_be_read_is_refused(root, text, options):
-    path = fill(root)
-    (path / "gym-monitor.json").write_text(text)
-    assert "gym-monitor.json is damaged" in refused(root, "run", **options)
-    assert (path / "episodes.csv").exists()
-
-
-def test_a_directory_in_place_of_the_list_is_refused(root):
-    path = fill(root)
-    (path / "gym-monitor.json").unlink()
-    (path / "gym-monitor.json").mkdir()
-    assert "gym-monitor.json is damaged" in refused(root, "run", resume=True)
-
-
-def test_the_damaged_list_of_another_monitor_is_named(root):
-    path = fill(root)
-    (path / "gym-monitor-89abcdef.json").write_text("[" * 100_000)
-    assert "gym-monitor-89abcdef.json is damaged" in refused(root, "run", force=True)
 
 
 def test_a_directory_that_was_refused_is_free_again(root, monitor_dir):
@@ -245,4 +192,4 @@ def test_a_directory_that_was_refused_is_free_again(root, monitor_dir):
     (monitor_dir / "run" / "episodes.csv").write_text("mine")
     refused(root, "run")
     (monitor_dir / "run" / "episodes.csv").unlink()
-    claim(root, "run")
+    take(root, "run")
