@@ -150,7 +150,7 @@ def reset_those_that_ended(client, url, env, ended):
 
 
 def action_file(env, batch, **metadata):
-    parts = spaces.batch_tensor_writer(env.single_action_space, "action")(batch)
+    parts = spaces.tensor_writer(env.single_action_space, "action", is_batch=True)(batch)
     if parts.texts:
         metadata["texts"] = parts.texts
     metadata = {name: json.dumps(value) for name, value in metadata.items()}

@@ -20,16 +20,15 @@ class ActionReader:
     member of the space is checked.
     """
 
-    def __init__(self, space: Space, num_envs: int) -> None:
+    def __init__(self, space: Space, num_envs: int | None) -> None:
         """Name the space.
 
         Args:
             space: of one action.
-            num_envs: how many sub-environments there are.
+            num_envs: how many sub-environments there are; None for a single environment.
         """
         self._space = space
-        self._num_envs = num_envs
-        self._all = f"the {num_envs} sub-environments"
+        self._all = spaces.Rows(num_envs, f"the {num_envs} sub-environments")
         self._taken = _Reader(spaces.with_wide_boxes(space))
 
     def read(self, action: object, rows: int | None = None) -> object:
@@ -37,13 +36,13 @@ class ActionReader:
 
         Args:
             action: a JSON value or ``Parts``.
-            rows: how many sub-environments step; None for a single environment.
+            rows: how many sub-environments step; None for all, or a single environment.
 
         Raises:
             GymServerError: ``action_not_in_space``.
         """
         try:
-            return self._decode(self._taken, action, rows)
+            return self._taken.read(action, self._rows(rows))
         except spaces.NotInSpace as refusal:
             raise GymServerError(
                 "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)
@@ -54,30 +53,30 @@ class ActionReader:
         if failure.code != "environment_error":
             return
         try:
-            self._decode(_Reader(self._space), action, rows)
+            _Reader(self._space).read(action, self._rows(rows))
         except spaces.NotInSpace:
             failure.hint = _CLIP
 
-    def _decode(self, reader: _Reader, action: object, rows: int | None) -> object:
-        if rows is None:
-            if isinstance(action, spaces.Parts):
-                return reader.of_tensors(action)
-            return reader.of_json(action)
-        is_all = rows == self._num_envs
-        whose = self._all if is_all else f"the {rows} sub-environments that step"
-        if isinstance(action, spaces.Parts):
-            return reader.of_batch_tensors(action, rows, whose)
-        return spaces.decode_sub_envs(reader.space, action, rows, whose)
+    def _rows(self, rows: int | None) -> spaces.Rows:
+        if rows is None or rows == self._all.number:
+            return self._all
+        return spaces.Rows(rows, f"the {rows} sub-environments that step")
 
 
 class _Reader:
     """What reads the actions of a space, made once for it."""
 
     def __init__(self, space: Space) -> None:
-        self.space = space
-        self.of_json = spaces.json_reader(space)
-        self.of_tensors = spaces.tensor_reader(space, "action")
-        self.of_batch_tensors = spaces.sub_envs_tensor_reader(space, "action")
+        self._space = space
+        self._of_json = spaces.json_reader(space)
+        self._of_tensors = spaces.tensor_reader(space, "action")
+
+    def read(self, action: object, rows: spaces.Rows) -> object:
+        if isinstance(action, spaces.Parts):
+            return self._of_tensors(action, rows)
+        if rows.number is None:
+            return self._of_json(action)
+        return spaces.decode_sub_envs(self._space, action, rows)
 
 
 def _possible_actions(space: Space) -> str | None:

@@ -74,7 +74,7 @@ class LocalInstance(Instance):
             "action_space": spaces.describe(self.single_action_space),
             "observation_space": spaces.describe(self.single_observation_space),
         }
-        self._actions = ActionReader(self.single_action_space, config.num_envs or 1)
+        self._actions = ActionReader(self.single_action_space, config.num_envs)
         self._render_fps: object = (env.metadata or {}).get("render_fps")
         self.viewer.fps = usable_fps(self._render_fps)
         self._seed_for_reset: Seed = config.seed
@@ -131,9 +131,24 @@ class LocalInstance(Instance):
             return self.renderer.run(reset_or_step, *args)
         return reset_or_step(*args)
 
-    def _encode(self, observation: Any, form: AnswerForm) -> object:
-        """Return an observation, or a batch, as JSON values or as ``Parts``."""
-        raise NotImplementedError
+    def _encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
+        """Return an observation, or a batch, as JSON values or as ``Parts`` of a name."""
+        if form.tensors and self._write_tensors:
+            return self._write_tensors[name](observation, form.by_column)
+        return self._write_json(self.single_observation_space, observation)
+
+    @cached_property
+    def _write_json(self) -> Callable[[Space, Any], Any]:
+        # The kind of the space is not looked up for each observation.
+        encode = spaces.encode if self._is_single else spaces.encode_batch
+        write: Callable[[Space, Any], Any] = encode.dispatch(type(self.single_observation_space))
+        return write
+
+    @cached_property
+    def _write_tensors(self) -> dict[str, Callable[[Any, bool], spaces.Parts]]:
+        space = self.single_observation_space
+        names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
+        return {name: spaces.tensor_writer(space, name, not self._is_single) for name in names}
 
     # Looks ----------------------------------------------------------------------------------
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,21 +84,6 @@ class SingleInstance(LocalInstance):
             # Converted while the environment cannot change it.
             "info": plain(checked_info(info)) if form.infos else {},
         }
-
-    def _encode(self, observation: Any, form: AnswerForm) -> object:
-        if form.tensors and self._write_tensors is not None:
-            return self._write_tensors(observation, form.by_column)
-        return self._write_json(observation)
-
-    @cached_property
-    def _write_json(self) -> Callable[[Any], object]:
-        return spaces.json_writer(self.single_observation_space)
-
-    @cached_property
-    def _write_tensors(self) -> Callable[[Any, bool], spaces.Parts] | None:
-        space = self.single_observation_space
-        travels = spaces.travels_as_tensors(space)
-        return spaces.tensor_writer(space, "observation") if travels else None
 
     def _sample_action(self) -> object:
         return spaces.encode(self.single_action_space, self.single_action_space.sample())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -133,7 +132,7 @@ class VectorInstance(LocalInstance):
         if not self._was_reset:
             raise reset_needed("step()")
         which = None if mask is None else self._select(mask)
-        rows = self._num_envs if which is None else len(which)
+        rows = None if which is None else len(which)
         decoded = self._actions.read(action, rows)
         self._check_running(which)
         try:
@@ -217,26 +216,13 @@ class VectorInstance(LocalInstance):
 
     # Values ---------------------------------------------------------------------------------
 
-    def _encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
-        if form.tensors and self._write_tensors:
-            return self._write_tensors[name](observation, form.by_column)
-        return self._write_json(observation)
-
-    @cached_property
-    def _write_json(self) -> Callable[[Any], object]:
-        return spaces.batch_json_writer(self.single_observation_space)
-
-    @cached_property
-    def _write_tensors(self) -> dict[str, Callable[[Any, bool], spaces.Parts]]:
-        space = self.single_observation_space
-        names = ("observation", "final_obs") if spaces.travels_as_tensors(space) else ()
-        return {name: spaces.batch_tensor_writer(space, name) for name in names}
-
     def _sample_action(self) -> object:
         return spaces.encode_sub_envs(self.single_action_space, self.gym_env.action_space.sample())
 
     def _decode(self, space: Space, value: object) -> object:
-        return spaces.decode_sub_envs(space, value, self._num_envs, "the sub-environments")
+        return spaces.decode_sub_envs(
+            space, value, spaces.Rows(self._num_envs, "the sub-environments")
+        )
 
     @property
     def pids(self) -> Sequence[int]:

@@ -42,6 +42,7 @@ _NAMES = {
     "b1": "BOOL",
 }
 _DTYPES = {name: np.dtype(code).newbyteorder("<") for code, name in _NAMES.items()}
+_NATIVE = {name: np.dtype(code) for code, name in _NAMES.items()}
 
 
 def has_tensor(dtype: np.dtype) -> bool:
@@ -52,12 +53,6 @@ def has_tensor(dtype: np.dtype) -> bool:
 def tensor_name(dtype: np.dtype) -> str:
     """Return the format's name for a dtype that has one."""
     return _NAMES[dtype.str[1:]]
-
-
-def native_dtype(name: str) -> tuple[np.dtype, np.dtype]:
-    """Return the dtype of a name as it lies in a file, and in the machine's own byte order."""
-    stored = _DTYPES[name]
-    return stored, stored.newbyteorder("=")
 
 
 class Tensor(NamedTuple):
@@ -89,8 +84,8 @@ class Tensor(NamedTuple):
 
     def array(self) -> np.ndarray:
         """Return the array, as a copy in the machine's own byte order."""
-        stored, native = native_dtype(self.dtype)
-        return np.frombuffer(self.data, stored).reshape(self.shape).astype(native)
+        array = np.frombuffer(self.data, _DTYPES[self.dtype]).reshape(self.shape)
+        return array.astype(_NATIVE[self.dtype])
 
 
 @dataclass(frozen=True)

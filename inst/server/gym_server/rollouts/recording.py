@@ -13,7 +13,7 @@ from gym_server.envs.memory_estimate import observation_bytes
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.task import MOST_BYTES, Keep
-from gym_server.spaces import batch_tensor_writer, stack
+from gym_server.spaces import stack, tensor_writer
 from gym_server.spaces.stacking import ARRAYS
 
 # Of observations with so many numbers together the moments are computed at once, and then merged:
@@ -187,7 +187,7 @@ def step_tensors(
     tensors: dict[str, Tensor] = {}
     for name, batch in steps.items():
         space = action_space if name == "action" else observation_space
-        tensors.update(batch_tensor_writer(space, name)(batch, False).tensors)
+        tensors.update(tensor_writer(space, name, is_batch=True)(batch, False).tensors)
     tensors["step/reward"] = Tensor.of(reward)
     tensors["step/terminated"] = Tensor.of(terminated)
     tensors["step/truncated"] = Tensor.of(truncated)

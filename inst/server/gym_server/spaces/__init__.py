@@ -20,11 +20,9 @@ from gym_server.spaces import (  # noqa: F401
     tuple_,
 )
 from gym_server.spaces.batches import (
-    batch_json_writer,
-    batch_tensor_writer,
     decode_sub_envs,
+    encode_batch,
     encode_sub_envs,
-    sub_envs_tensor_reader,
 )
 from gym_server.spaces.kinds import (
     NotInSpace,
@@ -32,12 +30,12 @@ from gym_server.spaces.kinds import (
     decode,
     encode,
     json_reader,
-    json_writer,
 )
 from gym_server.spaces.membership import contains
 from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe
 from gym_server.spaces.tensor_parts import (
+    Rows,
     tensor_reader,
     tensor_writer,
     travels_as_tensors,
@@ -47,19 +45,17 @@ from gym_server.spaces.wide_boxes import with_wide_boxes
 __all__ = [
     "NotInSpace",
     "Parts",
-    "batch_json_writer",
-    "batch_tensor_writer",
+    "Rows",
     "brief_space",
     "contains",
     "decode",
     "decode_sub_envs",
     "describe",
     "encode",
+    "encode_batch",
     "encode_sub_envs",
     "json_reader",
-    "json_writer",
     "stack",
-    "sub_envs_tensor_reader",
     "tensor_reader",
     "tensor_writer",
     "travels_as_tensors",

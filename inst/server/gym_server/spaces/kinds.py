@@ -75,11 +75,6 @@ def decode(space: Space, value: object) -> object:
     raise TypeError(f"no decoding for {type(space).__name__}")
 
 
-def json_writer(space: Space) -> Callable[[Any], Any]:
-    """Return ``encode()`` for one space: its kind is not looked up for each member."""
-    return partial(encode.dispatch(type(space)), space)
-
-
 def json_reader(space: Space) -> Callable[[object], object]:
     """Return ``decode()`` for one space: its kind is not looked up for each member."""
     return partial(decode.dispatch(type(space)), space)

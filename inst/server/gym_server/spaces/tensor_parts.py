@@ -1,4 +1,7 @@
-"""Members of a space as tensors: the parts of nested ones are named by JSON pointer.
+"""Members of a space, and batches of them, as tensors; parts are named by JSON pointer.
+
+A batch has the sub-environments along the first axes of its tensors: a member is a batch without
+that axis. Only Text differs: it has a text for each sub-environment.
 
 Sequence, Graph and OneOf have no fixed parts and travel as JSON only, and so does a space that
 holds one of them.  What takes a space's members apart and puts them together is made once for a
@@ -9,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import singledispatch
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.spaces import (
@@ -23,23 +26,41 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, native_dtype, tensor_name
-from gym_server.spaces.arrays import ArraySpace, bounds_of, check_bounds
+from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, tensor_name
+from gym_server.spaces.arrays import bounds_of, check_bounds
 from gym_server.spaces.discrete import wide_dtype
-from gym_server.spaces.kinds import NotInSpace, decode
+from gym_server.spaces.kinds import NotInSpace, decode, encode
+from gym_server.spaces.stacking import ARRAYS
 
+
+class Rows(NamedTuple):
+    """How many members a batch has to have.
+
+    Attributes:
+        number: so many; None for one member without a batch.
+        whose: names the sub-environments, in words that follow "for each of".
+    """
+
+    number: int | None = None
+    whose: str = ""
+
+
+ONE = Rows()
+
+# What leads to a part of a member.
+Path = tuple[str | int, ...]
 # Puts the parts of a value into others.
 TakeApart = Callable[[Any, Parts], None]
-# Takes a member's parts out of others, and returns the member.
-PutTogether = Callable[[Parts], object]
+# Takes a value's parts out of others, and returns the value.
+PutTogether = Callable[[Parts, Rows], object]
 
 
-def tensor_writer(space: Space, name: str) -> Callable[[Any, bool], Parts]:
+def tensor_writer(space: Space, name: str, is_batch: bool) -> Callable[[Any, bool], Parts]:
     """Return what returns a member of a space as tensors of a name; see ``travels_as_tensors()``.
 
-    It is given the member, and whether the tensors are wanted by column.
+    It is given the member, or the batch, and whether the tensors are wanted by column.
     """
-    take_apart = _take_apart(space, name)
+    take_apart = _take_apart(space, name, is_batch)
 
     def write(value: Any, by_column: bool = False) -> Parts:
         parts = Parts({}, {}, by_column)
@@ -49,110 +70,58 @@ def tensor_writer(space: Space, name: str) -> Callable[[Any, bool], Parts]:
     return write
 
 
-def tensor_reader(space: Space, name: str) -> Callable[[Parts], object]:
-    """Return what returns the member of a space that tensors of a name are.
+def tensor_reader(space: Space, name: str) -> Callable[[Parts, Rows], object]:
+    """Return what returns the member, or the batch, of a space that tensors of a name are.
 
-    It raises NotInSpace when they are none: a part too few or too many, another dtype or shape, or
-    outside the bounds.
+    It raises NotInSpace when they are none: a part too few or too many, another dtype, shape or
+    number of rows, or outside the bounds.
     """
-    put_together = _put_together(space, name)
+    put_together = _put_together(space, name, ())
 
-    def read(sent: Parts) -> object:
+    def read(sent: Parts, rows: Rows = ONE) -> object:
         left = Parts(dict(sent.tensors), dict(sent.texts))
-        member = put_together(left)
-        refuse_leftovers(space, name, left)
-        return member
+        value = put_together(left, rows)
+        for unknown in (*left.tensors, *left.texts):
+            if unknown == name or unknown.startswith(f"{name}/"):
+                raise NotInSpace(space, unknown, "it has no such part")
+        return value
 
     return read
-
-
-def refuse_leftovers(space: Space, name: str, left: Parts) -> None:
-    """Raise NotInSpace for a part that was sent and that the space does not have."""
-    for unknown in (*left.tensors, *left.texts):
-        if unknown == name or unknown.startswith(f"{name}/"):
-            raise NotInSpace(space, unknown, "it has no such part")
 
 
 @singledispatch
 def travels_as_tensors(space: Space) -> bool:
     """Tell whether the members of a space may travel as tensors."""
-    return False
+    return isinstance(space, (*ARRAYS, Text))
 
 
 @singledispatch
-def _take_apart(space: Space, name: str) -> TakeApart:
+def _take_apart(space: Space, name: str, is_batch: bool) -> TakeApart:
     raise TypeError(f"no tensors for {type(space).__name__}")
 
 
 @singledispatch
-def _put_together(space: Space, name: str) -> PutTogether:
-    def refuse(parts: Parts) -> object:
+def _put_together(space: Space, name: str, path: Path) -> PutTogether:
+    """Return what puts a value together, which a path leads to inside of the whole value."""
+
+    def refuse(parts: Parts, rows: Rows) -> object:
         raise NotInSpace(space, name, "its members travel as JSON")
 
     return refuse
 
 
-def part_name(name: str, key: object) -> str:
+def _part_name(name: str, key: object) -> str:
     """Return the name of a part of what has a name: a JSON pointer."""
     return f"{name}/{str(key).replace('~', '~0').replace('/', '~1')}"
-
-
-def _part_together(space: Space, name: str, key: object, step: str | int) -> PutTogether:
-    """Return what puts a part of a member together; a refusal names the step that leads to it."""
-    put_together = _put_together(space, part_name(name, key))
-
-    def put_part_together(parts: Parts) -> object:
-        try:
-            return put_together(parts)
-        except NotInSpace as refusal:
-            refusal.path.insert(0, step)
-            raise
-
-    return put_part_together
-
-
-def array_taker(
-    space: object, name: str, dtype: np.dtype
-) -> Callable[[Parts, tuple[int, ...]], np.ndarray]:
-    """Return what takes the tensor of a name and a shape out of some parts, as an array of its own.
-
-    It raises NotInSpace for another dtype or shape.
-    """
-    wanted = tensor_name(dtype)
-    stored, native = native_dtype(wanted)
-
-    def take(parts: Parts, shape: tuple[int, ...]) -> np.ndarray:
-        tensor = parts.tensors.pop(name, None)
-        if tensor is None:
-            raise NotInSpace(space, None, f"there is no tensor {name!r}")
-        if tensor.dtype != wanted or tensor.shape != shape:
-            raise NotInSpace(
-                space,
-                f"{tensor.dtype} {list(tensor.shape)}",
-                f"{wanted} {list(shape)} is needed",
-            )
-        return np.frombuffer(tensor.data, stored).reshape(shape).astype(native)
-
-    return take
 
 
 # Arrays -------------------------------------------------------------------------------------
 
 
-@travels_as_tensors.register(Box)
-@travels_as_tensors.register(Discrete)
-@travels_as_tensors.register(MultiBinary)
-@travels_as_tensors.register(MultiDiscrete)
-@travels_as_tensors.register(Text)
-def _(space: Space) -> bool:
-    return True
-
-
 @_take_apart.register(Box)
 @_take_apart.register(MultiBinary)
 @_take_apart.register(MultiDiscrete)
-def array_putter(space: ArraySpace, name: str) -> TakeApart:
-    """Return what puts an array of a space's numbers, of one member or of many, into some parts."""
+def _(space: Any, name: str, is_batch: bool) -> TakeApart:
     dtype = space.dtype
 
     def put(value: Any, parts: Parts) -> None:
@@ -164,66 +133,116 @@ def array_putter(space: ArraySpace, name: str) -> TakeApart:
     return put
 
 
+@_take_apart.register
+def _(space: Discrete, name: str, is_batch: bool) -> TakeApart:
+    dtype = wide_dtype(space)
+
+    def put(value: Any, parts: Parts) -> None:
+        array = np.asarray(value if is_batch else int(value), dtype)
+        parts.tensors[name] = Tensor.of(array)
+
+    return put
+
+
 @_put_together.register(Box)
 @_put_together.register(MultiBinary)
 @_put_together.register(MultiDiscrete)
-def _(space: ArraySpace, name: str) -> PutTogether:
-    take, bounds, shape = array_taker(space, name, space.dtype), bounds_of(space), space.shape
+def _(space: Any, name: str, path: Path) -> PutTogether:
+    return _array_together(space, name, space.dtype, path)
 
-    def put_together(parts: Parts) -> object:
-        array = take(parts, shape)
-        check_bounds(space, bounds, array)
+
+@_put_together.register
+def _(space: Discrete, name: str, path: Path) -> PutTogether:
+    of_wide = _array_together(space, name, wide_dtype(space), path)
+    # R has only 32 bit integers.
+    of_short = _array_together(space, name, np.dtype(np.int32), path)
+    may_be_short = wide_dtype(space) == np.int64
+
+    def put_together(parts: Parts, rows: Rows) -> object:
+        sent = parts.tensors.get(name)
+        is_short = may_be_short and sent is not None and sent.dtype == "I32"
+        array = (of_short if is_short else of_wide)(parts, rows)
+        return array.astype(space.dtype, copy=False)[()]
+
+    return put_together
+
+
+def _array_together(
+    space: Any, name: str, dtype: np.dtype, path: Path
+) -> Callable[[Parts, Rows], np.ndarray]:
+    wanted, bounds, of_one = tensor_name(dtype), bounds_of(space), space.shape or ()
+
+    def put_together(parts: Parts, rows: Rows) -> np.ndarray:
+        tensor = parts.tensors.pop(name, None)
+        shape = of_one if rows.number is None else (rows.number, *of_one)
+        if tensor is None or tensor.dtype != wanted or tensor.shape != shape:
+            refusal = _misfit(space, name, tensor, f"{wanted} {list(shape)}", rows)
+            refusal.path[:] = path
+            raise refusal
+        array = tensor.array()
+        try:
+            check_bounds(space, bounds, array)
+        except NotInSpace as refusal:
+            # The first step of its path is the sub-environment.
+            at = 0 if rows.number is None else 1
+            refusal.path[at:at] = path
+            raise
         return array
 
     return put_together
 
 
-# Discrete -----------------------------------------------------------------------------------
-
-
-@_take_apart.register
-def _(space: Discrete, name: str) -> TakeApart:
-    dtype = wide_dtype(space)
-
-    def put(value: Any, parts: Parts) -> None:
-        parts.tensors[name] = Tensor.of(np.array(int(value), dtype))
-
-    return put
-
-
-@_put_together.register
-def _(space: Discrete, name: str) -> PutTogether:
-    take = array_taker(space, name, wide_dtype(space))
-    return lambda parts: decode(space, take(parts, ()).item())
+def _misfit(space: Space, name: str, sent: Tensor | None, wanted: str, rows: Rows) -> NotInSpace:
+    """Return the refusal of a tensor that is missing, or of another dtype or shape."""
+    if sent is None:
+        return NotInSpace(space, None, f"there is no tensor {name!r}")
+    reason = f"{wanted} is needed"
+    is_row_missing = sent.shape[1:] == (space.shape or ()) and sent.shape[:1] != (rows.number,)
+    if rows.number is not None and sent.shape and is_row_missing:
+        reason = f"one action for each of {rows.whose} is needed, not {sent.shape[0]}"
+    return NotInSpace(space, f"{sent.dtype} {list(sent.shape)}", reason)
 
 
 # Text ---------------------------------------------------------------------------------------
 
 
 @_take_apart.register
-def _(space: Text, name: str) -> TakeApart:
+def _(space: Text, name: str, is_batch: bool) -> TakeApart:
     def put(value: Any, parts: Parts) -> None:
-        if not isinstance(value, str):
-            raise TypeError(f"a text should be a str, not {type(value).__name__}")
-        parts.texts[name] = str(value)
+        if not is_batch:
+            parts.texts[name] = encode(space, value)
+            return
+        for sub_env, text in enumerate(value):
+            parts.texts[_part_name(name, sub_env)] = encode(space, text)
 
     return put
 
 
 @_put_together.register
-def _(space: Text, name: str) -> PutTogether:
-    return lambda parts: take_text(space, name, parts)
+def _(space: Text, name: str, path: Path) -> PutTogether:
+    def put_together(parts: Parts, rows: Rows) -> object:
+        if rows.number is None:
+            return _take_text(space, name, parts, path)
+        return tuple(
+            _take_text(space, _part_name(name, sub_env), parts, (sub_env, *path))
+            for sub_env in range(rows.number)
+        )
+
+    return put_together
 
 
-def take_text(space: Text, name: str, parts: Parts) -> object:
-    """Take the text of a name out of some parts."""
-    text = parts.texts.pop(name, None)
-    if text is None:
-        raise NotInSpace(space, None, f"there is no text {name!r}")
-    return decode(space, text)
+def _take_text(space: Text, name: str, parts: Parts, path: Path) -> object:
+    try:
+        text = parts.texts.pop(name, None)
+        if text is None:
+            raise NotInSpace(space, None, f"there is no text {name!r}")
+        return decode(space, text)
+    except NotInSpace as refusal:
+        refusal.path[:0] = path
+        raise
 
 
-# Tuple --------------------------------------------------------------------------------------
+# Tuple and Dict -----------------------------------------------------------------------------
 
 
 @travels_as_tensors.register
@@ -232,29 +251,26 @@ def _(space: Tuple) -> bool:
 
 
 @_take_apart.register
-def _(space: Tuple, name: str) -> TakeApart:
-    return tuple_taker(
-        [_take_apart(part, part_name(name, i)) for i, part in enumerate(space.spaces)]
-    )
-
-
-def tuple_taker(take_apart: list[TakeApart]) -> TakeApart:
-    """Return what takes a tuple apart, given what takes its parts apart."""
+def _(space: Tuple, name: str, is_batch: bool) -> TakeApart:
+    parts_of = [
+        _take_apart(part, _part_name(name, index), is_batch)
+        for index, part in enumerate(space.spaces)
+    ]
 
     def take_all_apart(value: Any, parts: Parts) -> None:
-        for take, item in zip(take_apart, value, strict=True):
-            take(item, parts)
+        for take_apart, item in zip(parts_of, value, strict=True):
+            take_apart(item, parts)
 
     return take_all_apart
 
 
 @_put_together.register
-def _(space: Tuple, name: str) -> PutTogether:
-    parts_of = [_part_together(part, name, i, i) for i, part in enumerate(space.spaces)]
-    return lambda parts: tuple([put_together(parts) for put_together in parts_of])
-
-
-# Dict ---------------------------------------------------------------------------------------
+def _(space: Tuple, name: str, path: Path) -> PutTogether:
+    parts_of = [
+        _put_together(part, _part_name(name, index), (*path, index))
+        for index, part in enumerate(space.spaces)
+    ]
+    return lambda *how: tuple([put_together(*how) for put_together in parts_of])
 
 
 @travels_as_tensors.register
@@ -263,25 +279,23 @@ def _(space: Dict) -> bool:
 
 
 @_take_apart.register
-def _(space: Dict, name: str) -> TakeApart:
-    return dict_taker(
-        {key: _take_apart(part, part_name(name, key)) for key, part in space.spaces.items()}
-    )
-
-
-def dict_taker(take_apart: dict[Any, TakeApart]) -> TakeApart:
-    """Return what takes a dict apart, given what takes its parts apart."""
+def _(space: Dict, name: str, is_batch: bool) -> TakeApart:
+    parts_of = {
+        key: _take_apart(part, _part_name(name, key), is_batch)
+        for key, part in space.spaces.items()
+    }
 
     def take_all_apart(value: Any, parts: Parts) -> None:
-        for key, take in take_apart.items():
-            take(value[key], parts)
+        for key, take_apart in parts_of.items():
+            take_apart(value[key], parts)
 
     return take_all_apart
 
 
 @_put_together.register
-def _(space: Dict, name: str) -> PutTogether:
+def _(space: Dict, name: str, path: Path) -> PutTogether:
     parts_of = {
-        key: _part_together(part, name, key, str(key)) for key, part in space.spaces.items()
+        key: _put_together(part, _part_name(name, key), (*path, str(key)))
+        for key, part in space.spaces.items()
     }
-    return lambda parts: {key: put_together(parts) for key, put_together in parts_of.items()}
+    return lambda *how: {key: put_together(*how) for key, put_together in parts_of.items()}

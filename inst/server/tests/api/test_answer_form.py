@@ -158,7 +158,9 @@ def test_last_observations_come_without_infos(client, sub_envs):
 def test_tensors_can_be_sent_with_the_wish_for_no_last_observations(client, create, wanted):
     url = create(num_envs=2, autoreset_mode="SameStep", kwargs={"max_episode_steps": 1})
     client.post(f"{url}/reset/", json={"seed": 1})
-    parts = spaces.batch_tensor_writer(gymnasium.make("CartPole-v1").action_space, "action")
+    parts = spaces.tensor_writer(
+        gymnasium.make("CartPole-v1").action_space, "action", is_batch=True
+    )
     answer = client.post(
         f"{url}/step/",
         data=safetensors.write(parts(np.array([0, 1])).tensors, {"final_obs": json.dumps(wanted)}),
@@ -171,7 +173,7 @@ def test_tensors_can_be_sent_with_the_wish_for_no_infos(client, create):
     url = create(num_envs=2, vectorization_mode="sync")
     client.post(f"{url}/reset/", json={"seed": 1})
     space = gymnasium.make("CartPole-v1").action_space
-    parts = spaces.batch_tensor_writer(space, "action")(np.array([0, 1]))
+    parts = spaces.tensor_writer(space, "action", is_batch=True)(np.array([0, 1]))
     for info, status in (("false", 200), ("3", 400)):
         answer = client.post(
             f"{url}/step/",

@@ -28,7 +28,7 @@ def test_sub_envs_survive_json(seed):
     if not are_readable(space, members):
         return
     sent = [plain(spaces.encode(space, member)) for member in members]
-    batch = spaces.decode_sub_envs(space, sent, 3, "the 3 sub-environments")
+    batch = spaces.decode_sub_envs(space, sent, spaces.Rows(3, "the 3 sub-environments"))
     one_by_one = stack(space, [spaces.decode(space, value) for value in sent])
     assert same(batch, one_by_one)
 
@@ -41,22 +41,26 @@ def test_sub_envs_survive_tensors(seed):
     if not are_readable(space, members):
         return
     batch = stack(space, members)
-    parts = spaces.batch_tensor_writer(space, "action")(batch)
-    back = spaces.sub_envs_tensor_reader(space, "action")(parts, 3, "the 3 sub-environments")
+    parts = spaces.tensor_writer(space, "action", is_batch=True)(batch)
+    back = spaces.tensor_reader(space, "action")(parts, spaces.Rows(3, "the 3 sub-environments"))
     assert same(back, batch)
 
 
 def test_every_way_to_write_a_sub_env_is_read():
     box = Box(-1, 1, (1,), np.float32)
-    assert spaces.decode_sub_envs(box, [[1], 0.5], 2, "").tolist() == [[1], [0.5]]
-    assert spaces.decode_sub_envs(box, [1, 0.5], 2, "").tolist() == [[1], [0.5]]
+    assert spaces.decode_sub_envs(box, [[1], 0.5], spaces.Rows(2, "")).tolist() == [[1], [0.5]]
+    assert spaces.decode_sub_envs(box, [1, 0.5], spaces.Rows(2, "")).tolist() == [[1], [0.5]]
     square = Box(0, 9, (2, 2), np.uint8)
-    assert spaces.decode_sub_envs(square, [[1, 2, 3, 4], [[5, 6], [7, 8]]], 2, "").tolist() == [
+    assert spaces.decode_sub_envs(
+        square, [[1, 2, 3, 4], [[5, 6], [7, 8]]], spaces.Rows(2, "")
+    ).tolist() == [
         [[1, 2], [3, 4]],
         [[5, 6], [7, 8]],
     ]
-    assert spaces.decode_sub_envs(Discrete(3), [1, 2.0], 2, "").tolist() == [1, 2]
-    assert spaces.decode_sub_envs(MultiBinary(2), [[True, 0], [1, 1]], 2, "").tolist() == [
+    assert spaces.decode_sub_envs(Discrete(3), [1, 2.0], spaces.Rows(2, "")).tolist() == [1, 2]
+    assert spaces.decode_sub_envs(
+        MultiBinary(2), [[True, 0], [1, 1]], spaces.Rows(2, "")
+    ).tolist() == [
         [1, 0],
         [1, 1],
     ]
@@ -65,30 +69,30 @@ def test_every_way_to_write_a_sub_env_is_read():
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
 def test_discrete_sub_envs_may_be_32_or_64_bits_wide(dtype):
     parts = Parts({"action": Tensor.of(np.array([0, 2], dtype))})
-    batch = spaces.sub_envs_tensor_reader(Discrete(3, dtype=np.int8), "action")(parts, 2, "")
+    batch = spaces.tensor_reader(Discrete(3, dtype=np.int8), "action")(parts, spaces.Rows(2, ""))
     assert (batch.dtype, batch.tolist()) == (np.int8, [0, 2])
 
 
 def test_unsigned_discrete_sub_envs_are_unsigned():
     space = Discrete(3, dtype=np.uint64)
-    parts = spaces.batch_tensor_writer(space, "action")(np.array([0, 2], np.uint64))
+    parts = spaces.tensor_writer(space, "action", is_batch=True)(np.array([0, 2], np.uint64))
     assert parts.tensors["action"].dtype == "U64"
-    assert spaces.sub_envs_tensor_reader(space, "action")(parts, 2, "").dtype == np.uint64
+    assert spaces.tensor_reader(space, "action")(parts, spaces.Rows(2, "")).dtype == np.uint64
     short = Parts({"action": Tensor.of(np.array([0, 2], np.int32))})
     with pytest.raises(NotInSpace, match=r"U64 \[2\] is needed"):
-        spaces.sub_envs_tensor_reader(space, "action")(short, 2, "")
+        spaces.tensor_reader(space, "action")(short, spaces.Rows(2, ""))
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_arrays_travel_with_the_last_index_fastest_however_they_lie(order):
     batch = np.arange(12, dtype=np.float32).reshape(3, 4).copy(order=order)
-    tensor = spaces.batch_tensor_writer(Box(0, 20, (4,)), "o")(batch).tensors["o"]
+    tensor = spaces.tensor_writer(Box(0, 20, (4,)), "o", is_batch=True)(batch).tensors["o"]
     assert np.frombuffer(tensor.data, np.float32).tolist() == list(range(12))
 
 
 def test_what_was_encoded_does_not_change_with_the_batch():
     batch = np.zeros((2, 3), np.float32)
-    parts = spaces.batch_tensor_writer(Box(0, 1, (3,)), "o")(batch)
+    parts = spaces.tensor_writer(Box(0, 1, (3,)), "o", is_batch=True)(batch)
     batch[:] = 7
     assert parts.tensors["o"].array().tolist() == np.zeros((2, 3)).tolist()
 
@@ -96,6 +100,6 @@ def test_what_was_encoded_does_not_change_with_the_batch():
 def test_a_part_too_many_or_too_few_is_refused():
     parts = Parts({"action": Tensor.of(np.zeros(2, np.int64)), "action/x": Tensor.of(np.zeros(2))})
     with pytest.raises(NotInSpace, match="no such part"):
-        spaces.sub_envs_tensor_reader(Discrete(3), "action")(parts, 2, "")
+        spaces.tensor_reader(Discrete(3), "action")(parts, spaces.Rows(2, ""))
     with pytest.raises(NotInSpace, match="there is no tensor 'action'"):
-        spaces.sub_envs_tensor_reader(Discrete(3), "action")(Parts(), 2, "")
+        spaces.tensor_reader(Discrete(3), "action")(Parts(), spaces.Rows(2, ""))

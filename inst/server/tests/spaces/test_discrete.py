@@ -3,7 +3,7 @@ import pytest
 from gymnasium.spaces import Dict, Discrete, Tuple
 from refusals import refused
 
-from gym_server.spaces import decode, decode_sub_envs, describe
+from gym_server.spaces import Rows, decode, decode_sub_envs, describe
 
 
 def test_a_discrete_space_is_described():
@@ -32,8 +32,10 @@ def test_true_and_false_are_1_and_0():
     assert decode(Discrete(3, start=-1), False) == 0
     assert refused(Discrete(3, start=1), False).startswith("false is not in Discrete")
     assert decode(Tuple([Discrete(2)]), [True]) == (1,)
-    assert decode_sub_envs(Discrete(2), [True, False, 1], 3, "").tolist() == [1, 0, 1]
-    assert decode_sub_envs(Dict(a=Discrete(2)), [{"a": True}, {"a": 0}], 2, "")["a"].tolist() == [
+    assert decode_sub_envs(Discrete(2), [True, False, 1], Rows(3, "")).tolist() == [1, 0, 1]
+    assert decode_sub_envs(Dict(a=Discrete(2)), [{"a": True}, {"a": 0}], Rows(2, ""))[
+        "a"
+    ].tolist() == [
         1,
         0,
     ]

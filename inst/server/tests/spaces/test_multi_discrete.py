@@ -3,7 +3,7 @@ import pytest
 from gymnasium.spaces import MultiDiscrete
 from refusals import refused
 
-from gym_server.spaces import decode, decode_sub_envs, describe
+from gym_server.spaces import Rows, decode, decode_sub_envs, describe
 
 SPACE = MultiDiscrete([[2, 3], [4, 5]], dtype=np.int32, start=[[0, -1], [0, 10]])
 
@@ -29,7 +29,7 @@ def test_true_and_false_are_1_and_0_as_for_discrete():
     space = MultiDiscrete([2, 2], dtype=np.uint8)
     assert decode(space, [True, False]).tolist() == [1, 0]
     sub_envs = [[True, False], [0, True]]
-    assert decode_sub_envs(space, sub_envs, 2, "").tolist() == [[1, 0], [0, 1]]
+    assert decode_sub_envs(space, sub_envs, Rows(2, "")).tolist() == [[1, 0], [0, 1]]
     assert refused(space, [-1, True]).startswith("-1 at [0]")
 
 

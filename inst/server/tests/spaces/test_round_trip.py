@@ -43,7 +43,7 @@ def test_a_member_comes_back_through_json_as_it_was(seed):
 def test_a_member_comes_back_through_tensors_as_it_was(seed):
     for space, member in pairs(seed, tensors=True):
         assert spaces.travels_as_tensors(space)
-        parts = spaces.tensor_writer(space, "action")(member)
+        parts = spaces.tensor_writer(space, "action", is_batch=False)(member)
         raw = write(parts.tensors, {"texts": json.dumps(parts.texts)})
         file = read(raw)
         sent = Parts(file.tensors, json.loads(file.metadata["texts"]))
