@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gym_server.api import fields, schemas
+from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Room
 from gym_server.envs.config import EnvConfig
@@ -18,10 +18,10 @@ ROOM = Room("envs")
 @ROOM.declare(
     "POST",
     "/v1/envs/",
-    Field("env_id", fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field("env_id", env_fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
     Field(
         "seed",
-        fields.SEED,
+        env_fields.SEED,
         "Seeds the action space, and the first reset unless that has a seed; with num_envs also a "
         "list of one for each sub-environment.",
     ),
@@ -32,28 +32,30 @@ ROOM = Room("envs")
         "watches it moves in real time.",
     ),
     Field("kwargs", OBJECT, "Handed to the environment."),
-    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field(
-        "num_envs", fields.POSITIVE, "How many sub-environments; absent for a single environment."
+        "num_envs",
+        env_fields.POSITIVE,
+        "How many sub-environments; absent for a single environment.",
     ),
     Field(
         "vectorization_mode",
-        fields.VECTORIZATION_MODE,
+        env_fields.VECTORIZATION_MODE,
         "What runs the sub-environments; absent for the fastest that can do what is asked.",
     ),
     Field(
         "num_workers",
-        fields.NUM_WORKERS,
+        env_fields.NUM_WORKERS,
         "How many processes run the sub-environments; 0 for the server's own, absent to let the "
         "server choose.",
     ),
     Field(
         "autoreset_mode",
-        fields.AUTORESET_MODE,
+        env_fields.AUTORESET_MODE,
         "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
         "NextStep.",
     ),
-    Field("name", fields.NAME, "What its owner calls it; shown wherever it is listed."),
+    Field("name", env_fields.NAME, "What its owner calls it; shown wherever it is listed."),
     answer="instance_id",
     once=True,
     grows=True,
@@ -108,15 +110,17 @@ def env_about(call: Call) -> dict:
     INSTANCE + "reset/",
     Field(
         "seed",
-        fields.RESET_SEED,
+        env_fields.RESET_SEED,
         "Seeds the environment and its action space; with sub-environments also a list of one for "
         "each. One of these may be a list: the first for now, the others for the episodes that the "
         "sub-environment begins by itself. After the last one it rests: in a step it returns its "
         "last observation and the reward 0.",
     ),
     Field("options", OBJECT, "The environment's own."),
-    Field("reset_mask", fields.MASK, "Which sub-environments are reset; absent for all of them."),
-    fields.INFO,
+    Field(
+        "reset_mask", env_fields.MASK, "Which sub-environments are reset; absent for all of them."
+    ),
+    env_fields.INFO,
     answer="observation, info; with sub-environments one row for each",
     once=True,
     tensors=True,
@@ -150,9 +154,9 @@ def env_reset(call: Call) -> dict | Ready:
         "Whether people want to see it: while somebody watches, the step waits until real time "
         "has come so far.",
     ),
-    Field("step_mask", fields.MASK, "Which sub-environments step; absent for all of them."),
-    fields.INFO,
-    fields.FINAL_OBS,
+    Field("step_mask", env_fields.MASK, "Which sub-environments step; absent for all of them."),
+    env_fields.INFO,
+    env_fields.FINAL_OBS,
     answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
     "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
     "reset at once",
@@ -182,7 +186,9 @@ def env_step(call: Call) -> dict | Ready:
 @ROOM.declare(
     "GET",
     INSTANCE + "render/",
-    Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
+    Field(
+        "sub_env", env_fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."
+    ),
     answer="the current frame",
     grows=True,
     content_type="image/png",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gym_server.api import fields
+from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Room
 from gym_server.protocol.fields import BOOLEAN, TEXT, Field
@@ -16,7 +16,7 @@ ROOM = Room("monitors")
     Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
     Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
     Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
-    Field("video_callable", fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    Field("video_callable", env_fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
     grows=True,
 )
 def env_monitor_start(call: Call) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gym_server.api import fields, schemas
+from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
 from gym_server.api.routing import Room
 from gym_server.envs.config import EnvConfig
@@ -43,9 +43,9 @@ _KEEP = Kind(
 @ROOM.declare(
     "POST",
     "/v1/rollouts/",
-    Field("env_id", fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
+    Field("env_id", env_fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
     Field("kwargs", OBJECT, "Handed to the environment."),
-    Field("wrappers", fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
     Field(
         "policy",
         OBJECT,
@@ -55,7 +55,7 @@ _KEEP = Kind(
     ),
     Field(
         "max_steps",
-        fields.POSITIVE,
+        env_fields.POSITIVE,
         "After how many steps an episode is cut short; required where the environment has no time "
         "limit.",
     ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gym_server import viewing
-from gym_server.api import fields, schemas
+from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Callers, Room
 from gym_server.api.watch_keys import KEY_SECONDS
@@ -121,9 +121,13 @@ def env_watch_script(call: Call) -> Response:
 @ROOM.declare(
     "GET",
     _WATCH + "state/",
-    Field("sub_env", fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."),
     Field(
-        "after", fields.QUERY_INTEGER, "The number of what was seen last; absent for the present."
+        "sub_env", env_fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."
+    ),
+    Field(
+        "after",
+        env_fields.QUERY_INTEGER,
+        "The number of what was seen last; absent for the present.",
     ),
     answer="number, state (running, ended, not_reset, busy), env_id, sub_env, num_envs, episode, "
     "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "

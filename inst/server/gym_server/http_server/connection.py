@@ -151,7 +151,7 @@ class Connection:
             while data := self._receive():
                 self._busy = True
                 requests = self._parser.feed(data)
-                if not self._answer_all(requests):
+                if not all(map(self._answer, requests)):
                     break
                 if not requests:
                     self.waiting_since = time.monotonic()
@@ -190,9 +190,6 @@ class Connection:
         if self._app.recognizes(environ):
             self._is_recognized = True
             self._wait_at_most(_REST_SECONDS)
-
-    def _answer_all(self, requests: list[Request]) -> bool:
-        return all(map(self._answer, requests))
 
     def _answer(self, request: Request) -> bool:
         """Answer one request; return whether another may follow."""
@@ -348,12 +345,13 @@ class Connection:
 
 # In capitals, as Flask writes it and classic clients show it.
 _STATUS_LINES = {one.value: f"HTTP/1.1 {one.value} {one.phrase.upper()}" for one in HTTPStatus}
+_NO_CONTENT = HTTPStatus.NO_CONTENT.value
 
 
 def _head(response: Response, keep: bool) -> bytes:
     """Return what comes before the body."""
     head = f"{_STATUS_LINES[response.status]}\r\nContent-Type: {response.content_type}\r\n"
-    if response.status != HTTPStatus.NO_CONTENT:
+    if response.status != _NO_CONTENT:
         head += f"Content-Length: {len(response.body)}\r\n"
     for name, value in response.headers:
         head += f"{name}: {value}\r\n"

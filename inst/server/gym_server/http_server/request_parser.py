@@ -182,7 +182,8 @@ class RequestParser:
         try:
             while data:
                 data = self._parse(data)
-            self._check_head(self._unreported_bytes)
+            if self._unreported_bytes > _LARGEST_HEAD_BYTES:
+                self._refuse_head()
         except HttpParserError as error:
             self._end_with(self._refuse(400, self._fault or str(error)))
         return self._complete
@@ -221,9 +222,11 @@ class RequestParser:
 
     def on_url(self, url: bytes) -> None:
         """Take a piece of the URL."""
-        self._request.url += url
-        self._request.head_bytes += len(url)
-        self._check_head(self._request.head_bytes)
+        request = self._request
+        request.url += url
+        request.head_bytes += len(url)
+        if request.head_bytes > _LARGEST_HEAD_BYTES:
+            self._refuse_head()
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Take a header."""
@@ -232,16 +235,16 @@ class RequestParser:
         if not request.method:
             request.headers.append((name.lower(), value))
             request.head_bytes += len(name) + len(value)
-            self._check_head(request.head_bytes)
+            is_long = len(request.headers) > _MOST_HEAD_LINES
+            if is_long or request.head_bytes > _LARGEST_HEAD_BYTES:
+                self._refuse_head()
 
-    def _check_head(self, size: int) -> None:
-        """Refuse a head of such a size, or of so many lines as it has, if that is too much."""
-        if size > _LARGEST_HEAD_BYTES:
-            self._fault = f"its head has more than {_LARGEST_HEAD_BYTES} bytes"
-            raise HttpParserError
+    def _refuse_head(self) -> None:
         if len(self._request.headers) > _MOST_HEAD_LINES:
             self._fault = f"its head has more than {_MOST_HEAD_LINES} lines"
-            raise HttpParserError
+        else:
+            self._fault = f"its head has more than {_LARGEST_HEAD_BYTES} bytes"
+        raise HttpParserError
 
     def on_headers_complete(self) -> None:
         """Decide whether the body is wanted."""

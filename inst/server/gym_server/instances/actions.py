@@ -42,7 +42,7 @@ class ActionReader:
             GymServerError: ``action_not_in_space``.
         """
         try:
-            return self._taken.read(action, self._rows(rows))
+            return self._taken.read(action, self._all if rows is None else self._rows(rows))
         except spaces.NotInSpace as refusal:
             raise GymServerError(
                 "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)
@@ -53,12 +53,12 @@ class ActionReader:
         if failure.code != "environment_error":
             return
         try:
-            _Reader(self._space).read(action, self._rows(rows))
+            _Reader(self._space).read(action, self._all if rows is None else self._rows(rows))
         except spaces.NotInSpace:
             failure.hint = _CLIP
 
     def _rows(self, rows: int | None) -> spaces.Rows:
-        if rows is None or rows == self._all.number:
+        if rows == self._all.number:
             return self._all
         return spaces.Rows(rows, f"the {rows} sub-environments that step")
 

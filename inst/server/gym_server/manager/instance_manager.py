@@ -47,7 +47,7 @@ _MB = 2**20
 
 
 @dataclass
-class _Share:
+class _Taken:
     """What an environment takes of the server's limits, until it is gone."""
 
     room: Room
@@ -60,14 +60,14 @@ class _Creation:
 
     Attributes:
         config: what its client wants.
-        share: what it takes of the server's limits.
+        taken: what it takes of the server's limits.
         kill: kills the process that the creating thread waits for, so that the thread answers for
             itself; None where there is no such process.
         began: in the clock's seconds.
     """
 
     config: EnvConfig
-    share: _Share
+    taken: _Taken
     kill: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
 
@@ -112,7 +112,7 @@ class InstanceManager:
         # While an instance that took too much is being closed.
         self._evicting = threading.Event()
         # By creation until it ends, then by instance_id until the instance is closed.
-        self._shares: dict[_Creation | str, _Share] = {}
+        self._taken: dict[_Creation | str, _Taken] = {}
         # The creations, each with the thread that does it; the instances that are being closed.
         self._creating: InProgress[_Creation, int] = InProgress()
         self._closing: dict[str, Instance] = {}
@@ -145,7 +145,7 @@ class InstanceManager:
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
             if not isolated:
-                self._note_processes(instance, creation.share)
+                self._note_processes(instance, creation.taken)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -163,7 +163,7 @@ class InstanceManager:
                 return False
             instance.instance_id = self._new_id()
             self._instances[instance.instance_id] = instance
-            self._shares[instance.instance_id] = self._shares.pop(creation)
+            self._taken[instance.instance_id] = self._taken.pop(creation)
             return True
 
     @contextlib.contextmanager
@@ -174,18 +174,17 @@ class InstanceManager:
         most_here = self._isolation.most_bytes_here
         reservation = MemoryReservation(self._budget, config.num_envs or 1, most_here)
         with self._lock:
-            taken = sum((one.room for one in list(self._shares.values())), Room(0))
+            taken = sum((one.room for one in list(self._taken.values())), Room(0))
             if not config.wants_workers:
                 workers = min(workers, max(0, self._limits.max_processes - taken.processes))
             # An isolated environment starts its workers by a fork server of its own.
             fork_server = bool(isolated and workers)
             room = Room(config.num_envs or 1, isolated + fork_server + workers)
-            share = _Share(room, reservation)
-            creation = _Creation(replace(config, max_workers=workers), share)
+            creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
             instances = len(self._instances) + len(self._creating)
             self._limits.check_room(instances, taken, room)
             self._creating.begin(creation, threading.get_ident())
-            self._shares[creation] = share
+            self._taken[creation] = creation.taken
         try:
             yield creation
         except BaseException:
@@ -196,20 +195,20 @@ class InstanceManager:
         finally:
             self._release(creation)
 
-    def _note_processes(self, instance: Instance, share: _Share) -> None:
+    def _note_processes(self, instance: Instance, taken: _Taken) -> None:
         """Give back the room for processes that were not needed.
 
         Not for an isolated environment: its process, which nobody trusts, would tell how many.
         """
         processes = instance.about()["num_workers"] or 0
         with self._lock:
-            share.room = replace(share.room, processes=processes)
+            taken.room = replace(taken.room, processes=processes)
 
     def _release(self, whose: _Creation | str) -> None:
-        """Free the share of an environment that is gone, or was not created after all."""
-        share = self._shares.pop(whose, None)
-        if share is not None:
-            share.reservation.give_back()
+        """Free what an environment took that is gone, or was not created after all."""
+        taken = self._taken.pop(whose, None)
+        if taken is not None:
+            taken.reservation.give_back()
             self.left_garbage = True
 
     def _make(self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
@@ -219,7 +218,7 @@ class InstanceManager:
             self._limits.max_num_envs,
             self._renderer,
             undo,
-            creation.share.reservation,
+            creation.taken.reservation,
         )
 
     def _make_isolated(
@@ -233,7 +232,7 @@ class InstanceManager:
             instance = IsolatedInstance(config, settings, self._renderer)
             undo.callback(instance.kill, shutting_down())
             creation.kill = instance.kill
-        instance.create(creation.share.reservation)
+        instance.create(creation.taken.reservation)
         return instance
 
     def registered(self, search: str | None) -> list[dict]:
@@ -308,17 +307,28 @@ class InstanceManager:
             self._closing.pop(instance.instance_id, None)
             self._release(instance.instance_id)
 
-    def _close_and_log(self, instance: Instance) -> None:
-        try:
-            self._close(instance)
-        except GymServerError as error:
-            log.warning("Closing instance %s: %s", instance.instance_id, error)
+    def _close_in_background(
+        self, instance: Instance, then: Callable[[], None] = lambda: None
+    ) -> threading.Thread:
+        def close() -> None:
+            try:
+                self._close(instance)
+            except GymServerError as error:
+                log.warning("Closing instance %s: %s", instance.instance_id, error)
+            finally:
+                then()
+
+        closer = threading.Thread(target=close, daemon=True)
+        closer.start()
+        return closer
+
+    def _all(self) -> tuple[Instance, ...]:
+        with self._lock:
+            return tuple(self._instances.values())
 
     def list(self) -> list[dict]:
         """Return the list entries of all instances, the oldest first, without waiting for any."""
-        with self._lock:
-            instances = list(self._instances.values())
-        return [instance.list_entry() for instance in instances]
+        return [instance.list_entry() for instance in self._all()]
 
     def evict_overdue(
         self, seconds: float, answer_for: Callable[[int, GymServerError], None]
@@ -330,59 +340,40 @@ class InstanceManager:
             answer_for: answers for a thread that is stuck and cannot.
         """
         before = time.monotonic() - seconds
+
+        def answer(stuck: int, why: GymServerError) -> None:
+            answer_for(stuck, why)
+            # The thread has not gone on to other work: it waits until it was answered for.
+            interrupt(stuck)
+
         for creation, thread in self._creating.items():
             began = self._renderer.began(thread) or creation.began
             if began < before and self._creating.abandon(creation):
-                self._answer_creation(creation, thread, seconds, answer_for)
+                why = creation.too_long(seconds)
+                log.warning("%s", why.message)
+                if creation.kill is not None:
+                    creation.kill(why)
+                elif not self._renderer.abandon(thread, why):
+                    answer(thread, why)
+                self._creating.answered(creation)
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
         for instance in instances:
             since = instance.busy_since
             if since is not None and since < before:
-                self._evict(instance, seconds, answer_for)
+                what = f"A call on instance {instance.instance_id} of {instance.env_id}"
+                why = call_too_long(what, seconds, "the instance is gone")
+                log.warning("%s", why.message)
+                self._remove(instance.instance_id, why)
+                stuck = instance.abandon(why)
+                if stuck is not None:
+                    answer(stuck, why)
+                instance.lock.answered()
         # An instance that was evicted may hang once more while it is closed, on the render thread
         # and without being listed any more.
         why = call_too_long("Closing an environment", seconds, "the server leaves it alone")
         if self._renderer.abandon_if_began_before(before - seconds, why):
             log.warning("%s", why.message)
-
-    def _answer_creation(
-        self,
-        creation: _Creation,
-        thread: int,
-        seconds: float,
-        answer_for: Callable[[int, GymServerError], None],
-    ) -> None:
-        """See that the client of a creation that was abandoned gets an answer."""
-        why = creation.too_long(seconds)
-        log.warning("%s", why.message)
-        if creation.kill is not None:
-            creation.kill(why)
-        elif not self._renderer.abandon(thread, why):
-            answer_for(thread, why)
-            interrupt(thread)
-        self._creating.answered(creation)
-
-    def _evict(
-        self,
-        instance: Instance,
-        seconds: float,
-        answer_for: Callable[[int, GymServerError], None],
-    ) -> None:
-        """Evict an instance on which a call takes too long, and answer its client."""
-        why = call_too_long(
-            f"A call on instance {instance.instance_id} of {instance.env_id}",
-            seconds,
-            "the instance is gone",
-        )
-        log.warning("%s", why.message)
-        self._remove(instance.instance_id, why)
-        stuck = instance.abandon(why)
-        if stuck is not None:
-            answer_for(stuck, why)
-            # The thread has not gone on to other work: it waits until it was answered for.
-            interrupt(stuck)
-        instance.lock.answered()
 
     def _remove(self, instance_id: str, why: GymServerError) -> None:
         """Remove an instance that is not to be closed any more; keep the reason."""
@@ -406,9 +397,7 @@ class InstanceManager:
         self.account.measure()
         if not self.account.is_exceeded:
             return
-        with self._lock:
-            instances = list(self._instances.values())
-        sizes = {one: one.grown + self.account.of(one.pids) for one in instances}
+        sizes = {one: one.grown + self.account.of(one.pids) for one in self._all()}
         instance = max(sizes, key=sizes.__getitem__, default=None)
         playing = {pid: self.account.of([pid]) for pid in rollouts.pids()}
         largest = max(playing, key=playing.__getitem__, default=None)
@@ -422,21 +411,16 @@ class InstanceManager:
         if self._unlist(instance.instance_id, why) is not None:
             log.warning("%s", why.message)
             self._evicting.set()
-            threading.Thread(target=self._close_evicted, args=(instance,), daemon=True).start()
+            self._close_in_background(instance, self._note_evicted)
 
-    def _close_evicted(self, instance: Instance) -> None:
-        try:
-            self._close_and_log(instance)
-            memory.give_back()
-        finally:
-            self._evicting.clear()
+    def _note_evicted(self) -> None:
+        memory.give_back()
+        self._evicting.clear()
 
     def evict_idle(self, minutes: float) -> None:
         """Evict the instances that nobody has used or watched for so long, and close them."""
         now = time.monotonic()
-        with self._lock:
-            instances = list(self._instances.values())
-        for instance in instances:
+        for instance in self._all():
             lock = instance.lock
             if max(lock.used, lock.watched) > now - minutes * 60 or lock.busy_since is not None:
                 continue
@@ -446,14 +430,11 @@ class InstanceManager:
             why = idle_closed(instance.instance_id, instance.env_id, minutes)
             if self._unlist(instance.instance_id, why) is not None:
                 log.info("%s", why.message)
-                closer = threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
-                closer.start()
+                self._close_in_background(instance)
 
     def end_watching(self) -> None:
         """Answer all watchers with an error: the server is about to stop."""
-        with self._lock:
-            instances = list(self._instances.values())
-        for instance in instances:
+        for instance in self._all():
             instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
@@ -463,14 +444,8 @@ class InstanceManager:
             instances = list(self._instances.values())
             self._instances.clear()
         # At the same time: one that hangs must not keep the others from finishing their monitors.
-        threads = [
-            threading.Thread(target=self._close_and_log, args=(instance,), daemon=True)
-            for instance in instances
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        for closer in [self._close_in_background(instance) for instance in instances]:
+            closer.join()
         # After them: closing them leaves processes there.
         pool.end()
 

@@ -146,11 +146,15 @@ def _dumps_tensors(
     if final_obs is not None:
         tensors.update(final_obs.tensors)
         texts.update(final_obs.texts)
-    for name, of_scalar in _SCALARS.items():
-        value = others.get(name)
-        if value is not None:
-            is_array = isinstance(value, np.ndarray)
-            tensors[name] = Tensor.of(value) if is_array else of_scalar(value)
+    # Done is one of the two flags. With sub-environments they are arrays.
+    reward = others.get("reward")
+    if isinstance(reward, np.ndarray):
+        for name in ("reward", "terminated", "truncated"):
+            tensors[name] = Tensor.of(others[name])
+    elif reward is not None:
+        tensors["reward"] = Tensor("F64", (), struct.pack("<d", reward))
+        tensors["terminated"] = _FLAGS[others["terminated"]]
+        tensors["truncated"] = _FLAGS[others["truncated"]]
     metadata = [_metadata("info", others["info"])]
     if request_id is not None:
         metadata.append(_request_metadata(request_id))
@@ -179,14 +183,4 @@ def _request_beginning(key: str) -> bytes:
     return _metadata("request", {"key": key, "number": 0})[: -len(b'0}"')]
 
 
-def _flag(value: bool) -> Tensor:
-    return Tensor("BOOL", (), b"\1" if value else b"\0")
-
-
-# What an answer holds beside the observation; done is one of the two flags. With sub-environments
-# they are arrays already.
-_SCALARS = {
-    "reward": lambda value: Tensor("F64", (), struct.pack("<d", value)),
-    "terminated": _flag,
-    "truncated": _flag,
-}
+_FLAGS = {False: Tensor("BOOL", (), b"\0"), True: Tensor("BOOL", (), b"\1")}

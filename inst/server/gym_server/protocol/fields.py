@@ -119,12 +119,11 @@ _KEY = re.compile("[!-~]{1,64}")
 
 
 def _request_id(value: object) -> RequestId:
-    value = json_object(value)
-    key, number = text(value.get("key")), integer(value.get("number"))
+    key = value.get("key") if isinstance(value, dict) else None
     # It is echoed in a header, where nothing else may stand.
-    if _KEY.fullmatch(key) is None:
+    if not isinstance(value, dict) or not isinstance(key, str) or _KEY.fullmatch(key) is None:
         raise ValueError
-    return RequestId(key, number)
+    return RequestId(key, integer(value.get("number")))
 
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)

@@ -88,7 +88,7 @@ class Tensor(NamedTuple):
         return array.astype(_NATIVE[self.dtype])
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Parts:
     """A value in parts, as a space's members and its batches travel.
 

@@ -62,7 +62,10 @@ class InstanceLock:
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         self.used = time.monotonic()
-        self._release(error)
+        if self._held.finish(threading.get_ident()):
+            self._lock.release()
+        else:
+            self._come_back(error)
 
     def acquire(self, timeout: float) -> bool:
         """Take the lock only to look, which does not count as using the environment.
@@ -85,7 +88,10 @@ class InstanceLock:
 
     def release(self) -> None:
         """Release the lock after ``acquire()``."""
-        self._release(None)
+        if self._held.finish(threading.get_ident()):
+            self._lock.release()
+        else:
+            self._come_back(None)
 
     @property
     def busy_since(self) -> float | None:
@@ -129,18 +135,14 @@ class InstanceLock:
         """Return the bare lock, for what is done after the end."""
         return self._lock
 
-    def _release(self, error: object) -> None:
-        thread = threading.get_ident()
-        if self._held.finish(thread):
-            self._lock.release()
-            return
-        # The lock was taken away from this thread meanwhile, and the environment has to be closed,
-        # unless this thread only waited for the render thread. Then the error is the reason for
-        # abandoning it, which RenderThread.abandon() passes on, and the render thread is still in
-        # the environment, so nothing else may touch it.
+    def _come_back(self, error: object) -> None:
+        """End a thread's work from which the lock was taken away meanwhile."""
+        # The environment has to be closed, unless this thread only waited for the render thread.
+        # Then the error is the reason for abandoning it, which RenderThread.abandon() passes on,
+        # and the render thread is still in the environment, so nothing else may touch it.
         if error is not self.why:
             self._close_abandoned()
-        self._held.wait_until_answered(thread)
+        self._held.wait_until_answered(threading.get_ident())
         raise self.refusal()
 
     def _refuse(self) -> None:

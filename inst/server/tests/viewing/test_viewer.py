@@ -360,7 +360,7 @@ def test_one_that_is_held_up_holds_up_no_other_and_is_seen(app, client, create):
 
 @pytest.mark.parametrize(("fps", "expected"), [(50, 50), (None, 30), (0, 30), ("x", 30), (0.1, 30)])
 def test_a_speed_that_makes_no_sense_is_the_usual_one(fps, expected):
-    assert viewer.Viewer(None, fps).fps == expected
+    assert viewer.usable_fps(fps) == expected
 
 
 def test_being_watched_is_known_and_is_no_use_of_the_environment(client, create):
