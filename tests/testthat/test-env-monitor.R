@@ -44,7 +44,7 @@ test_that("resume goes on counting, force begins anew, neither is refused", {
   expect_equal(readLines(keep), "mine")
 })
 
-test_that("several environments record into one directory, each into its own files", {
+test_that("several environments that name one directory each have one of their own", {
   directory <- withr::local_tempdir()
   envs <- list(local_env(seed = 1), local_env(seed = 2), local_env(seed = 3))
   for (env in envs) {
@@ -52,10 +52,11 @@ test_that("several environments record into one directory, each into its own fil
   }
   lengths <- lapply(envs, play_episodes, episodes = 2)
   ids <- vapply(envs, function(env) env$instance_id, "")
-  tables <- file.path(directory, c("episodes.csv", sprintf("episodes-%s.csv", ids[-1])))
+  tables <- file.path(c(directory, file.path(directory, ids[-1])), "episodes.csv")
   recorded <- lapply(tables, function(table) read.csv(table)$length)
   expect_equal(recorded, lengths)
-  expect_setequal(list.files(directory, "^episodes.*csv$"), basename(tables))
+  found <- list.files(directory, "^episodes[.]csv$", recursive = TRUE, full.names = TRUE)
+  expect_setequal(found, tables)
 })
 
 test_that("closing a monitor twice, or none, is no error", {

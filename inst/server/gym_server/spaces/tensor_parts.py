@@ -105,7 +105,9 @@ def _put_together(space: Space, name: str, path: Path) -> PutTogether:
     """Return what puts a value together, which a path leads to inside of the whole value."""
 
     def refuse(parts: Parts, rows: Rows) -> object:
-        raise NotInSpace(space, name, "its members travel as JSON")
+        refusal = NotInSpace(space, name, "its members travel as JSON")
+        refusal.path[:] = path
+        raise refusal
 
     return refuse
 
