@@ -156,13 +156,13 @@ def _(space: Any, name: str, path: Path) -> PutTogether:
 @_put_together.register
 def _(space: Discrete, name: str, path: Path) -> PutTogether:
     of_wide = _array_together(space, name, wide_dtype(space), path)
-    # R has only 32 bit integers.
+    # R has only 32 bit integers, and sends a batch as such.
     of_short = _array_together(space, name, np.dtype(np.int32), path)
     may_be_short = wide_dtype(space) == np.int64
 
     def put_together(parts: Parts, rows: Rows) -> object:
-        sent = parts.tensors.get(name)
-        is_short = may_be_short and sent is not None and sent.dtype == "I32"
+        sent = parts.tensors.get(name) if may_be_short and rows.number is not None else None
+        is_short = sent is not None and sent.dtype == "I32"
         array = (of_short if is_short else of_wide)(parts, rows)
         return array.astype(space.dtype, copy=False)[()]
 
