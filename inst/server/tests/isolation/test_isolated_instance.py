@@ -200,7 +200,8 @@ def test_monitors_write_and_are_refused_as_ever(servers):
         assert server.post(monitor, {"directory": "here"})[0] == 204
         assert server.post(monitor, {"directory": "there"})[1]["code"] == "monitor_active"
         assert server.post(f"{other}/monitor/start/", {"directory": "here"})[0] == 204
-        assert server.get(f"{other}/")[1]["monitor"]["table"] == f"episodes-{other[-8:]}.csv"
+        own = str(server.directory / "here" / other[-8:])
+        assert server.get(f"{other}/")[1]["monitor"]["directory"] == own
         assert server.post(f"{other}/monitor/close/")[0] == 204
         server.post(f"{url}/reset/", {"seed": 1})
         while not server.post(f"{url}/step/", {"action": 1})[1]["done"]:

@@ -246,7 +246,7 @@ def test_resuming_goes_on_counting_time_after_time(client, create, monitor_dir):
         client.post(f"{url}/reset/")
         client.post(f"{url}/close/")
     assert [row[0] for row in rows(monitor_dir / "run")] == ["episode", "0", "1", "3"]
-    assert videos(monitor_dir / "run") == [f"rl-video-episode-{n}.mp4" for n in (0, 2)]
+    assert videos(monitor_dir / "run") == [f"rl-video-episode-{n}.mp4" for n in (0, 2, 4)]
 
 
 def test_videos_need_an_environment_that_draws(client, faulty, monitor_dir):
