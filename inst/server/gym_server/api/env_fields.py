@@ -61,30 +61,35 @@ def _positive(value: object) -> int:
     return number
 
 
-def _seed(value: object) -> int | tuple[int | None, ...]:
+def _seed(value: object) -> object:
+    return _seeds(
+        value,
+        _own_seed,
+        "an integer, 0 or greater, or a list of one, or null, for each sub-environment",
+    )
+
+
+def _reset_seed(value: object) -> object:
+    if not isinstance(value, list) or not any(isinstance(item, list) for item in value):
+        return _seed(value)
+    return _seeds(
+        value,
+        lambda item: _later_seeds(item) if isinstance(item, list) else _own_seed(item),
+        "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
+        "sub-environment",
+    )
+
+
+def _seeds(value: object, parse: Callable[[object], object], wanted: str) -> object:
     if not isinstance(value, list):
         return _one_seed(value)
     try:
-        return tuple(None if seed is None else _one_seed(seed) for seed in value)
+        return tuple(map(parse, value))
     except ValueError:
-        wanted = "an integer, 0 or greater, or a list of one, or null, for each sub-environment"
         raise invalid_parameter("seed", value, wanted) from None
 
 
-def _reset_seed(value: object) -> int | tuple[int | tuple[int, ...] | None, ...]:
-    if not isinstance(value, list) or not any(isinstance(item, list) for item in value):
-        return _seed(value)
-    try:
-        return tuple(_later_seeds(item) if isinstance(item, list) else _own(item) for item in value)
-    except ValueError:
-        wanted = (
-            "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
-            "sub-environment"
-        )
-        raise invalid_parameter("seed", value, wanted) from None
-
-
-def _own(value: object) -> int | None:
+def _own_seed(value: object) -> int | None:
     return None if value is None else _one_seed(value)
 
 
@@ -164,40 +169,17 @@ VIDEO_CALLABLE = Kind(
     _video_callable,
 )
 POSITIVE = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _positive)
-SEED = Kind(
-    {
-        "oneOf": [
-            {"type": ["integer", "boolean"], "minimum": 0},
-            {
-                "type": "array",
-                "items": {"type": ["integer", "boolean", "null"], "minimum": 0},
-                "minItems": 1,
-            },
-        ]
-    },
-    "an integer, 0 or greater",
-    _seed,
-)
+_ONE_SEED = {"type": ["integer", "boolean"], "minimum": 0}
+_OWN_SEED = {"type": ["integer", "boolean", "null"], "minimum": 0}
+
+
+def _list_of(items: dict) -> dict:
+    return {"type": "array", "items": items, "minItems": 1}
+
+
+SEED = Kind({"oneOf": [_ONE_SEED, _list_of(_OWN_SEED)]}, "an integer, 0 or greater", _seed)
 RESET_SEED = Kind(
-    {
-        "oneOf": [
-            {"type": ["integer", "boolean"], "minimum": 0},
-            {
-                "type": "array",
-                "items": {
-                    "oneOf": [
-                        {"type": ["integer", "boolean", "null"], "minimum": 0},
-                        {
-                            "type": "array",
-                            "items": {"type": ["integer", "boolean"], "minimum": 0},
-                            "minItems": 1,
-                        },
-                    ]
-                },
-                "minItems": 1,
-            },
-        ]
-    },
+    {"oneOf": [_ONE_SEED, _list_of({"oneOf": [_OWN_SEED, _list_of(_ONE_SEED)]})]},
     "an integer, 0 or greater",
     _reset_seed,
 )
