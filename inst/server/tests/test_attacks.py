@@ -240,7 +240,7 @@ def test_a_link_that_comes_and_goes_leads_nowhere(attacked, ask, made, tmp_path)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_many_who_want_one_directory_get_files_of_their_own(attacked, ask, made):
+def test_many_who_want_one_directory_get_one_of_their_own_each(attacked, ask, made):
     urls = [made() for _ in range(6)]
     statuses = []
 
@@ -254,9 +254,10 @@ def test_many_who_want_one_directory_get_files_of_their_own(attacked, ask, made)
     for thread in threads:
         thread.join()
     assert statuses == 6 * [204]
-    tables = {ask("GET", f"{url}/")[1]["monitor"]["table"] for url in urls}
-    assert len(tables) == 6
-    assert tables == {path.name for path in (attacked.root / "runs" / "wanted").glob("*.csv")}
+    directories = {ask("GET", f"{url}/")[1]["monitor"]["directory"] for url in urls}
+    assert len(directories) == 6
+    tables = (attacked.root / "runs" / "wanted").rglob("episodes.csv")
+    assert directories == {str(path.parent) for path in tables}
 
 
 # Searching, depth ----------------------------------------------------------------------------

@@ -276,7 +276,9 @@ def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
 def _empty_those_of_gone_monitors(path: Path) -> None:
     for one in own_directories(path):
         other = MonitorDirectory(one)
-        if other.take():
+        # A monitor that is just starting has locked its table before it writes into it.
+        has_begun = (one / TABLE).exists() and (one / TABLE).stat().st_size > 0
+        if has_begun and other.take():
             other.empty()
 
 

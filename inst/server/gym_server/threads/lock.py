@@ -1,4 +1,4 @@
-"""The lock of an instance: one thread at a time moves the environment, or looks at it."""
+"""The lock of an instance: one thread at a time resets or steps the environment, or looks at it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from gym_server.threads.in_progress import InProgress
 
 
 class InstanceLock:
-    """A lock that can be taken away from a thread that is stuck; a context for moves.
+    """A lock that can be taken away from a thread that is stuck; a context for resets and steps.
 
     Attributes:
         closed: whether the environment is gone.
         why: why the server closed it; None while it is open, or where its owner closed it.
-        used: when the environment was last moved, in the clock's seconds.
+        used: when the environment was last reset or stepped, in the clock's seconds.
         watched: when somebody was last found to watch it, in the clock's seconds.
     """
 
@@ -49,7 +49,7 @@ class InstanceLock:
         self.watched = 0.0
 
     def __enter__(self) -> None:
-        """Wait for the lock, to move the environment.
+        """Wait for the lock, to reset or step the environment.
 
         Raises:
             GymServerError: when the environment was closed meanwhile, see ``refusal()``.
