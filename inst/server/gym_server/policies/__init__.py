@@ -4,7 +4,7 @@ They act as the policies of the R package do (``R/policy-*.R``): the same action
 bits of sums, which NumPy adds in another order.
 """
 
-from gym_server.policies.acting import Actor, GroupActor, Policy
+from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.read import read_policy
 
-__all__ = ["Actor", "GroupActor", "Policy", "read_policy"]
+__all__ = ["Actor", "Policy", "read_policy"]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -76,30 +75,21 @@ def in_place(name: str, x: np.ndarray) -> Steps:
     return _STEPS[name](x)
 
 
-def above_middle(name: str) -> Callable[[float], bool]:
-    """Return whether the sum of an only output neuron stands for the second of two actions.
+def of_number(name: str, x: float) -> float:
+    """Return the output for the sum of a single neuron, or a number as far from the middle.
 
-    It does where the output is above the middle of its range; without a range above 0. Exactly
-    the middle is the first action, also where rounding makes it the middle.
+    Of one number Python's floats take a tenth of the time of NumPy's arrays.
     """
-    return {"logistic": _logistic_above_half, "Gompertz": _gompertz_above_half}.get(
-        name, _above_zero
-    )
+    if name == "logistic":
+        return 1.0 / (1.0 + math.exp(min(-x, 700.0)))
+    # Below 0.066 for a number below -1, far below the middle, and no exp() overflows.
+    return math.exp(-math.exp(min(-x, 1.0))) if name == "Gompertz" else x
 
 
-def _above_zero(x: float) -> bool:
-    return x > 0.0
+def middle(name: str) -> float:
+    """Return what a single output must exceed to stand for the second of two actions.
 
-
-def _logistic_above_half(x: float) -> bool:
-    return x > 0.0 and 1.0 / (1.0 + math.exp(-x)) > 0.5
-
-
-def _gompertz_above_half(x: float) -> bool:
-    # exp(-exp(1)) is below one half; a number far below 0 would overflow.
-    return x > -1.0 and math.exp(-math.exp(-x)) > 0.5
-
-
-def rows_above_middle(name: str, outputs: Any) -> Any:
-    """Return ``above_middle()`` of many outputs, which have been through the activation."""
-    return outputs > (0.5 if name in ("logistic", "Gompertz") else 0.0)
+    It is the middle of the output's range, 0 where it has no range. Exactly the middle is the first
+    action, also where rounding makes it the middle.
+    """
+    return 0.5 if name in ("logistic", "Gompertz") else 0.0

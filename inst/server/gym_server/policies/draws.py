@@ -7,6 +7,7 @@ a policy must not repeat its numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,34 +16,6 @@ from numpy.random import PCG64, Generator, SeedSequence
 # To draw one number takes as long as to draw thirty; many episodes end before they need more.
 _FIRST = 16
 _MOST = 512
-
-
-def _seed_sequence(seed: int) -> SeedSequence:
-    # Of a list NumPy makes such an array, which takes twice as long.
-    return SeedSequence(np.array([seed, 1], np.uint32) if seed < 2**32 else [seed, 1])
-
-
-class EpisodeGenerator:
-    """The generator of an episode, made when it is first asked for: to make one takes 15 us."""
-
-    def __init__(self) -> None:
-        self._seed = 0
-        self._generator: Generator | None = None
-
-    def begin(self, seed: int) -> None:
-        """Forget the generator; the next one is made from this seed."""
-        self._seed = seed
-        self._generator = None
-
-    def get(self) -> Generator:
-        """Return the generator of the episode."""
-        if self._generator is None:
-            self._generator = Generator(PCG64(_seed_sequence(self._seed)))
-        return self._generator
-
-    def uniforms(self, *shape: int) -> np.ndarray:
-        """Draw numbers from 0 to 1."""
-        return self.get().random(shape)
 
 
 class Draws:
@@ -64,7 +37,9 @@ class Draws:
         """
         self._block = block
         self._most = most
-        self._source = EpisodeGenerator()
+        self._seed = 0
+        # Made when it is first needed: to make one takes 15 us.
+        self._generator: Generator | None = None
         self._size = 0
         # Those drawn ahead, the next one last.
         self._rest: list[Any] = []
@@ -72,13 +47,13 @@ class Draws:
 
     def begin(self, seed: int) -> None:
         """Forget what was drawn ahead, and draw from this seed."""
-        self._source.begin(seed)
+        self._seed = seed
+        self._generator = None
         self._rest.clear()
         self._size = min(_FIRST, self._most)
 
     def _taker(self) -> Callable[..., Any]:
-        pop = self._rest.pop
-        fill = self._fill
+        pop, fill = self._rest.pop, self._fill
 
         def take(_observation: object = None) -> Any:
             try:
@@ -90,10 +65,28 @@ class Draws:
         return take
 
     def _fill(self) -> None:
-        self._rest.extend(reversed(self._block(self._source.get(), self._size)))
+        if self._generator is None:
+            self._generator = Generator(PCG64(_seed_sequence(self._seed)))
+        self._rest.extend(reversed(self._block(self._generator, self._size)))
         self._size = min(2 * self._size, self._most)
 
 
-def uniforms() -> Draws:
-    """Return draws of numbers from 0 to 1, uniformly."""
-    return Draws(lambda generator, n: generator.random(n).tolist())
+def _seed_sequence(seed: int) -> SeedSequence:
+    # Of a list NumPy makes such an array, which takes twice as long.
+    return SeedSequence(np.array([seed, 1], np.uint32) if seed < 2**32 else [seed, 1])
+
+
+def uniforms(*shape: int) -> Draws:
+    """Return draws of numbers from 0 to 1, or of arrays of them."""
+    if not shape:
+        return Draws(lambda generator, n: generator.random(n).tolist())
+    return Draws(lambda generator, n: list(generator.random((n, *shape))), _most_of(shape))
+
+
+def normals(*shape: int) -> Draws:
+    """Return draws of arrays of standard normal numbers."""
+    return Draws(lambda generator, n: list(generator.standard_normal((n, *shape))), _most_of(shape))
+
+
+def _most_of(shape: tuple[int, ...]) -> int:
+    return max(1, _MOST * 8 // prod(shape))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,28 +23,34 @@ def check_fields(document: Mapping, tensors: Mapping[str, np.ndarray], *known: s
                 )
 
 
-def number(
-    document: Mapping, name: str, default: float | None, low: float, high: float, wanted: str
-) -> float | None:
-    """Return a field that is a number from ``low`` to ``high``."""
+def field(document: Mapping, name: str, fits: Callable[[Any], bool], wanted: str) -> Any:
+    """Return a field, None where it is absent and that fits."""
     value = document.get(name)
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+    if not fits(value):
         raise invalid_policy(f"The policy's {name} must be {wanted}, not {brief(value)}")
-    return float(value)
+    return value
 
 
-def epsilon_of(document: Mapping, default: float | None) -> float | None:
+def number(document: Mapping, name: str, low: float, high: float, wanted: str) -> float | None:
+    """Return a field that is a number from ``low`` to ``high``, None where it is absent."""
+
+    def fits(value: object) -> bool:
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return value is None or (is_number and low <= value <= high)  # type: ignore[operator]
+
+    value = field(document, name, fits, wanted)
+    return None if value is None else float(value)
+
+
+def epsilon_of(document: Mapping) -> float | None:
     """Return how often a policy explores."""
-    return number(document, "epsilon", default, 0, 1, "a number from 0 to 1")
+    return number(document, "epsilon", 0, 1, "a number from 0 to 1")
 
 
 def temperature_of(document: Mapping) -> float | None:
     """Return the temperature of the softmax; None for no softmax."""
-    above_zero = math.nextafter(0, 1)
-    largest = math.nextafter(math.inf, 0)
-    return number(document, "temperature", None, above_zero, largest, "a number above 0")
+    above_zero, largest = math.nextafter(0, 1), math.nextafter(math.inf, 0)
+    return number(document, "temperature", above_zero, largest, "a number above 0")
 
 
 def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
@@ -56,13 +63,33 @@ def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
     return tensor.astype(np.float64)
 
 
-def finite_numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return a tensor that the policy must have, without infinities and NaN."""
+def finite_numbers(
+    tensors: Mapping[str, np.ndarray], name: str, shapes: list[tuple[int | None, ...]], wanted: str
+) -> np.ndarray:
+    """Return a tensor that the policy must have, of one of some shapes, without Inf and NaN.
+
+    Args:
+        tensors: all of them.
+        name: its name.
+        shapes: a length of None stands for any from 1.
+        wanted: the shapes in words.
+    """
     tensor = numbers(tensors, name)
+    if not any(_matches(tensor.shape, shape) for shape in shapes):
+        raise invalid_policy(
+            f"The policy's {name} must be {wanted}, not {shape_text(tensor.shape)}"
+        )
     if not np.isfinite(tensor).all():
         wrong = float(tensor[~np.isfinite(tensor)][0])
         raise invalid_policy(f"The policy's {name} must be finite numbers, not {brief(wrong)}")
     return tensor
+
+
+def _matches(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(wanted) and all(
+        found > 0 if length is None else found == length
+        for found, length in zip(shape, wanted, strict=True)
+    )
 
 
 def shape_text(shape: tuple[int, ...]) -> str:

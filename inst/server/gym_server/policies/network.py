@@ -2,142 +2,99 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
 
-from gym_server.policies import inputs, outputs
-from gym_server.policies.acting import Actor, GroupActor, Policy
-from gym_server.policies.activation import Steps, in_place
-from gym_server.policies.draws import Draws, uniforms
-from gym_server.policies.memo import remembered
-from gym_server.policies.network_group import network_group
+from gym_server.policies.acting import Actor, Policy
+from gym_server.policies.activation import of_number
+from gym_server.policies.box import box_actions
+from gym_server.policies.discrete import DiscreteChoice, not_a_number
+from gym_server.policies.draws import normals
+from gym_server.policies.layers import Forward, forward
 from gym_server.policies.network_plan import NetworkPlan
 
 
+@dataclass(frozen=True)
 class NetworkPolicy(Policy):
-    """Candidates that are networks of the same sizes, with different weights."""
+    """Candidates that are networks of the same sizes, with different weights.
 
-    def __init__(
-        self,
-        plan: NetworkPlan,
-        weights: np.ndarray,
-        observation_space: Box | Discrete,
-        action_space: Box | Discrete,
-    ) -> None:
-        """Keep the networks.
+    Attributes:
+        plan: what they have in common.
+        weights: float64[candidates, weights], in the order of R's ``coef()``: layer after layer,
+            each matrix column after column.
+        deviation: float64[candidates, outputs], the standard deviations of the output "gaussian";
+            otherwise None.
+    """
 
-        Args:
-            plan: what they have in common.
-            weights: float64[candidates, weights], in the order of R's ``coef()``: layer after
-                layer, each matrix column after column.
-            observation_space: what comes in.
-            action_space: what goes out.
-        """
-        self.candidates = len(weights)
-        self._plan = plan
-        self._weights = weights
-        self._observation_space = observation_space
-        self._action_space = action_space
-
-    def actor(self, candidate: int) -> Actor:
-        """Return an actor whose arrays are laid out once, and computed in place."""
-        read, steps, signal = self._forward(self._matrices(candidate))
-        draws = self._draws()
-        choose = self._chooser(candidate, signal, draws)
-
-        def act(observation: Any) -> Any:
-            read(observation)
-            for step in steps:
-                step()
-            return choose()
-
-        if draws is not None:
-            return Actor(act, draws)
-        can_be_counted = isinstance(self._observation_space, Discrete)
-        # An array may be changed by whom it is given to.
-        if can_be_counted and isinstance(self._action_space, Discrete):
-            return Actor(remembered(act))
-        return Actor(act)
-
-    def group_actor(self, candidates: np.ndarray, num_envs: int) -> GroupActor:
-        """Return an actor for groups."""
-        return network_group(
-            self._plan,
-            self._weights[candidates],
-            candidates,
-            self._observation_space,
-            self._action_space,
-        )
-
-    def _matrices(self, candidate: int) -> list[np.ndarray]:
-        pieces = np.split(self._weights[candidate], self._plan.ends[:-1])
-        return [
-            np.ascontiguousarray(piece.reshape(shape, order="F"))
-            for piece, shape in zip(pieces, self._plan.shapes, strict=True)
-        ]
-
-    def _forward(self, matrices: list[np.ndarray]) -> tuple[Any, Steps, np.ndarray]:
-        """Return what reads an observation, the steps that follow, and where they leave outputs."""
-        plan, space = self._plan, self._observation_space
-        width = plan.sizes[0]
-        source = inputs.with_bias(width, bias=plan.bias)
-        read: Any = None
-        steps: Steps = []
-        if isinstance(space, Box):
-            read = inputs.box_reader(space, source[:width])
-            steps += inputs.normalizing(source[:width], plan.moments)
-        for layer, (matrix, activation) in enumerate(zip(matrices, plan.activation, strict=True)):
-            is_last = layer == len(matrices) - 1
-            target = inputs.with_bias(len(matrix), bias=plan.bias and not is_last)
-            sums = target[: len(matrix)]
-            if isinstance(space, Discrete) and layer == 0:
-                read = inputs.column_reader(space, _columns(matrix, plan.bias), sums)
-            else:
-                steps.append(partial(matrix.dot, source, sums))
-            if not (is_last and self._is_single):
-                steps += in_place(activation, sums)
-            source = target
-        return read, steps, source
+    plan: NetworkPlan
+    weights: np.ndarray
+    deviation: np.ndarray | None
 
     @property
-    def _is_single(self) -> bool:
-        """Whether a single output chooses between two actions."""
-        return self._plan.is_single(self._action_space)
+    def candidates(self) -> int:
+        """How many there are."""
+        return len(self.weights)
 
-    def _draws(self) -> Draws | None:
-        if self._plan.output == "greedy":
-            return None
-        if self._plan.output == "gaussian":
-            width = self._plan.sizes[-1]
-            return Draws(lambda generator, n: list(generator.standard_normal((n, width))))
-        return uniforms()
-
-    def _chooser(self, candidate: int, signal: np.ndarray, draws: Draws | None) -> outputs.Choose:
-        plan, space = self._plan, self._action_space
-        if isinstance(space, Box):
-            if draws is None:
-                return outputs.box(space, signal, plan.stretched_from)
-            assert plan.deviation is not None
-            choose = outputs.box(space, signal, None)
-            return outputs.noisy(signal, plan.deviation[candidate], draws, choose)
-        members = outputs.members_of(space)
-        if plan.output == "softmax":
-            assert draws is not None
-            return outputs.softmax(signal, members, draws)
-        index = (
-            outputs.index_above_middle(signal, plan.activation[-1])
-            if self._is_single
-            else outputs.index_of_largest(signal)
+    def actor(self, candidate: int | np.ndarray) -> Actor:
+        """Return an actor; see ``Policy.actor()``."""
+        plan = self.plan
+        outputs = forward(plan, self.weights, candidate)
+        if isinstance(plan.action_space, Box):
+            return self._box_actor(plan.action_space, outputs, candidate)
+        choice = DiscreteChoice(
+            plan.action_space,
+            epsilon=(plan.epsilon or 0.0) if plan.output == "epsilon-greedy" else 0.0,
+            temperature=1.0 if plan.output == "softmax" else None,
         )
-        if draws is None:
-            return outputs.greedy(index, members)
-        return outputs.exploring(index, members, plan.epsilon, draws)
+        if isinstance(candidate, int):
+            values_of = self._floats(outputs)
+            return choice.actor(values_of, isinstance(plan.observation_space, Discrete))
+        return choice.rows_actor(_checked(outputs), len(candidate))
+
+    def _floats(self, outputs: Forward) -> Callable[[Any], list[float]]:
+        chooses_by_one = self.plan.sizes[-1] < self.plan.num_values
+        name = self.plan.activation[-1]
+
+        def values_of(observation: Any) -> list[float]:
+            values: list[float] = outputs(observation).tolist()
+            total = sum(values)
+            # The sum tells in one call whether to look closer: Inf - Inf is not a number, either.
+            if total != total and any(value != value for value in values):
+                raise not_a_number()
+            if chooses_by_one:
+                values[1] = of_number(name, values[1])
+            return values
+
+        return values_of
+
+    def _box_actor(self, space: Box, outputs: Forward, candidate: int | np.ndarray) -> Actor:
+        rows = None if isinstance(candidate, int) else len(candidate)
+        choose = box_actions(space, self.plan.stretched_from, rows)
+        if self.deviation is None:
+            return Actor(lambda observation: choose(outputs(observation).T))
+        deviation = self.deviation[candidate]
+        draws = normals(*deviation.shape)
+        take = draws.take
+
+        def act(observation: Any) -> Any:
+            noise = take()
+            noise *= deviation
+            noise += outputs(observation).T
+            return choose(noise)
+
+        return Actor(act, draws)
 
 
-def _columns(matrix: np.ndarray, bias: bool) -> np.ndarray:
-    """Return the sums of the first layer for each discrete observation, in rows."""
-    columns = np.ascontiguousarray(matrix.T)
-    return columns[:-1] + columns[-1] if bias else columns
+def _checked(outputs: Forward) -> Forward:
+    def values_of(observation: Any) -> np.ndarray:
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = outputs(observation)
+        if np.isnan(values).any():
+            raise not_a_number()
+        return values
+
+    return values_of

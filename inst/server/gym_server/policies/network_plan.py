@@ -8,10 +8,9 @@ from itertools import accumulate
 from math import prod
 
 import numpy as np
-from gymnasium.spaces import Discrete, Space
+from gymnasium.spaces import Box, Discrete
 
 from gym_server.policies.activation import HAVE_RANGE
-from gym_server.policies.inputs import Moments
 
 
 @dataclass(frozen=True)
@@ -19,23 +18,26 @@ class NetworkPlan:
     """All of a network but its weights.
 
     Attributes:
+        observation_space: what comes in.
+        action_space: what goes out.
         sizes: how many inputs, neurons of each hidden layer, and outputs there are.
         activation: the activation of each layer after the inputs.
         bias: whether each neuron has a bias, the last column of its layer's matrix.
-        moments: what inputs are normalised by; None where they come in as they are.
         output: "greedy", "softmax", "gaussian" or "epsilon-greedy".
-        epsilon: how often "epsilon-greedy" explores.
-        deviation: float64[candidates, outputs], the standard deviations of "gaussian"; otherwise
-            None.
+        epsilon: how often "epsilon-greedy" explores; None where it was not given.
+        mean, scale: float64[inputs], by which inputs are normalised: ``(x - mean) * scale``; None
+            where they come in as they are.
     """
 
+    observation_space: Box | Discrete
+    action_space: Box | Discrete
     sizes: tuple[int, ...]
     activation: tuple[str, ...]
-    bias: bool = False
-    moments: Moments | None = None
-    output: str = "greedy"
-    epsilon: float = 0.0
-    deviation: np.ndarray | None = None
+    bias: bool
+    output: str
+    epsilon: float | None
+    mean: np.ndarray | None = None
+    scale: np.ndarray | None = None
 
     @cached_property
     def shapes(self) -> list[tuple[int, int]]:
@@ -51,6 +53,12 @@ class NetworkPlan:
         return list(accumulate(prod(shape) for shape in self.shapes))
 
     @property
+    def num_values(self) -> int:
+        """How many values an action is chosen by: also a single output chooses between two."""
+        space = self.action_space
+        return int(space.n) if isinstance(space, Discrete) else self.sizes[-1]
+
+    @property
     def stretched_from(self) -> str | None:
         """The activation whose range is stretched to the bounds of a Box; None where it has none.
 
@@ -58,9 +66,3 @@ class NetworkPlan:
         """
         last = self.activation[-1]
         return last if last in HAVE_RANGE and self.output == "greedy" else None
-
-    def is_single(self, action_space: Space) -> bool:
-        """Tell whether a single output chooses between two actions."""
-        return (
-            self.sizes[-1] == 1 and isinstance(action_space, Discrete) and int(action_space.n) == 2
-        )

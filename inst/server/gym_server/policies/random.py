@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,29 +14,30 @@ from numpy.random import Generator
 
 from gym_server.errors import invalid_policy
 from gym_server.json_values import brief
-from gym_server.policies.acting import Actor, GroupActor, Policy
+from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.draws import Draws
 from gym_server.policies.fields import check_fields
 from gym_server.spaces import brief_space
 
 
+@dataclass(frozen=True)
 class RandomPolicy(Policy):
     """Draws each action from a space."""
 
-    candidates = None
+    space: Space
 
-    def __init__(self, action_space: Space) -> None:
-        self._space = action_space
+    @property
+    def candidates(self) -> None:
+        """Any number of them acts alike."""
 
-    def actor(self, candidate: int) -> Actor:
-        """Return an actor that draws from a generator of its own."""
-        draws = _draws(copy.deepcopy(self._space))
+    def actor(self, candidate: int | np.ndarray) -> Actor:
+        """Return an actor that draws for itself, for a group all rows at once."""
+        space = copy.deepcopy(self.space)
+        if isinstance(candidate, int):
+            draws = _draws(space)
+        else:
+            draws = _one_by_one(batch_space(space, len(candidate)))
         return Actor(draws.take, draws)
-
-    def group_actor(self, candidates: np.ndarray, num_envs: int) -> GroupActor:
-        """Return an actor that draws the actions of all rows at once, whoever plays them."""
-        draws = _one_by_one(copy.deepcopy(batch_space(self._space, num_envs)))
-        return GroupActor(draws.take, draws)
 
 
 def read_random(
@@ -57,15 +59,16 @@ def _narrower(own: object, action_space: Space) -> Discrete:
             f"{brief_space(action_space)}",
             "leave its action_space out",
         )
-    if not isinstance(own, Mapping) or not own.keys() <= {"n", "start"}:
+    parts = own if isinstance(own, Mapping) and own.keys() <= {"n", "start"} else {}
+    n, start, first = parts.get("n"), parts.get("start", 0), int(action_space.start)
+    if (
+        type(n) is not int
+        or type(start) is not int
+        or not (first <= start < start + n <= first + int(action_space.n))
+    ):
         raise invalid_policy(
-            f'The policy\'s action_space must be {{"n", "start"}}, not {brief(own)}'
-        )
-    n, start = own.get("n"), own.get("start", 0)
-    if type(n) is not int or type(start) is not int or n < 1 or not _within(n, start, action_space):
-        raise invalid_policy(
-            f"The policy's actions are {brief(own)}, but the environment takes "
-            f"{brief_space(action_space)}"
+            f'The policy\'s action_space must be {{"n", "start"}}, within the environment\'s '
+            f"{brief_space(action_space)}, not {brief(own)}"
         )
     # A copy and not a new one: only newer versions of Gymnasium have a dtype.
     narrower = copy.deepcopy(action_space)
@@ -74,36 +77,24 @@ def _narrower(own: object, action_space: Space) -> Discrete:
     return narrower
 
 
-def _within(n: int, start: int, outer: Discrete) -> bool:
-    first = int(outer.start)
-    return start >= first and start + n <= first + int(outer.n)
-
-
 def _draws(space: Space) -> Draws:
     # Only these kinds: of numbers below 32 bits Gymnasium draws several at once from one of 32.
     if type(space) is Discrete and space.dtype.itemsize >= 4:
-        return Draws(_discrete_block(space))
+        n, start, kind = space.n, space.start, space.dtype.type
+        return Draws(lambda rng, size: list(start + rng.integers(n, size=size, dtype=kind)))
     # A block of single numbers falls apart into scalars, and not into arrays without axes.
     if type(space) is Box and space.shape and space.dtype.kind == "f" and _has_finite_range(space):
-        return Draws(_box_block(space), most=max(1, min(256, 4096 // max(1, space.low.size))))
+        low, high, shape, dtype = space.low, space.high, space.shape, space.dtype
+        return Draws(
+            lambda rng, size: list(rng.uniform(low, high, (size, *shape)).astype(dtype)),
+            most=max(1, min(256, 4096 // max(1, low.size))),
+        )
     return _one_by_one(space)
-
-
-def _discrete_block(space: Discrete) -> Callable[[Generator, int], list[Any]]:
-    n, start, dtype = space.n, space.start, space.dtype.type
-    return lambda generator, size: list(start + generator.integers(n, size=size, dtype=dtype))
 
 
 def _has_finite_range(space: Box) -> bool:
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(space.high - space.low).all())
-
-
-def _box_block(space: Box) -> Callable[[Generator, int], list[Any]]:
-    low, high, dtype = space.low, space.high, space.dtype
-    return lambda generator, size: list(
-        generator.uniform(low, high, (size, *space.shape)).astype(dtype)
-    )
 
 
 def _one_by_one(space: Space) -> Draws:

@@ -1,16 +1,17 @@
-"""Read a policy of any kind."""
+"""Read a policy of any kind, or a list of them, each of which is a candidate."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Space
 
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
-from gym_server.policies.acting import Policy
-from gym_server.policies.candidates import PolicyList
+from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.fields import check_fields, count_of
 from gym_server.policies.random import read_random
 from gym_server.policies.read_network import read_network
@@ -52,9 +53,24 @@ def read_policy(
             f"The policy has {total:,} numbers, and at most {_MOST_NUMBERS:,} are possible",
             "ask for fewer candidates at a time",
         )
-    if isinstance(document, Mapping) and document.get("kind") == "list":
-        return _read_list(document, tensors, observation_space, action_space)
-    return _read_one(document, tensors, observation_space, action_space)
+    if not isinstance(document, Mapping) or document.get("kind") != "list":
+        return _read_one(document, tensors, observation_space, action_space)
+    documents = document.get("policies")
+    if not isinstance(documents, list) or not 1 <= len(documents) <= _MOST_POLICIES:
+        found = count_of(len(documents), "policy") if isinstance(documents, list) else documents
+        raise invalid_policy(
+            f"The policies of a list must be from 1 to {_MOST_POLICIES:,}, not {brief(found)}"
+        )
+    check_fields(document, {}, "policies")
+    policies = []
+    for index, own in enumerate(zip(documents, _by_policy(tensors, len(documents)), strict=True)):
+        try:
+            policies.append(_read_candidate(*own, observation_space, action_space))
+        except GymServerError as error:
+            raise GymServerError(
+                error.code, f"Policy {index + 1} of the list: {error.message}", error.hint
+            ) from None
+    return PolicyList(policies)
 
 
 def _read_one(
@@ -73,26 +89,13 @@ def _read_one(
     return _READERS[kind](document, tensors, observation_space, action_space)
 
 
-def _read_list(
-    document: Mapping,
-    tensors: Mapping[str, np.ndarray],
-    observation_space: Space,
-    action_space: Space,
-) -> PolicyList:
-    documents = document.get("policies")
-    if not isinstance(documents, list) or not 1 <= len(documents) <= _MOST_POLICIES:
-        found = count_of(len(documents), "policy") if isinstance(documents, list) else documents
+def _read_candidate(document: object, *bound: Any) -> Policy:
+    policy = _read_one(document, *bound)
+    if policy.candidates not in (1, None):
         raise invalid_policy(
-            f"The policies of a list must be from 1 to {_MOST_POLICIES:,}, not {brief(found)}"
+            f"It has {policy.candidates} candidates, and each of a list must be one"
         )
-    check_fields(document, {}, "policies")
-    parts = _by_policy(tensors, len(documents))
-    return PolicyList(
-        [
-            _read_numbered(index, own, parts[index], observation_space, action_space)
-            for index, own in enumerate(documents)
-        ]
-    )
+    return policy
 
 
 def _by_policy(tensors: Mapping[str, np.ndarray], n: int) -> list[dict[str, np.ndarray]]:
@@ -109,22 +112,33 @@ def _by_policy(tensors: Mapping[str, np.ndarray], n: int) -> list[dict[str, np.n
     return parts
 
 
-def _read_numbered(
-    index: int,
-    document: object,
-    tensors: Mapping[str, np.ndarray],
-    observation_space: Space,
-    action_space: Space,
-) -> Policy:
-    try:
-        policy = _read_one(document, tensors, observation_space, action_space)
-    except GymServerError as error:
-        raise GymServerError(
-            error.code, f"Policy {index + 1} of the list: {error.message}", error.hint
-        ) from None
-    if policy.candidates not in (1, None):
-        raise invalid_policy(
-            f"Policy {index + 1} of the list has {policy.candidates} candidates, and each of a "
-            "list must be one"
-        )
-    return policy
+@dataclass(frozen=True)
+class PolicyList(Policy):
+    """Candidates that are policies of their own."""
+
+    policies: list[Policy]
+
+    @property
+    def candidates(self) -> int:
+        """How many there are."""
+        return len(self.policies)
+
+    def actor(self, candidate: int | np.ndarray) -> Actor:
+        """Return an actor of a policy; for a group one in which each row takes its own policy's.
+
+        Each policy of a group acts for all rows and draws from a generator of its own, so that one
+        that draws does not move the draws of another.
+        """
+        if isinstance(candidate, int):
+            return self.policies[candidate].actor(0)
+        alone = np.zeros_like(candidate)
+        actors = {one: self.policies[one].actor(alone) for one in np.unique(candidate).tolist()}
+
+        def act(observation: Any) -> Any:
+            actions = {one: actor.act(observation) for one, actor in actors.items()}
+            together = np.array(next(iter(actions.values())))
+            for one, own in actions.items():
+                together[candidate == one] = own[candidate == one]
+            return together
+
+        return Actor(act, *actors.values())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import prod
 
 import numpy as np
@@ -12,19 +11,10 @@ from gymnasium.spaces import Box, Discrete, Space
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.activation import NAMES
-from gym_server.policies.fields import (
-    check_fields,
-    count_of,
-    epsilon_of,
-    finite_numbers,
-    shape_text,
-)
-from gym_server.policies.inputs import Moments
+from gym_server.policies.fields import check_fields, count_of, epsilon_of, field, finite_numbers
 from gym_server.policies.network import NetworkPolicy
 from gym_server.policies.network_plan import NetworkPlan
 from gym_server.spaces import brief_space
-
-_OUTPUTS = ("greedy", "softmax", "gaussian", "epsilon-greedy")
 
 
 def read_network(
@@ -40,191 +30,129 @@ def read_network(
         *("sizes", "activation", "bias", "output", "epsilon"),
         *("weights", "mean", "scale", "deviation"),
     )
-    sizes = _sizes(document)
-    observed = _check_inputs(sizes, observation_space)
-    acted = _check_outputs(sizes, action_space)
-    activation = _activation(document, len(sizes) - 1)
-    output = _output(document, sizes, acted)
-    plan = NetworkPlan(sizes, activation, _bias(document))
-    weights = _weights(tensors, plan)
-    plan = replace(
-        plan,
-        moments=_moments(tensors, sizes[0], observed),
-        output=output,
-        epsilon=_epsilon(document, output),
-        deviation=_deviation(tensors, output, (len(weights), sizes[-1])),
+    observed, acted = _supported(observation_space), _supported(action_space)
+    sizes = field(document, "sizes", _are_sizes, "two or more whole numbers from 1")
+    _check_ends(sizes, observed, acted)
+    plan = NetworkPlan(
+        observed,
+        acted,
+        tuple(sizes),
+        activation=_activation(document, len(sizes) - 1),
+        bias=field(document, "bias", _is_flag, "true or false") or False,
+        output=_output(document, sizes[-1], acted),
+        epsilon=epsilon_of(document),
+        **_moments(tensors, observed, sizes[0]),
     )
-    if isinstance(acted, Box) and plan.stretched_from is not None:
-        _check_bounded(acted, plan.stretched_from)
-    return NetworkPolicy(plan, weights, observed, acted)
-
-
-def _sizes(document: Mapping) -> tuple[int, ...]:
-    sizes = document.get("sizes")
-    if (
-        not isinstance(sizes, list)
-        or len(sizes) < 2
-        or not all(type(size) is int and size >= 1 for size in sizes)
-    ):
+    if plan.output == "epsilon-greedy" and plan.epsilon is None:
+        raise invalid_policy('The output "epsilon-greedy" needs an epsilon, a number from 0 to 1')
+    if plan.stretched_from is not None and isinstance(acted, Box) and not acted.is_bounded():
         raise invalid_policy(
-            f"The policy's sizes must be two or more whole numbers from 1, not {brief(sizes)}"
+            f'The outputs of "{plan.stretched_from}" are scaled to the bounds of the action, but '
+            f"the environment takes {brief_space(acted)} with a side without a bound",
+            'outputs of "identity" are taken as they are',
         )
-    return tuple(sizes)
+    network = "-".join(map(str, sizes)) + (" with a bias" if plan.bias else "")
+    row = f"a row of {count_of(plan.ends[-1], 'number')} for each candidate, as {network} has them"
+    weights = finite_numbers(tensors, "weights", [(None, plan.ends[-1])], row)
+    return NetworkPolicy(plan, weights, _deviation(tensors, plan, len(weights)))
 
 
-def _activation(document: Mapping, layers: int) -> tuple[str, ...]:
-    names = document.get("activation")
-    if not isinstance(names, list) or len(names) != layers:
-        raise invalid_policy(
-            f"The policy's activation must be {count_of(layers, 'name')}, one for each layer after "
-            f"the inputs, not {brief(names)}"
-        )
-    for name in names:
-        if name not in NAMES:
-            raise invalid_policy(
-                f"There is no activation {brief(name)}", f"there are {', '.join(NAMES)}"
-            )
-    return tuple(names)
-
-
-def _bias(document: Mapping) -> bool:
-    bias = document.get("bias", False)
-    if not isinstance(bias, bool):
-        raise invalid_policy(f"The policy's bias must be true or false, not {brief(bias)}")
-    return bias
-
-
-def _supported(space: Space, do: str, what: str) -> Box | Discrete:
+def _supported(space: Space) -> Box | Discrete:
     if isinstance(space, (Box, Discrete)):
         return space
     raise GymServerError(
         "not_supported",
-        f"A network cannot {do} {brief_space(space)}",
-        f"networks need {what} of a Box or a Discrete space",
+        f"A network cannot observe or choose from {brief_space(space)}",
+        "networks need observations and actions of a Box or a Discrete space",
     )
 
 
-def _check_inputs(sizes: tuple[int, ...], space: Space) -> Box | Discrete:
-    space = _supported(space, "observe", "observations")
-    gives = _width(space)
-    if sizes[0] != gives:
-        kind = (
-            f"is one of {gives:,} and needs an input for each"
-            if isinstance(space, Discrete)
-            else f"has {count_of(gives, 'number')}"
-        )
+def _are_sizes(value: object) -> bool:
+    if not isinstance(value, list) or len(value) < 2:
+        return False
+    return all(type(size) is int and size >= 1 for size in value)
+
+
+def _is_flag(value: object) -> bool:
+    return value is None or isinstance(value, bool)
+
+
+def _check_ends(sizes: list[int], observed: Box | Discrete, acted: Box | Discrete) -> None:
+    """Refuse a network with other inputs or outputs than the environment's numbers."""
+    inputs, outputs = _width(observed), _width(acted)
+    if sizes[0] != inputs:
         raise invalid_policy(
             f"The network takes {count_of(sizes[0], 'input')}, but an observation of the "
-            f"environment {kind}",
-            f"make the first of its sizes {gives}",
+            f"environment, {brief_space(observed)}, needs {inputs}",
+            f"make the first of its sizes {inputs}",
         )
-    return space
-
-
-def _check_outputs(sizes: tuple[int, ...], space: Space) -> Box | Discrete:
-    space = _supported(space, "choose from", "actions")
-    width, outputs = _width(space), sizes[-1]
-    is_discrete = isinstance(space, Discrete)
-    if outputs != width and not (is_discrete and outputs == 1 and width == 2):
-        takes = "has" if is_discrete else "takes an action of"
+    chooses_by_one = isinstance(acted, Discrete) and (outputs, sizes[-1]) == (2, 1)
+    if sizes[-1] != outputs and not chooses_by_one:
         raise invalid_policy(
-            f"The network gives {count_of(outputs, 'output')}, but the environment {takes} "
-            f"{count_of(width, 'action' if is_discrete else 'number')}",
-            f"make the last of its sizes {width}",
+            f"The network gives {count_of(sizes[-1], 'output')}, but an action of the "
+            f"environment, {brief_space(acted)}, needs {outputs}",
+            f"make the last of its sizes {outputs}",
         )
-    return space
 
 
 def _width(space: Box | Discrete) -> int:
     return int(space.n) if isinstance(space, Discrete) else prod(space.shape)
 
 
-def _check_bounded(space: Box, activation: str) -> None:
-    if not (np.isfinite(space.low).all() and np.isfinite(space.high).all()):
-        raise invalid_policy(
-            f'The outputs of "{activation}" are scaled to the bounds of the action, but the '
-            f"environment takes {brief_space(space)} with a side without a bound",
-            'outputs of "identity" are taken as they are',
-        )
+def _activation(document: Mapping, layers: int) -> tuple[str, ...]:
+    def fits(value: object) -> bool:
+        return isinstance(value, list) and len(value) == layers and all(v in NAMES for v in value)
+
+    wanted = (
+        f"{count_of(layers, 'name')} of {', '.join(NAMES)}, one for each layer after the inputs"
+    )
+    return tuple(field(document, "activation", fits, wanted))
 
 
-def _output(document: Mapping, sizes: tuple[int, ...], space: Box | Discrete) -> str:
+def _output(document: Mapping, outputs: int, space: Box | Discrete) -> str:
+    names = ["greedy", "gaussian"] if isinstance(space, Box) else ["greedy", "epsilon-greedy"]
+    if isinstance(space, Discrete) and outputs == space.n:
+        names.append("softmax")
     output = document.get("output", "greedy")
-    if output not in _OUTPUTS:
+    if output not in names:
         raise invalid_policy(
-            f"The policy's output must be one of {', '.join(_OUTPUTS)}, not {brief(output)}"
-        )
-    wanted = {"softmax": Discrete, "epsilon-greedy": Discrete, "gaussian": Box}.get(output)
-    if wanted is not None and not isinstance(space, wanted):
-        raise invalid_policy(
-            f'The output "{output}" needs actions of a {wanted.__name__} space, and the '
-            f"environment takes {brief_space(space)}"
-        )
-    if output == "softmax" and sizes[-1] != _width(space):
-        raise invalid_policy(
-            f'The output "softmax" needs an output for each of the {_width(space)} actions, and '
-            f"the network gives {sizes[-1]}",
-            f"make the last of its sizes {_width(space)}",
+            f"The policy's output must be one of {', '.join(names)} with "
+            f"{count_of(outputs, 'output')} for {brief_space(space)}, not {brief(output)}"
         )
     return str(output)
 
 
-def _epsilon(document: Mapping, output: str) -> float:
-    epsilon = epsilon_of(document, None)
-    if output == "epsilon-greedy" and epsilon is None:
-        raise invalid_policy('The output "epsilon-greedy" needs an epsilon, a number from 0 to 1')
-    return epsilon or 0.0
-
-
-def _weights(tensors: Mapping[str, np.ndarray], plan: NetworkPlan) -> np.ndarray:
-    weights = finite_numbers(tensors, "weights")
-    if weights.ndim != 2 or not len(weights) or weights.shape[1] != plan.ends[-1]:
-        sizes = "-".join(map(str, plan.sizes)) + (" with a bias" if plan.bias else "")
-        raise invalid_policy(
-            f"The policy's weights must be a row of {count_of(plan.ends[-1], 'number')} for each "
-            f"candidate, because its network is {sizes}, not {shape_text(weights.shape)}"
-        )
-    return weights
-
-
 def _moments(
-    tensors: Mapping[str, np.ndarray], inputs: int, space: Box | Discrete
-) -> Moments | None:
+    tensors: Mapping[str, np.ndarray], space: Box | Discrete, inputs: int
+) -> dict[str, np.ndarray]:
     if not {"mean", "scale"} & tensors.keys():
-        return None
+        return {}
     if isinstance(space, Discrete):
         raise invalid_policy(
             f"Observations that are numbers of a range can be normalised, but those of the "
             f"environment are {brief_space(space)}",
             "make the policy without mean and scale",
         )
-    moments = Moments(finite_numbers(tensors, "mean"), finite_numbers(tensors, "scale"))
-    for name, tensor in moments._asdict().items():
-        if tensor.shape != (inputs,):
-            raise invalid_policy(
-                f"The policy's {name} must be a number for each of its "
-                f"{count_of(inputs, 'input')}, not {shape_text(tensor.shape)}"
-            )
-    return moments
+    wanted = f"a number for each of its {count_of(inputs, 'input')}"
+    return {name: finite_numbers(tensors, name, [(inputs,)], wanted) for name in ("mean", "scale")}
 
 
 def _deviation(
-    tensors: Mapping[str, np.ndarray], output: str, shape: tuple[int, int]
+    tensors: Mapping[str, np.ndarray], plan: NetworkPlan, candidates: int
 ) -> np.ndarray | None:
-    if output != "gaussian":
+    if plan.output != "gaussian":
         if "deviation" in tensors:
             raise invalid_policy(
-                f'Standard deviations belong to the output "gaussian", not to "{output}"',
+                f'Standard deviations belong to the output "gaussian", not to "{plan.output}"',
                 "leave the tensor deviation out",
             )
         return None
-    deviation = finite_numbers(tensors, "deviation")
-    if deviation.shape not in (shape, shape[1:]):
-        raise invalid_policy(
-            f"The policy's deviation must be a number for each of its "
-            f"{count_of(shape[1], 'output')}, or a row of these for each candidate, not "
-            f"{shape_text(deviation.shape)}"
-        )
+    shape = (candidates, plan.sizes[-1])
+    wanted = (
+        f"a number for each of its {count_of(shape[1], 'output')}, or a row of these for each "
+        "candidate"
+    )
+    deviation = finite_numbers(tensors, "deviation", [shape, shape[1:]], wanted)
     if (deviation < 0).any():
         raise invalid_policy(
             f"The policy's deviation must be numbers from 0, not {brief(float(deviation.min()))}"

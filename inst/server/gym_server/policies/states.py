@@ -15,6 +15,9 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Dict, Discrete, MultiBinary, MultiDiscrete, Space, Tuple
 
+# What ``States.index`` raises for what is no value of the space.
+NOT_A_STATE = (ValueError, TypeError, KeyError, IndexError)
+
 
 @dataclass(frozen=True)
 class States:
@@ -22,14 +25,11 @@ class States:
 
     Attributes:
         count: how many there are.
-        index: returns the number of one. It raises ``ValueError``, ``TypeError``, ``KeyError`` or
-            ``IndexError`` for what is none of them.
-        indices: returns the numbers of a batch.
+        index: returns the number of one, or raises one of ``NOT_A_STATE``.
     """
 
     count: int
     index: Callable[[Any], int]
-    indices: Callable[[Any], np.ndarray]
 
 
 @singledispatch
@@ -49,11 +49,7 @@ def _digits(nvec: list[int], start: list[int]) -> States:
             number = number * n + beyond
         return number
 
-    def indices(batch: Any) -> np.ndarray:
-        rows = np.asarray(batch)
-        return np.array([index(row) for row in rows], dtype=np.intp)
-
-    return States(prod(nvec), index, indices)
+    return States(prod(nvec), index)
 
 
 @states_of.register
@@ -74,30 +70,23 @@ def _(space: MultiBinary) -> States:
 
 @states_of.register
 def _(space: Tuple) -> States | None:
-    parts = [states_of(part) for part in space.spaces]
-    return _together(list(range(len(parts))), parts)
+    return _together(dict(enumerate(space.spaces)))
 
 
 @states_of.register
 def _(space: Dict) -> States | None:
-    return _together(list(space.spaces), [states_of(part) for part in space.spaces.values()])
+    return _together(space.spaces)
 
 
-def _together(keys: list[Any], parts: list[States | None]) -> States | None:
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts):
+def _together(spaces: dict[Any, Space]) -> States | None:
+    parts = {key: states for key, space in spaces.items() if (states := states_of(space))}
+    if len(parts) < len(spaces):
         return None
 
     def index(value: Any) -> int:
         number = 0
-        for key, part in zip(keys, known, strict=True):
+        for key, part in parts.items():
             number = number * part.count + part.index(value[key])
         return number
 
-    def indices(batch: Any) -> np.ndarray:
-        numbers: Any = 0
-        for key, part in zip(keys, known, strict=True):
-            numbers = numbers * part.count + part.indices(batch[key])
-        return np.asarray(numbers)
-
-    return States(prod(part.count for part in known), index, indices)
+    return States(prod(part.count for part in parts.values()), index)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,16 +11,8 @@ from gymnasium.spaces import Discrete, Space
 
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
-from gym_server.policies.acting import Actor, GroupActor, Policy
-from gym_server.policies.choice import (
-    Odds,
-    draw_columns,
-    even_columns,
-    odds,
-    softmax_columns,
-    softmax_weights,
-)
-from gym_server.policies.draws import EpisodeGenerator, uniforms
+from gym_server.policies.acting import Actor, Policy
+from gym_server.policies.discrete import DiscreteChoice
 from gym_server.policies.fields import (
     check_fields,
     count_of,
@@ -28,137 +21,64 @@ from gym_server.policies.fields import (
     shape_text,
     temperature_of,
 )
-from gym_server.policies.memo import remembered
-from gym_server.policies.outputs import members_of
-from gym_server.policies.states import States, states_of
+from gym_server.policies.states import NOT_A_STATE, States, states_of
 from gym_server.spaces import brief_space
-
-# What the number of a state is asked by; see ``States``.
-_NOT_A_STATE = (ValueError, TypeError, KeyError, IndexError)
+from gym_server.spaces.stacking import unstack
 
 
+@dataclass(frozen=True)
 class TablePolicy(Policy):
-    """Takes the action with the largest value, and may explore."""
+    """Takes the action with the largest value, and may explore.
 
-    def __init__(
-        self,
-        q: np.ndarray,
-        states: States,
-        action_space: Discrete,
-        epsilon: float,
-        temperature: float | None,
-    ) -> None:
-        """Keep the table.
+    Attributes:
+        q: float64[candidates, states, actions].
+        states: what its rows are for.
+        observation_space: where they come from.
+        choice: how an action is chosen by its values.
+    """
 
-        Args:
-            q: float64[candidates, states, actions].
-            states: what its rows are for.
-            action_space: what its columns are for.
-            epsilon: how often any other action is drawn.
-            temperature: of the softmax that actions are drawn by, in place of epsilon; None for
-                none.
-        """
-        self.candidates = len(q)
-        self._q = q
-        self._states = states
-        self._space = action_space
-        self._epsilon = epsilon
-        self._temperature = temperature
+    q: np.ndarray
+    states: States
+    observation_space: Space
+    choice: DiscreteChoice
 
-    def actor(self, candidate: int) -> Actor:
-        """Return an actor that looks its states up in a candidate's table."""
-        rows = self._rows(self._q[candidate])
-        members = members_of(self._space)
-        if self._temperature is not None:
-            return _by_odds(rows, members, self._temperature)
-        if self._epsilon > 0:
-            return _exploring(rows, members, self._epsilon)
-        return Actor(remembered(lambda observation: members[_best(rows(observation))]))
+    @property
+    def candidates(self) -> int:
+        """How many tables there are."""
+        return len(self.q)
 
-    def group_actor(self, candidates: np.ndarray, num_envs: int) -> GroupActor:
-        """Return an actor that looks the states of all rows up."""
-        start, dtype = int(self._space.start), self._space.dtype
-        generator = EpisodeGenerator()
+    def actor(self, candidate: int | np.ndarray) -> Actor:
+        """Return an actor that looks its states up; see ``Policy.actor()``."""
+        q = self.q
 
-        def act(observation: Any) -> np.ndarray:
-            states = self._indices(observation)
-            columns = self._q[candidates, states].T
-            if (columns.max(axis=0) == -np.inf).any():
-                raise _no_action(int(states[columns.max(axis=0) == -np.inf][0]))
-            return (self._chosen(columns, generator) + start).astype(dtype)
-
-        return GroupActor(act, generator)
-
-    def _chosen(self, columns: np.ndarray, generator: EpisodeGenerator) -> np.ndarray:
-        n = columns.shape[1]
-        if self._temperature is not None:
-            return draw_columns(softmax_columns(columns, self._temperature), generator.uniforms(n))
-        choice: np.ndarray = columns.argmax(axis=0)
-        if self._epsilon == 0:
-            return choice
-        explores, u = generator.uniforms(2, n)
-        drawn = draw_columns(even_columns(columns > -np.inf), u)
-        return np.where(explores < self._epsilon, drawn, choice)
-
-    def _rows(self, q: np.ndarray) -> Callable[[Any], list[float]]:
-        index = self._states.index
-
-        def row(observation: Any) -> list[float]:
-            try:
-                state = index(observation)
-            except _NOT_A_STATE:
-                raise _no_row(observation) from None
-            values: list[float] = q[state].tolist()
+        def values_of(observation: Any) -> list[float]:
+            state = self._index(observation)
+            values: list[float] = q[candidate, state].tolist()
             if max(values) == -np.inf:
                 raise _no_action(state)
             return values
 
-        return row
+        def values_of_rows(observation: Any) -> np.ndarray:
+            members = unstack(self.observation_space, observation)
+            states = np.array([self._index(member) for member in members])
+            values: np.ndarray = q[candidate, states].T
+            without = states[values.max(axis=0) == -np.inf]
+            if len(without):
+                raise _no_action(int(without[0]))
+            return values
 
-    def _indices(self, observation: Any) -> np.ndarray:
+        if isinstance(candidate, int):
+            return self.choice.actor(values_of, remembers=True)
+        return self.choice.rows_actor(values_of_rows, len(candidate))
+
+    def _index(self, observation: Any) -> int:
         try:
-            return self._states.indices(observation)
-        except _NOT_A_STATE:
-            raise _no_row(observation) from None
-
-
-def _best(values: list[float]) -> int:
-    return values.index(max(values))
-
-
-def _by_odds(rows: Callable[[Any], list[float]], members: list[Any], temperature: float) -> Actor:
-    draws = uniforms()
-    take = draws.take
-    find = remembered(lambda observation: odds(softmax_weights(rows(observation), temperature)))
-
-    def act(observation: Any) -> Any:
-        return members[find(observation).draw(take())]
-
-    return Actor(act, draws)
-
-
-def _exploring(rows: Callable[[Any], list[float]], members: list[Any], epsilon: float) -> Actor:
-    draws = uniforms()
-    take = draws.take
-
-    def best_and_possible(observation: Any) -> tuple[int, Odds]:
-        values = rows(observation)
-        return _best(values), odds([float(value > -np.inf) for value in values])
-
-    find = remembered(best_and_possible)
-
-    def act(observation: Any) -> Any:
-        best, possible = find(observation)
-        return members[possible.draw(take()) if take() < epsilon else best]
-
-    return Actor(act, draws)
-
-
-def _no_row(observation: Any) -> GymServerError:
-    return invalid_policy(
-        f"The policy's table has no row for the observation {brief(observation)}",
-        "the environment's observation is not in its observation space",
-    )
+            return self.states.index(observation)
+        except NOT_A_STATE:
+            raise invalid_policy(
+                f"The policy's table has no row for the observation {brief(observation)}",
+                "the environment's observation is not in its observation space",
+            ) from None
 
 
 def _no_action(state: int) -> GymServerError:
@@ -190,26 +110,17 @@ def read_table(
             f"{brief_space(observation_space)} cannot",
             "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these",
         )
-    epsilon, temperature = epsilon_of(document, 0.0), temperature_of(document)
-    q = _table_of(numbers(tensors, "q"), states.count, int(action_space.n))
-    if temperature is not None and (q == np.inf).any():
-        raise invalid_policy("The policy's q has the value Inf, of which there is no softmax")
-    return TablePolicy(q, states, action_space, epsilon or 0.0, temperature)
-
-
-def _table_of(q: np.ndarray, states: int, actions: int) -> np.ndarray:
+    epsilon, temperature = epsilon_of(document) or 0.0, temperature_of(document)
+    q = numbers(tensors, "q")
+    shape = (states.count, int(action_space.n))
+    if q.shape[-2:] != shape or q.ndim not in (2, 3) or not q.size:
+        raise invalid_policy(
+            f"The policy's q must be a table of {count_of(shape[0], 'state')} and "
+            f"{count_of(shape[1], 'action')}, or one for each candidate, not {shape_text(q.shape)}"
+        )
     if np.isnan(q).any():
         raise invalid_policy("The policy's q must be numbers, not NaN")
-    tables = q[np.newaxis] if q.ndim == 2 else q
-    if tables.ndim != 3 or not len(tables):
-        raise invalid_policy(
-            f"The policy's q must be a table or one for each candidate, not {shape_text(q.shape)}"
-        )
-    if tables.shape[1:] != (states, actions):
-        rows, columns = tables.shape[1:]
-        raise invalid_policy(
-            f"The policy's table has {count_of(rows, 'row')} and {count_of(columns, 'column')}, "
-            f"but the environment has {count_of(states, 'state')} and "
-            f"{count_of(actions, 'action')}"
-        )
-    return tables
+    if temperature is not None and (q == np.inf).any():
+        raise invalid_policy("The policy's q has the value Inf, of which there is no softmax")
+    choice = DiscreteChoice(action_space, epsilon, temperature, masks=True)
+    return TablePolicy(q.reshape(-1, *shape), states, observation_space, choice)

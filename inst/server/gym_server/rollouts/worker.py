@@ -163,7 +163,7 @@ class _Playing:
         # Rows that nobody asked for are played by the last candidate.
         candidates = np.full(group.num_envs, unit.candidates[-1])
         candidates[rows] = unit.candidates
-        actor = self._policy.group_actor(candidates, group.num_envs)
+        actor = self._policy.actor(candidates)
         played = play_group(group, actor, unit, self._task.max_steps, self._task.keep)
         columns = (played.earned, played.length, played.terminated, played.truncated)
         return {**_columns(*(column[rows] for column in columns)), **played.tensors}

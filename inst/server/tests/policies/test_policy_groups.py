@@ -13,7 +13,7 @@ FEW, MANY = [4, 3, 2], [4, 30, 30, 3]
 
 
 def started(policy, candidates, seed=3):
-    group = policy.group_actor(np.asarray(candidates), ROWS)
+    group = policy.actor(np.asarray(candidates))
     group.begin(seed)
     return group
 

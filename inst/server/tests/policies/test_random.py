@@ -93,7 +93,7 @@ def test_it_may_have_fewer_actions():
 
 def test_a_group_draws_all_rows_at_once():
     for space in (Discrete(3, start=2), Box(-1, 1, (2,))):
-        group = read_policy(RANDOM, {}, OBSERVED, space).group_actor(np.zeros(8, int), 8)
+        group = read_policy(RANDOM, {}, OBSERVED, space).actor(np.zeros(8, int))
         group.begin(5)
         sample = sampler(batch_space(space, 8), 5)
         for _ in range(10):

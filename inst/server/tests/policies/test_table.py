@@ -1,3 +1,4 @@
+from bisect import bisect_right
 from collections import OrderedDict
 
 import numpy as np
@@ -6,7 +7,7 @@ from bound import TWO, begun, episode_generator, table
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tuple
 
 from gym_server.errors import GymServerError
-from gym_server.policies.choice import draw_by_weights, draw_columns, odds
+from gym_server.policies.discrete import chances, draw_columns
 from gym_server.policies.states import states_of
 
 MINUS = -np.inf
@@ -78,7 +79,7 @@ def test_a_row_that_leaves_no_action_is_an_error_when_it_is_met():
         actor.act(0)
         with pytest.raises(GymServerError, match="Row 2 of the policy's table leaves no action"):
             actor.act(1)
-        group = policy.group_actor(np.zeros(2, int), 2)
+        group = policy.actor(np.zeros(2, int))
         group.begin(1)
         with pytest.raises(GymServerError, match="Row 2"):
             group.act(np.array([0, 1]))
@@ -104,16 +105,14 @@ def test_the_temperature_draws_by_a_softmax():
     assert [actor.act(0) for _ in range(500)] == np.where(u >= p[0], 2, 0).tolist()
 
 
-def test_three_ways_to_draw_by_weights_agree():
+def test_one_row_and_many_are_drawn_alike():
     rng = np.random.default_rng(1)
     for _ in range(300):
         weights = rng.uniform(size=5) * rng.integers(2, size=5)
         weights[rng.integers(5)] = 1
-        chances = odds(weights.tolist())
         p = weights / weights.sum()
         for u in [*rng.random(10).tolist(), 0.0, 1 - 2**-53]:
-            chosen = chances.draw(u)
-            assert chosen == draw_by_weights(weights.tolist(), u)
+            chosen = bisect_right(chances(weights.tolist()), u)
             assert chosen == draw_columns(p[:, None], np.array([u]))[0]
             assert weights[chosen] > 0
 

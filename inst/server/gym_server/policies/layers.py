@@ -1,0 +1,176 @@
+"""Compute the outputs of networks, for one observation or for a batch, in arrays laid out once.
+
+A row's outputs must not depend, to the last bit, on who plays the other rows. So all rows are
+always computed, and only the sizes decide how: a matrix product of all rows adds in another order
+than one of some rows, and both in another order than a sum of products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box, Discrete
+
+from gym_server.errors import GymServerError
+from gym_server.json_values import brief
+from gym_server.policies.activation import Steps, in_place, middle
+from gym_server.policies.network_plan import NetworkPlan
+from gym_server.policies.states import NOT_A_STATE, states_of
+
+# With so many weights a row's own matrices are multiplied number by number; with more, all rows are
+# multiplied by the matrices of each candidate.
+_FEW_WEIGHTS = 512
+
+Forward = Callable[[Any], np.ndarray]
+
+
+def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray) -> Forward:
+    """Return what computes outputs, float64[outputs] or float64[outputs, rows].
+
+    Before a single output that chooses between two actions, the middle of its range stands as the
+    value of the first one. For one observation that output is a sum; see ``of_number()``.
+
+    Args:
+        plan: what the networks have in common.
+        weights: float64[candidates, weights].
+        candidate: whose network it is; for a group int[rows].
+    """
+    if isinstance(candidate, int):
+        return _layers(plan, _matrices(plan, weights[candidate]), ())
+    if plan.ends[-1] <= _FEW_WEIGHTS and not isinstance(plan.observation_space, Discrete):
+        return _layers(plan, _matrices(plan, weights[candidate].T), candidate.shape)
+    return _by_candidate(plan, weights, candidate)
+
+
+def _by_candidate(plan: NetworkPlan, weights: np.ndarray, candidates: np.ndarray) -> Forward:
+    """Return what computes all rows by each candidate, and takes each row's own."""
+    parts = []
+    for candidate in np.unique(candidates):
+        matrices = _matrices(plan, weights[candidate])
+        parts.append((candidates == candidate, _layers(plan, matrices, candidates.shape)))
+
+    def outputs(observation: Any) -> np.ndarray:
+        result = np.empty((plan.num_values, len(candidates)))
+        for own, of_all in parts:
+            result[:, own] = of_all(observation)[:, own]
+        return result
+
+    return outputs
+
+
+def _matrices(plan: NetworkPlan, weights: np.ndarray) -> list[np.ndarray]:
+    """Return float64[inputs, neurons] for each layer, or float64[inputs, neurons, rows]."""
+    pieces = np.split(weights, plan.ends[:-1])
+    return [
+        piece.reshape(taken, neurons, *weights.shape[1:])
+        for piece, (neurons, taken) in zip(pieces, plan.shapes, strict=True)
+    ]
+
+
+def _layers(plan: NetworkPlan, matrices: list[np.ndarray], rows: tuple[int, ...]) -> Forward:
+    width = plan.sizes[0]
+    # Below the inputs of each layer there is a 1 for the bias.
+    source = np.ones((width + plan.bias, *rows))
+    read: Any = None
+    steps: Steps = []
+    if isinstance(plan.observation_space, Box):
+        read = _reader(plan.observation_space, source[:width])
+        steps += _normalizing(plan, source[:width])
+    for layer, (matrix, activation) in enumerate(zip(matrices, plan.activation, strict=True)):
+        neurons = matrix.shape[1]
+        if layer < len(matrices) - 1:
+            target = np.ones((neurons + plan.bias, *rows))
+            sums = target[:neurons]
+        else:
+            target = np.full((plan.num_values, *rows), middle(activation))
+            sums = target[-neurons:]
+        if layer == 0 and isinstance(plan.observation_space, Discrete):
+            read = _column_reader(plan.observation_space, matrix, plan.bias, sums)
+        else:
+            steps += _product(matrix, source, sums)
+        if rows or layer < len(matrices) - 1 or neurons == plan.num_values:
+            steps += in_place(activation, sums)
+        source = target
+
+    def outputs(observation: Any) -> np.ndarray:
+        read(observation)
+        for step in steps:
+            step()
+        return source
+
+    return outputs
+
+
+def _product(matrix: np.ndarray, source: np.ndarray, sums: np.ndarray) -> Steps:
+    if matrix.ndim == 2:
+        return [partial(np.ascontiguousarray(matrix.T).dot, source, sums)]
+    by_input = np.ascontiguousarray(matrix)
+    products = np.empty_like(by_input)
+    return [
+        partial(np.multiply, by_input, source[:, np.newaxis, :], products),
+        partial(np.add.reduce, products, 0, None, sums),
+    ]
+
+
+def _reader(space: Box, inputs: np.ndarray) -> Callable[[Any], None]:
+    """Return a function that copies an observation, or a batch of them, into an array."""
+    # In the shape of the observation: a copy that also changes the shape takes longer.
+    target = inputs.T.reshape(*inputs.shape[1:], *space.shape)
+    copyto = np.copyto
+
+    def read(observation: Any) -> None:
+        try:
+            copyto(target, observation)
+        except (ValueError, TypeError):
+            raise _misfit(observation) from None
+
+    return read
+
+
+def _column_reader(
+    space: Discrete, matrix: np.ndarray, bias: bool, sums: np.ndarray
+) -> Callable[[Any], None]:
+    """Return a function that copies the sums of the first layer for discrete observations.
+
+    Of inputs that are 0 but for one that is 1, they are a column of the weights.
+    """
+    columns = matrix[:-1] + matrix[-1] if bias else matrix
+    states = states_of(space)
+    assert states is not None
+
+    def index(observation: Any) -> int:
+        try:
+            return states.index(observation)
+        except NOT_A_STATE:
+            raise _misfit(observation) from None
+
+    def read(observation: Any) -> None:
+        sums[...] = columns[index(observation)]
+
+    def read_rows(observation: Any) -> None:
+        sums[...] = columns[[index(one) for one in observation]].T
+
+    return read if sums.ndim == 1 else read_rows
+
+
+def _normalizing(plan: NetworkPlan, inputs: np.ndarray) -> Steps:
+    """Return the calls that normalise inputs where they are."""
+    if plan.mean is None or plan.scale is None:
+        return []
+    across = (-1,) + (1,) * (inputs.ndim - 1)
+    mean, scale = plan.mean.reshape(across), plan.scale.reshape(across)
+    return [
+        partial(np.subtract, inputs, mean, inputs),
+        partial(np.multiply, inputs, scale, inputs),
+    ]
+
+
+def _misfit(observation: Any) -> GymServerError:
+    """An observation is not in the space that the environment says it is in."""
+    return GymServerError(
+        "environment_error",
+        f"The environment's observation {brief(observation)} is not in its observation space",
+    )
