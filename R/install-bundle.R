@@ -54,7 +54,7 @@ gym_server_bundle <- function(dir, extras = character()) {
   write_sums(new)
   replace_bundle(new, dir, fields, call)
   inform_of_bundle(read_bundle(dir, extras, call))
-  invisible(normalizePath(dir, winslash = "/"))
+  invisible(dir)
 }
 
 # Where uv gets and puts things while a bundle is made: its downloads end up in the bundle.
@@ -205,7 +205,6 @@ read_bundle <- function(dir, extras, call) {
   }
   words <- function(field) strsplit(fields[[field]], "[[:space:]]+")[[1L]]
   check_bundle(fields, setdiff(extras, words("Extras")), extras, call)
-  dir <- normalizePath(dir, winslash = "/")
   list(
     dir = dir, python = fields[["Python"]], index = words("Index"),
     has_python = length(list.files(file.path(dir, "python"))) > 0L

@@ -22,9 +22,7 @@
 #' ), start = 1)
 #' model_arrays(walk)$P[, , "1"]
 model_arrays <- function(model) {
-  if (!inherits(model, "gym_model")) {
-    abort_argument(model, "a model, as `gym_model()` makes it", "model", rlang::current_env())
-  }
+  check_is_model(model)
   states <- length(model$start)
   actions <- as.integer(model$action_space$n)
   cells <- (states + 1)^2 * actions

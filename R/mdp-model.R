@@ -148,6 +148,12 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
   )
 }
 
+check_is_model <- function(model, call = rlang::caller_env()) {
+  if (!inherits(model, "gym_model")) {
+    abort_argument(model, "a model, as `gym_model()` makes it", "model", call)
+  }
+}
+
 check_column <- function(x, name, must, are_good, arg, call) {
   good <- are_good(x[[name]])
   if (!all(good)) {

@@ -22,9 +22,7 @@
 #' env$step(1)
 #' rollout(walk, policy_random(), episodes = 100, seed = 1)
 model_env <- function(model, num_envs = NULL) {
-  if (!inherits(model, "gym_model")) {
-    abort_argument(model, "a model, as `gym_model()` makes it", "model", rlang::current_env())
-  }
+  check_is_model(model)
   check_count(num_envs, allow_null = TRUE)
   moves <- moves_of(model)
   make <- function(...) {

@@ -41,8 +41,9 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   at_once <- if (vector_env$one_seed) vector_env$num_envs else min(n, vector_env$num_envs)
   candidates <- unique(episodes$candidate)
   batch <- rlang::env(
-    candidate = match(episodes$candidate, candidates), episode = episodes$episode, seed = episodes$seed,
-    sub_env = (seq_len(n) - 1L) %% at_once + 1L, return = numeric(n), length = integer(n),
+    candidate = match(episodes$candidate, candidates), episode = episodes$episode,
+    seed = episodes$seed, sub_env = (seq_len(n) - 1L) %% at_once + 1L,
+    return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
     # Whose observations count must not depend on when others end.
     target = if (!keep_moments) target, each = each,
@@ -65,9 +66,10 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
                "truncated")
   kept <- mget(c("steps", "frames"), batch)
   kept["moments"] <- list(if (keep_moments) list(batch$moments))
-  episodes <- lapply(mget(columns, batch), utils::head, batch$needed)
+  needed <- if (is.null(target)) n else needed_episodes(batch$return, each, target)
+  episodes <- lapply(mget(columns, batch), utils::head, needed)
   episodes$candidate <- candidates[episodes$candidate]
-  c(if (keep_moments) without_needless(episodes, each, target) else episodes, kept)
+  c(episodes, kept)
 }
 
 # An error of the environment names the user's call, not the step that was taken for it.
@@ -261,35 +263,19 @@ end_episodes <- function(batch, at, returns, length, out) {
   batch$ended[at] <- TRUE
   batch$report(sum(batch$ended))
   if (!is.null(batch$target)) {
-    drop_needless_candidates(batch, unique(batch$candidate[at]))
+    batch$needed <- needed_episodes(ifelse(batch$ended, batch$return, NA), batch$each, batch$target)
   }
 }
 
-# A candidate whose mean return reaches the target makes all later ones needless, which are not
-# played on: of the batch's episodes the first `needed` are. Candidates before it are played on,
-# because one of them may reach the target, too.
-drop_needless_candidates <- function(batch, candidates) {
-  for (candidate in candidates) {
-    own <- batch$candidate == candidate
-    if (sum(own) == batch$each && all(batch$ended[own]) &&
-          isTRUE(mean(batch$return[own]) >= batch$target)) {
-      batch$needed <- min(batch$needed, sum(batch$candidate <= candidate))
-    }
+# How many of some candidates' episodes are needed: those up to the first candidate whose mean
+# return reaches the target. One before it that is not yet played to its end, as far as its returns
+# are missing, is played on, because it may reach the target, too.
+needed_episodes <- function(returns, each, target) {
+  if (length(returns) < each) {
+    return(length(returns))
   }
-}
-
-# Candidates after one that has reached the target.
-without_needless <- function(episodes, each, target) {
-  if (is.null(target)) {
-    return(episodes)
-  }
-  returns <- split(episodes$return, episodes$candidate)
-  reached <- vapply(returns, function(own) length(own) == each && isTRUE(mean(own) >= target), NA)
-  if (!any(reached)) {
-    return(episodes)
-  }
-  first <- as.integer(names(returns))[which(reached)[[1L]]]
-  lapply(episodes, `[`, episodes$candidate <= first)
+  reached <- which(colMeans(matrix(returns, each)) >= target)
+  min(reached[1L] * each, length(returns), na.rm = TRUE)
 }
 
 # Moments of observations ------------------------------------------------------------------

@@ -142,7 +142,7 @@ take_played <- function(play, piece, batch, error = NULL) {
     play$pieces[[as.character(piece$first)]] <- batch
     play$played <- play$played + n
     play$returns[piece$first - 1L + seq_len(n)] <- batch$return
-    if (!is.null(play$target)) play$needed <- min(play$needed, needed_episodes(play))
+    if (!is.null(play$target)) play$needed <- needed_episodes(play$returns, play$each, play$target)
   }
   rest <- piece$first + n
   if (!is.null(error)) {
@@ -152,13 +152,6 @@ take_played <- function(play, piece, batch, error = NULL) {
     play$again <- c(play$again, list(rest))
   }
   enter_in_order(play)
-}
-
-# Those up to the first candidate that has reached the target. One before it that is not yet played
-# to its end may make fewer needed.
-needed_episodes <- function(play) {
-  means <- colMeans(matrix(play$returns, play$each))
-  c(which(means >= play$target), Inf)[[1L]] * play$each
 }
 
 enter_in_order <- function(play) {

@@ -15,7 +15,7 @@ test_that("a bundle installs without a network", {
   skip_if_no_packages()
   dir <- file.path(withr::local_tempdir(), "a bündle")
   suppressMessages(expect_message(
-    expect_identical(gym_server_bundle(dir, "box2d"), normalizePath(dir)), "The bundle is ready"
+    expect_identical(gym_server_bundle(dir, "box2d"), dir), "The bundle is ready"
   ))
   expect_setequal(list.files(dir), c("bundle.dcf", "SHA256SUMS", uv_name(), "cache"))
   expect_identical(list.files(install_root()), "install.log")
