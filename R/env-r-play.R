@@ -54,7 +54,8 @@ check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
 
 abort_clone <- function(sub_env, call = rlang::caller_env()) {
   gym_abort(
-    c(paste0(sub_env$traits$spec$id, " cannot be cloned: a clone would share its random generator."),
+    c(paste0(sub_env$traits$spec$id,
+             " cannot be cloned: a clone would share its random generator."),
       i = "Make another one instead."),
     class = "gym_error_argument", argument = "env", call = call
   )

@@ -12,7 +12,8 @@
 #'   need; `taken`, how many steps the episode has taken, `NA` before the first reset; `ended`,
 #'   whether it has ended, `NA` when it was warned of that; `closed`.
 #' @noRd
-new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALSE, num_envs = NULL) {
+new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALSE,
+                        num_envs = NULL) {
   sub_env <- new.env(parent = emptyenv())
   sub_env$traits <- traits
   sub_env$reset <- reset

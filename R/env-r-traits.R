@@ -9,7 +9,7 @@
 #'   `fits_observations` and `fits_actions`, quick checks of batches.
 #' @noRd
 new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
-                     reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
+                       reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
   check_is_space(observation_space, call = call)
   check_is_space(action_space, call = call)
   check_string(id, call = call)

@@ -69,7 +69,7 @@ new_r_vector_env <- function(traits, ..., frames, sub_env) {
 
 #' Play sub-environments side by side
 #'
-#' @param sub_envs A list of them, all of one traits.
+#' @param sub_envs A list of them, all with the same traits.
 #' @noRd
 scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
   traits <- sub_envs[[1L]]$traits
@@ -87,7 +87,8 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
         i <- which[[k]]
         reset_sub_env(sub_envs[[i]], seeds[[k]], sub_env_number = number(i), call = call)
       })
-      tidy_value(traits$observation_space, batch_of(traits$observation_space, values), length(which))
+      space <- traits$observation_space
+      tidy_value(space, batch_of(space, values), length(which))
     },
     step = function(action, which = all) {
       call <- rlang::current_env()

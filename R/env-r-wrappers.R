@@ -1,11 +1,11 @@
 # Wrappers of environments written in R, with the names, the arguments and the formulas of
 # Gymnasium's (https://gymnasium.farama.org/api/wrappers/).
 #
-# A wrapper is made by a function of the traits that it wraps and of its arguments. What it returns is
-# a list: `traits`, as the environment looks from outside, and `around`, a function of `inner` (a list
-# of the functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL` where they are
-# not vectorised), which returns these functions as they are from outside. It is called for each
-# sub-environment, so what a wrapper remembers belongs to one.
+# A wrapper is made by a function of the traits of what it wraps and of its arguments. What it
+# returns is a list: `traits`, as the environment looks from outside, and `around`, a function of
+# `inner` (a list of the functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL`
+# where they are not vectorised), which returns these functions as they are from outside. It is
+# called for each sub-environment, so what a wrapper remembers belongs to one.
 
 #' Wrap an environment written in R
 #' @param arguments Those of the wrapper, a list with names.
@@ -175,7 +175,8 @@ wrap_normalize_observation <- function(traits, epsilon = 1e-8, call) {
   size <- prod(shape)
   outside <- space_box(-Inf, Inf, shape)
   outside$names <- space$names
-  list(traits = change_spaces(traits, observation_space = outside), around = function(inner, num_envs) {
+  changed <- change_spaces(traits, observation_space = outside)
+  list(traits = changed, around = function(inner, num_envs) {
     n <- num_envs %||% 1L
     moments <- running_moments(size)
     playing <- playing_sub_envs(n)

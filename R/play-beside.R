@@ -219,8 +219,8 @@ episodes_task <- function(play, piece) {
   episodes <- lapply(play$episodes, `[`, piece$first:piece$last)
   new_worker_task(
     "episodes", vector_env$recipe, server_versions(vector_env$client), episodes = episodes,
-    policy = play$policy_of(unique(episodes$candidate)), most = play$most, max_steps = play$max_steps,
-    keep = play$keep, num_envs = vector_env$num_envs
+    policy = play$policy_of(unique(episodes$candidate)), most = play$most,
+    max_steps = play$max_steps, keep = play$keep, num_envs = vector_env$num_envs
   )
 }
 

@@ -93,7 +93,7 @@ test_that("a server that describes environments makes no instance to look at", {
   expect_identical(made(), 3L)
 })
 
-test_that("neither does an older one, which plays all in sub-environments with seeds of their own", {
+test_that("nor does an older one, where all sub-environments have seeds of their own", {
   local_functions(plays_rollouts = function(...) FALSE)
   client <- local_server()
   made <- count_instances()
