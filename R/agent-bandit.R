@@ -27,8 +27,8 @@
 #' @param baseline Does `"gradient"` compare rewards with their mean so far? `TRUE`, the default, or
 #'   `FALSE`, with 0.
 #' @param learners How many learners there are, a whole number of at least 1; the default is 2,000.
-#' @param steps How many steps they take, a whole number; `NULL`, the default, is an episode of the
-#'   bandit's.
+#' @param horizon How many steps they take, a whole number; `NULL`, the default, is an episode of
+#'   the bandit's.
 #' @param seed A whole number that fixes all that is drawn, as for [rollout()].
 #' @return An object of class `gym_bandit_learning`, which [print()], [as.data.frame()] and
 #'   [plot()][plot.gym_bandit_learning()] know; a list with the elements `curve`, a data frame of
@@ -48,7 +48,7 @@
 #' plot(greedy, explores)
 learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), epsilon = 0.1,
                          confidence = 2, learning_rate = NULL, initial = 0, baseline = TRUE,
-                         learners = 2000, steps = NULL, seed = NULL) {
+                         learners = 2000, horizon = NULL, seed = NULL) {
   problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
   if (is.null(problem)) {
     abort_argument(env, "a bandit, as `bandit()` makes it", "env", rlang::current_env())
@@ -60,16 +60,16 @@ learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), e
   check_number(initial)
   check_flag(baseline)
   check_count(learners)
-  check_count(steps, allow_null = TRUE)
+  check_count(horizon, allow_null = TRUE)
   check_seed(seed)
-  steps <- steps %||% env$spec$max_episode_steps
+  horizon <- horizon %||% env$spec$max_episode_steps
   seed <- seed %||% draw_seed()
   rule <- list(
     method = method, epsilon = epsilon, confidence = confidence, learning_rate = learning_rate,
     baseline = baseline
   )
   played <- with_generator(
-    new_generator(seed), play_bandits(problem, rule, initial, as.integer(learners), steps)
+    new_generator(seed), play_bandits(problem, rule, initial, as.integer(learners), horizon)
   )
   structure(
     c(played, list(label = bandit_text(rule, initial), learners = learners, seed = seed,
@@ -78,13 +78,13 @@ learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), e
   )
 }
 
-play_bandits <- function(problem, rule, initial, learners, steps) {
+play_bandits <- function(problem, rule, initial, learners, horizon) {
   means <- draw_means(problem, learners)
   values <- matrix(as.double(initial), learners, problem$arms)
   taken <- matrix(0, learners, problem$arms)
   mean_so_far <- numeric(learners)
-  mean_reward <- best_share <- numeric(steps)
-  for (step in seq_len(steps)) {
+  mean_reward <- best_share <- numeric(horizon)
+  for (step in seq_len(horizon)) {
     arm <- choose_arms(rule, values, taken, step)
     at <- cbind(seq_len(learners), arm)
     best_share[[step]] <- mean(means[at] >= row_max(means))
@@ -106,7 +106,7 @@ play_bandits <- function(problem, rule, initial, learners, steps) {
   }
   list(
     curve = data.frame(
-      step = seq_len(steps), mean_reward = mean_reward, best_share = best_share
+      step = seq_len(horizon), mean_reward = mean_reward, best_share = best_share
     ),
     values = values
   )

@@ -5,40 +5,44 @@
 #' Makes a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of how
 #' many steps it has observed. Any function of this kind will do; these are the usual ones.
 #'
-#' @param from,to The number in the first step, and after `steps`, where it stays.
-#' @param steps How many steps it takes, a number of at least 1.
+#' @param from,to The number in the first step, and after `duration`, where it stays.
+#' @param duration How many steps it takes, a number of at least 1.
 #' @return A function of a number of steps. `schedule_linear()` goes in equal parts,
 #'   `schedule_exponential()` by equal factors (both numbers are above 0 then).
 #' @section Errors: `gym_error_argument`.
 #' @export
 #' @examples
-#' epsilon <- schedule_linear(1, 0.05, steps = 1000)
+#' epsilon <- schedule_linear(1, 0.05, duration = 1000)
 #' epsilon(c(0, 500, 2000))
-schedule_linear <- function(from, to, steps) {
+schedule_linear <- function(from, to, duration) {
   check_number(from)
   check_number(to)
-  check_number(steps, min = 1)
-  new_schedule(from, to, steps, function(taken) from + (to - from) * pmin(taken / steps, 1))
+  check_number(duration, min = 1)
+  new_schedule(from, to, duration, function(taken) {
+    from + (to - from) * pmin(taken / duration, 1)
+  })
 }
 
 #' @rdname schedule_linear
 #' @export
-schedule_exponential <- function(from, to, steps) {
+schedule_exponential <- function(from, to, duration) {
   check_above_zero(from)
   check_above_zero(to)
-  check_number(steps, min = 1)
-  new_schedule(from, to, steps, function(taken) from * (to / from)^pmin(taken / steps, 1))
+  check_number(duration, min = 1)
+  new_schedule(from, to, duration, function(taken) {
+    from * (to / from)^pmin(taken / duration, 1)
+  })
 }
 
 # A checkpoint tells two schedules apart by their numbers, not by what a function has kept.
-new_schedule <- function(from, to, steps, f) {
-  structure(f, from = from, to = to, steps = steps, class = c("gym_schedule", "function"))
+new_schedule <- function(from, to, duration, f) {
+  structure(f, from = from, to = to, duration = duration, class = c("gym_schedule", "function"))
 }
 
 #' @export
 print.gym_schedule <- function(x, ...) {
   cat("<schedule: from ", number_text(attr(x, "from")), " to ", number_text(attr(x, "to")), " in ",
-      count_of(attr(x, "steps"), "step"), ">\n", sep = "")
+      count_of(attr(x, "duration"), "step"), ">\n", sep = "")
   invisible(x)
 }
 

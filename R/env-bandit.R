@@ -13,7 +13,7 @@
 #' @param centre The mean of the means that are drawn, a number; the default is 0.
 #' @param drift The standard deviation of the step by which each mean moves after each action, a
 #'   number of at least 0; the default, 0, leaves them where they are.
-#' @param steps How many actions make an episode, a whole number; the default is 1,000.
+#' @param horizon How many actions make an episode, a whole number; the default is 1,000.
 #' @return An environment, as [gym_env()] makes them, in which [rollout()] plays 256
 #'   sub-environments side by side, each with arms of its own. [learn_bandit()] learns in it.
 #' @section Errors: `gym_error_argument`.
@@ -22,9 +22,9 @@
 #' @export
 #' @examples
 #' bandit()
-#' rollout(bandit(3, mean = c(0, 1, 2), steps = 10), policy_random(), episodes = 100, seed = 1)
+#' rollout(bandit(3, mean = c(0, 1, 2), horizon = 10), policy_random(), episodes = 100, seed = 1)
 bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
-                   steps = 1000) {
+                   horizon = 1000) {
   if (missing(arms) && !is.null(mean)) arms <- length(mean)
   check_count(arms)
   mean <- plain_numbers(mean)
@@ -35,7 +35,7 @@ bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
   check_number(sd, min = 0)
   check_number(centre)
   check_number(drift, min = 0)
-  check_count(steps)
+  check_count(horizon)
   arms <- as.integer(arms)
   gym_env(
     reset = function(self) {
@@ -55,7 +55,7 @@ bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
       list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift),
       class = "gym_bandit"
     ),
-    id = paste0("Bandit-", arms), max_episode_steps = steps
+    id = paste0("Bandit-", arms), max_episode_steps = horizon
   )
 }
 

@@ -10,7 +10,7 @@
 #' @return The first of them, invisibly; `autoplot()` a ggplot.
 #' @export
 #' @examples
-#' testbed <- bandit(arms = 10, steps = 200)
+#' testbed <- bandit(arms = 10, horizon = 200)
 #' few <- learn_bandit(testbed, epsilon = 0.01, learners = 200, seed = 1)
 #' many <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
 #' plot(few, many, what = "best_share")

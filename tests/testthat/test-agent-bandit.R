@@ -1,5 +1,5 @@
 test_that("a bandit pays each arm's mean, with the noise that it has", {
-  env <- bandit(mean = c(-1, 0, 2), sd = 0.5, steps = 20)
+  env <- bandit(mean = c(-1, 0, 2), sd = 0.5, horizon = 20)
   expect_identical(env$single_action_space$n, 3L)
   played <- rollout(env, policy_random(), episodes = 500, seed = 1, steps = TRUE)
   each <- tapply(played$steps$reward, played$steps$action, mean)
@@ -11,12 +11,12 @@ test_that("a bandit pays each arm's mean, with the noise that it has", {
 })
 
 test_that("without means each episode draws its own", {
-  played <- rollout(bandit(arms = 2, sd = 0, steps = 2), function(state) 0L * state,
+  played <- rollout(bandit(arms = 2, sd = 0, horizon = 2), function(state) 0L * state,
                     episodes = 400, seed = 1, steps = TRUE)
   first <- played$steps$reward[played$steps$step == 1]
   expect_identical(first, played$steps$reward[played$steps$step == 2])
   expect_equal(stats::sd(first), 1, tolerance = 0.15)
-  moving <- rollout(bandit(mean = 0, sd = 0, drift = 1, steps = 30), function(state) 0L * state,
+  moving <- rollout(bandit(mean = 0, sd = 0, drift = 1, horizon = 30), function(state) 0L * state,
                     episodes = 400, seed = 1, steps = TRUE)
   steps <- diff(moving$steps$reward)[diff(moving$steps$episode) == 0]
   expect_equal(stats::sd(steps), 1, tolerance = 0.05)
@@ -42,7 +42,7 @@ test_that("the testbed's curves are those of the book", {
 })
 
 test_that("a seed fixes all that is drawn, and the session's generator stays as it was", {
-  testbed <- bandit(arms = 4, steps = 30)
+  testbed <- bandit(arms = 4, horizon = 30)
   set.seed(5)
   state <- globalenv()$.Random.seed
   first <- learn_bandit(testbed, learners = 20, seed = 3)
@@ -54,14 +54,14 @@ test_that("a seed fixes all that is drawn, and the session's generator stays as 
 test_that("one learner follows its method step by step", {
   # Without noise: the value of an arm that was taken is its mean.
   sure <- bandit(mean = c(1, 3, 2), sd = 0)
-  ucb <- learn_bandit(sure, "ucb", learners = 1, steps = 3, seed = 1)
+  ucb <- learn_bandit(sure, "ucb", learners = 1, horizon = 3, seed = 1)
   expect_identical(ucb$values[1, ], c(1, 3, 2))
   constant <- learn_bandit(sure, learning_rate = 0.5, initial = 8, epsilon = 0, learners = 1,
-                           steps = 3, seed = 1)
+                           horizon = 3, seed = 1)
   # Optimism makes it try each arm once.
   expect_identical(constant$values[1, ], c(4.5, 5.5, 5))
   one <- learn_bandit(sure, "gradient", learning_rate = 0.1, baseline = FALSE, learners = 1,
-                      steps = 1, seed = 1)
+                      horizon = 1, seed = 1)
   arm <- which.max(one$values[1, ])
   expected <- rep(-1 / 3, 3)
   expected[[arm]] <- 2 / 3
@@ -69,7 +69,7 @@ test_that("one learner follows its method step by step", {
 })
 
 test_that("what was learned prints and plots, several together", {
-  testbed <- bandit(arms = 3, steps = 20)
+  testbed <- bandit(arms = 3, horizon = 20)
   few <- learn_bandit(testbed, epsilon = 0, learners = 50, seed = 1)
   ucb <- learn_bandit(testbed, "ucb", learners = 50, seed = 1)
   expect_output(print(few), "50 learners in Bandit-3: epsilon 0\nLast 20 steps of 20")
@@ -97,7 +97,7 @@ test_that("what is no bandit, or no method, is refused", {
 
 test_that("all learners of a plot may be named", {
   local_device()
-  testbed <- bandit(arms = 3, steps = 20)
+  testbed <- bandit(arms = 3, horizon = 20)
   greedy <- learn_bandit(testbed, epsilon = 0, learners = 5, seed = 1)
   often <- learn_bandit(testbed, epsilon = 0.1, learners = 5, seed = 1)
   expect_identical(plot(never = greedy, sometimes = often), greedy)
