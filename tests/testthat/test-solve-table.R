@@ -17,7 +17,7 @@ test_that("each seed has one row, without a gap, failures included", {
     expect_identical(unique(choice), seq_len(max(choice)))
     expect_identical(own$seed, 1000L * choice + sequence(rle(choice)$lengths))
   }
-  expect_identical(table$solved, table$mean_return >= table$target)
+  expect_identical(table$reached, table$mean_return >= table$target)
   expect_true(all(table$lower <= table$mean_return & table$mean_return <= table$upper))
   expect_true(all(table$episodes == 100))
   expect_false(anyNA(table[c("steps", "seconds", "gym", "R", "gymnasium", "BLAS")]))

@@ -8,20 +8,20 @@ write_readme_rows <- function(table_file = "inst/extdata/solve-table.csv.gz") {
     choice <- rows$seed %/% 1000L
     rows <- rows[choice == max(choice), ]
     count <- nrow(rows)
-    solved <- if (count > 1L) {
-      paste(sum(rows$solved), "of", count, "seeds")
+    reached <- if (count > 1L) {
+      paste(sum(rows$reached), "of", count, "seeds")
     } else {
-      one <- if (rows$solved) "a demonstration:" else "one seed, not solved:"
+      one <- if (rows$reached) "a demonstration:" else "one seed, not reached:"
       paste(one, round(rows$mean_return))
     }
     steps <- format(round(stats::median(rows$steps), -3), big.mark = ",", scientific = FALSE)
     kwargs <- rows$kwargs[[1L]]
     name <- paste0(rows$env_id[[1L]], if (nzchar(kwargs)) paste0(", ", kwargs))
-    paste("|", name, "|", rows$target[[1L]], "|", solved, "|", steps, "|")
+    paste("|", name, "|", rows$target[[1L]], "|", reached, "|", steps, "|")
   }, "")
   lines <- readLines("README.md")
   marks <- which(lines == "<!-- solved -->")
-  head <- c("| environment | target | solved | steps, median |", "|---|---|---|---|")
+  head <- c("| environment | target | reached | steps, median |", "|---|---|---|---|")
   writeLines(
     c(lines[seq_len(marks[[1L]])], head, unname(rows), lines[marks[[2L]]:length(lines)]),
     "README.md"

@@ -20,7 +20,7 @@ reported <- cbind(
   data.frame(
     agent = format(training$agent), policy = format(training$policy),
     origin = from$preset$origin, train_target = training$target, seed = training$seed,
-    solved = final$mean_return >= job$target, stopped_early = training$solved,
+    reached = final$mean_return >= job$target, solved = training$solved,
     iterations = nrow(training$history), steps = training$steps,
     eval_steps = sum(training$evaluations$steps),
     final[c("mean_return", "se", "lower", "upper", "episodes")],
