@@ -36,8 +36,8 @@
 #' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
 #'   a row for, the settings that are not given are taken from there, with a message.
 #' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
-#' @param iterations,steps,target The budget and the target, as for [train_agent()]; `NULL`, the
-#'   default, takes the preset's.
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]; `NULL`,
+#'   the default, takes the preset's.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
 #' @return `agent_ars()` an agent of class `gym_agent_ars`; `search_ars()` makes that agent, trains
@@ -137,10 +137,6 @@ format.gym_agent_ars <- function(x, ...) {
 #' @export
 search_ars <- function(env = "CartPole-v1", policy = NULL, directions = NULL, top = NULL,
                        step_size = NULL, noise = NULL, version = NULL, shift = NULL,
-                       iterations = NULL, steps = NULL, target = NULL, ...) {
-  given <- list(
-    policy = policy, directions = directions, top = top, step_size = step_size, noise = noise,
-    version = version, shift = shift, iterations = iterations, steps = steps, target = target
-  )
-  search_by("ars", given, env, ...)
+                       iterations = NULL, total_steps = NULL, target = NULL, ...) {
+  make_and_train("agent_ars", rlang::current_env(), ...)
 }

@@ -20,8 +20,8 @@
 #' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
 #'   a row for, the settings that are not given are taken from there, with a message.
 #' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
-#' @param iterations,steps,target The budget and the target, as for [train_agent()]; `NULL`, the
-#'   default, takes the preset's.
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]; `NULL`,
+#'   the default, takes the preset's.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
 #' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains
@@ -92,11 +92,6 @@ format.gym_agent_cem <- function(x, ...) {
 #' @export
 search_cem <- function(env = "CartPole-v1", policy = NULL, population = NULL, elite = NULL,
                        noise = NULL, extra_noise = NULL, extra_iterations = NULL,
-                       iterations = NULL, steps = NULL, target = NULL, ...) {
-  given <- list(
-    policy = policy, population = population, elite = elite, noise = noise,
-    extra_noise = extra_noise, extra_iterations = extra_iterations, iterations = iterations,
-    steps = steps, target = target
-  )
-  search_by("cem", given, env, ...)
+                       iterations = NULL, total_steps = NULL, target = NULL, ...) {
+  make_and_train("agent_cem", rlang::current_env(), ...)
 }

@@ -9,7 +9,7 @@
 #'   the default is 1.
 #' @param env The environment, as for [train_agent()].
 #' @param policy The policy, as for [train_agent()].
-#' @param iterations,steps,target The budget and the target, as for [train_agent()].
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()].
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
 #' @return `agent_hill_climb()` an agent of class `gym_agent_hill_climb`, whose policy has the best
@@ -70,13 +70,7 @@ format.gym_agent_hill_climb <- function(x, ...) {
 #' @rdname agent_hill_climb
 #' @export
 search_hill_climb <- function(env = "CartPole-v1", policy = policy_linear(), noise = 0.1,
-                              candidates = 1, iterations = NULL, steps = NULL, target = NULL,
-                              ...) {
-  naming_own_call(
-    train_agent(
-      agent_hill_climb(noise, candidates), env, policy, iterations = iterations, steps = steps,
-      target = target, ...
-    ),
-    c("agent_hill_climb", "train_agent")
-  )
+                              candidates = 1, iterations = NULL, total_steps = NULL,
+                              target = NULL, ...) {
+  make_and_train("agent_hill_climb", rlang::current_env(), ...)
 }

@@ -112,15 +112,9 @@ format.gym_agent_monte_carlo <- function(x, ...) {
 
 #' @rdname agent_monte_carlo
 #' @export
-learn_monte_carlo <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
-                              discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
-                              visits = c("first", "every"), exploring_starts = FALSE,
+learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target = NULL,
+                              episodes = 10, discount = 0.99, epsilon = 0.1, temperature = NULL,
+                              initial = 0, visits = c("first", "every"), exploring_starts = FALSE,
                               learning_rate = NULL, mask = NULL, ...) {
-  naming_own_call({
-    agent <- agent_monte_carlo(
-      discount, epsilon, temperature, initial, visits, exploring_starts, learning_rate, mask
-    )
-    train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
-                target = target, ...)
-  }, c("agent_monte_carlo", "train_agent"))
+  make_and_train("agent_monte_carlo", rlang::current_env(), ...)
 }

@@ -13,10 +13,10 @@
 #'   agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such one), of the
 #'   policy `hidden` (how many hidden neurons a network has, which are tanh and see normalised
 #'   observations, `NA` for a linear policy) and `bias` (a logical), of the training `episodes`,
-#'   `steps` (its budget) and `target` (the mean return at which it stops, which lies above the one
-#'   that the environment counts as solved, so that the final evaluation reaches that), and where
-#'   they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how many
-#'   settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
+#'   `total_steps` (its budget) and `target` (the mean return at which it stops, which lies above
+#'   the one that the environment counts as solved, so that the final evaluation reaches that), and
+#'   where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how
+#'   many settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
 #'   `vignette("solved")` reports other seeds.
 #' @section Errors: `gym_error_argument` when `env_id` is no string.
 #' @export
@@ -59,64 +59,62 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 
 #' Make an agent and train it
 #'
-#' @param agent The agent's name, as in the presets.
-#' @param given What the user has given, a list: the agent's arguments, `policy`, and arguments of
-#'   the training.
-#' @param env,... As for [train_agent()].
+#' @param make The function that makes the agent, its name.
+#' @param frame The frame of the user's call, which has the agent's arguments, `env` and some of
+#'   [train_agent()]. What is `NULL` was not given.
+#' @param ... Further arguments of [train_agent()], and the environment's own.
 #' @noRd
-search_by <- function(agent, given, env, ..., call = rlang::caller_env()) {
-  check_environment(env, "env", call)
-  make <- paste0("agent_", agent)
-  of_agent <- names(formals(make))
+make_and_train <- function(make, frame, ...) {
+  check_no_steps(...names(), frame)
+  given <- lapply(rlang::set_names(ls(frame)), function(name) eval(as.name(name), frame))
+  env <- given$env
+  given <- Filter(Negate(is.null), given[names(given) != "env"])
   dots <- list(...)
-  of_training <- names(dots) %in% names(formals(train_agent))
-  preset <- find_preset(agent, env, dots[!of_training])
-  given <- given[!vapply(given, is.null, NA)]
+  check_environment(env, "env", frame)
+  of_agent <- names(formals(make))
+  of_training <- names(formals(train_agent))
+  kwargs <- dots[!names(dots) %in% of_training]
+  preset <- find_preset(sub("agent_", "", make), env, kwargs)
   own <- intersect(of_agent, names(given))
   arguments <- preset[intersect(of_agent, names(preset))]
   # A part of the candidates that was meant for another number of them, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
-  made <- naming_own_call(rlang::exec(make, !!!arguments), make, call)
-  training <- c(given[setdiff(names(given), own)], dots[of_training])
+  agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
+  training <- c(given[setdiff(names(given), own)], dots[names(dots) %in% of_training])
   # A budget of the user's own is the only one.
-  budget <- any(c("iterations", "steps") %in% names(training))
+  budget <- any(c("iterations", "total_steps") %in% names(training))
   if (is.null(preset) && !budget) {
-    abort_no_budget(agent, env, dots[!of_training], call)
+    abort_no_budget(preset_hints(env, kwargs), frame)
   }
   if (!is.null(preset)) {
-    from_preset <- preset[setdiff(c("episodes", "target", if (!budget) "steps"), names(training))]
-    training[names(from_preset)] <- from_preset
+    from_preset <- setdiff(c("episodes", "target", if (!budget) "total_steps"), names(training))
+    training[from_preset] <- preset[from_preset]
     training$policy <- training$policy %||% preset_policy(preset)
     inform_of_preset(preset, env)
-    made$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
-    made$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
+    agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
+    agent$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
   }
   naming_own_call(
-    rlang::exec("train_agent", made, env, !!!training, !!!dots[!of_training]), "train_agent", call
+    rlang::exec("train_agent", agent, env, !!!training, !!!kwargs), "train_agent", frame
   )
 }
 
-abort_no_budget <- function(agent, env, kwargs, call) {
+preset_hints <- function(env, kwargs) {
   presets <- if (is.character(env)) agent_presets(env)
-  known <- if (NROW(presets)) {
-    paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
-           presets$kwargs, collapse = ", ")
+  if (!NROW(presets)) {
+    return(NULL)
   }
-  gym_abort(
-    c(
-      "Training needs a budget: give `iterations`, or `steps` of the environment.",
-      i = if (length(known)) {
-        paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
-               known, ".")
-      },
-      i = if (length(known) && length(kwargs)) {
-        paste0("These were taken for the environment's own: ",
-               paste0("`", names(kwargs), "`", collapse = ", "), ".")
-      }
-    ),
-    class = "gym_error_argument", argument = "iterations", call = call
+  known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
+                  presets$kwargs, collapse = ", ")
+  c(
+    i = paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
+               known, "."),
+    i = if (length(kwargs)) {
+      paste0("These were taken for the environment's own: ",
+             paste0("`", names(kwargs), "`", collapse = ", "), ".")
+    }
   )
 }
 

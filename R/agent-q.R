@@ -37,8 +37,8 @@
 #'   What it forbids at an observation is never taken there again, and its value is `-Inf`; tables
 #'   only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()].
-#' @param iterations,steps,target The budget and the target, as for [train_agent()]. An iteration
-#'   are `episodes` episodes.
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. An
+#'   iteration are `episodes` episodes.
 #' @param episodes How many episodes make an iteration, a whole number; the default is 10.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `num_envs`, and the
 #'   environment's own, such as `is_slippery = FALSE`.
@@ -54,7 +54,7 @@
 #'   learner is.
 #' @export
 #' @examples
-#' agent_q(epsilon = schedule_linear(1, 0.05, steps = 5000))
+#' agent_q(epsilon = schedule_linear(1, 0.05, duration = 5000))
 #' @examplesIf gym:::can_start_server()
 #' learned <- learn_q("FrozenLake-v1", iterations = 20, seed = 1, is_slippery = FALSE, initial = 1)
 #' learned
@@ -173,14 +173,8 @@ format.gym_agent_q <- function(x, ...) {
 
 #' @rdname agent_q
 #' @export
-learn_q <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
+learn_q <- function(env, iterations = NULL, total_steps = NULL, target = NULL, episodes = 10,
                     discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
                     initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL, ...) {
-  naming_own_call({
-    agent <- agent_q(
-      discount, learning_rate, epsilon, temperature, initial, features, double, planning, mask
-    )
-    train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
-                target = target, ...)
-  }, c("agent_q", "train_agent"))
+  make_and_train("agent_q", rlang::current_env(), ...)
 }

@@ -71,109 +71,53 @@
 search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seeds = 1:100,
                           progress = rlang::is_interactive(), client = gym_client()) {
-  seeds <- plain_numbers(seeds)
-  check_seeds(seeds)
-  check_flag(progress)
-  call <- rlang::current_env()
-  settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
-  play <- function(vector_env) {
-    settings <- settings_in(vector_env, settings)
-    check_target(settings, call)
-    template <- policy_bind(settings$policy, vector_env, call = call)
-    anew <- length(vector_env$remembers) && !is_playable(env)
-    with_env <- if (anew) in_env else function(use) use(vector_env)
-    play_searches(with_env, template, settings, seeds, progress, call)
-  }
-  in_env <- function(use, ...) {
-    with_vector_env(env, as.numeric(rounds) * episodes, use, ..., client = client, call = call)
-  }
-  in_env(play, max_steps)
-}
-
-check_target <- function(settings, call) {
-  if (is.null(settings$target)) {
-    gym_abort(
-      c(paste0(settings$env_id, " has no reward threshold, so that nothing says when a search ",
-               "has solved it."),
-        i = "Give the mean return that does as `target`."),
-      class = "gym_error_argument", argument = "target", call = call
-    )
-  }
-}
-
-#' Play a search with each seed
-#'
-#' An interrupt ends them early; so does an error, which carries the searches that were finished.
-#' @param with_env A function that calls a function with a vector environment: the same for all
-#'   seeds, or one that is made anew where it remembers earlier episodes.
-#' @return As [search_repeat()].
-#' @noRd
-play_searches <- function(with_env, template, settings, seeds, progress, call) {
-  started <- proc.time()[["elapsed"]]
-  show <- progress_bar(length(seeds), "Search", "0 solved, ", shown = progress)
-  rows <- list()
-  origin <- NULL
-  play <- function() {
-    for (seed in seeds) {
-      search <- play_seed(with_env, template, settings, seed, call)
-      if (search$interrupted) {
-        rlang::interrupt()
-      }
-      origin <<- origin %||% search$provenance
-      rows <<- c(rows, list(search_row(search)))
-      show(length(rows), paste0(sum(vapply(rows, function(row) row$solved, NA)), " solved, "))
-    }
-  }
-  interrupted <- tryCatch(
-    until_interrupted(
-      play(), "Interrupted after {finished} of {total} seed{?s}; what was finished is returned.",
-      function() length(rows), length(seeds)
+  check_count(rounds)
+  rounds <- as.integer(rounds)
+  keep_random_state(force(policy))
+  given <- list(
+    target = target, template = policy, max_rounds = rounds,
+    episodes = as.integer(episodes),
+    max_steps = max_steps
+  )
+  trained <- withCallingHandlers(
+    naming_own_call(
+      train_agent(
+        agent_random(), env, policy, iterations = rounds, episodes = episodes, target = target,
+        max_steps = max_steps, seeds = seeds, solved_by = "candidate", progress = progress,
+        client = client
+      ),
+      "train_agent"
     ),
-    error = function(cnd) {
-      result <- new_searches(rows, settings, started, interrupted = FALSE, origin)
-      abort_with_result(cnd$parent %||% cnd, "The search", result,
-                        count_of(length(rows), "seed"), "gym_error_search", call)
+    gym_error_search = function(cnd) {
+      if (inherits(cnd$result, "gym_trainings")) {
+        cnd$result <- new_searches(cnd$result, given)
+        rlang::cnd_signal(cnd)
+      }
     }
   )
-  new_searches(rows, settings, started, interrupted, origin)
+  new_searches(trained, given)
 }
 
-# An interrupt of one search ends all of them. Messages come once, for all.
-play_seed <- function(with_env, template, settings, seed, call) {
-  settings$seed <- seed
-  quietly_for_seed(with_env(function(vector_env) {
-    agent <- agent_start(agent_random(), template)
-    play_search(agent, vector_env, settings, progress = FALSE, call)
-  }))
-}
-
-search_row <- function(search) {
-  data.frame(
-    seed = narrow_whole(search$seed), solved = search$solved,
-    round = if (search$solved) search$round else NA_integer_,
-    rounds = nrow(search$rounds), mean_return = max(search$rounds$mean_return),
-    steps = sum(search$rounds$steps), elapsed = search$elapsed
+# A row for each search that was finished.
+new_searches <- function(trained, given) {
+  done <- Filter(function(search) !search$interrupted, trained$trainings)
+  column <- function(f, type) unname(vapply(done, f, type))
+  searches <- data.frame(
+    seed = narrow_whole(column(function(search) as.numeric(search$seed), 0)),
+    solved = column(function(search) search$solved, NA),
+    round = column(function(search) if (search$solved) search$round else NA_integer_, 0L),
+    rounds = column(function(search) nrow(search$rounds), 0L),
+    mean_return = column(function(search) max(search$rounds$mean_return), 0),
+    steps = column(function(search) sum(search$rounds$steps), 0L),
+    elapsed = column(function(search) search$elapsed, 0)
   )
-}
-
-new_searches <- function(rows, settings, started, interrupted, origin = NULL) {
-  none <- data.frame(
-    seed = integer(), solved = logical(), round = integer(), rounds = integer(),
-    mean_return = numeric(), steps = integer(), elapsed = numeric()
-  )
-  searches <- do.call(rbind, c(list(none), rows))
-  chance <- round_chance(searches)
-  if (!is.null(origin)) {
-    origin$seed <- as.numeric(searches$seed)
-  }
+  given["target"] <- list(given$target %||% trained$target)
+  origin <- trained$provenance
+  if (!is.null(origin)) origin$seed <- as.numeric(searches$seed)
   structure(
-    list(
-      searches = searches, chance = chance$chance, se = chance$se,
-      env_id = settings$env_id, target = settings$target, template = settings$policy,
-      max_rounds = settings$rounds, episodes = settings$episodes,
-      max_steps = settings$max_steps,
-      elapsed = proc.time()[["elapsed"]] - started, interrupted = interrupted,
-      provenance = origin
+    c(
+      list(searches = searches), round_chance(searches), list(env_id = trained$env_id), given,
+      list(elapsed = trained$elapsed, interrupted = trained$interrupted, provenance = origin)
     ),
     class = "gym_searches"
   )

@@ -5,10 +5,11 @@
 #' Each candidate has weights that are drawn anew, as [policy_network()] draws them, and the best so
 #' far are the agent's: what the tutorial *Artificial Intelligence in R (I)* (2018) does. Nothing is
 #' learned from one iteration for the next, so that it is what other agents are measured against.
-#' [search_random()] plays this agent by the tutorial's own rule; with [train_agent()] it is trained
-#' and evaluated as the others.
+#' [search_random()] trains this agent by the tutorial's own rule, which `train_agent(solved_by =
+#' "candidate")` chooses; otherwise it is trained and evaluated as the others.
 #'
-#' @param candidates How many candidates are played in an iteration, a whole number of at least 1.
+#' @param candidates How many candidates are played in an iteration, a whole number of at least 1;
+#'   the default is 8. By the tutorial's rule each candidate is an iteration.
 #' @return An agent of class `gym_agent_random`. Its policy has the best weights so far.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be.
 #' @seealso [search_random()], [agent_ars()], [agent_cem()], [agent_hill_climb()]
@@ -63,11 +64,12 @@ format.gym_agent_random <- function(x, ...) {
 
 #' Search for a policy at random
 #'
-#' Plays the agent of the tutorial *Artificial Intelligence in R (I)* (2018): each round draws
-#' the weights of a network anew, plays a batch of episodes with it, and the first round whose
-#' mean return reaches the target ends the search. `search_random()` without arguments solves
-#' CartPole. An environment named by its id is made for the purpose and closed afterwards,
-#' whatever happens.
+#' Trains the agent of the tutorial *Artificial Intelligence in R (I)* (2018), [agent_random()], by
+#' the tutorial's rule: each round draws the weights of a network anew, plays a batch of episodes
+#' with it, and the first round whose mean return reaches the target ends the search.
+#' `search_random()` without arguments solves CartPole. It is [train_agent()] with other defaults
+#' and `solved_by = "candidate"`. An environment named by its id is made for the purpose and closed
+#' afterwards, whatever happens.
 #'
 #' The weights of each round and the seeds of its episodes follow from one whole number, `seed`.
 #' Without one it is drawn from R's generator, so that [set.seed()] fixes the whole search, too.
@@ -108,8 +110,10 @@ format.gym_agent_random <- function(x, ...) {
 #'   A message of class `gym_message_resumed` says so. `FALSE` begins anew, and replaces the
 #'   file.
 #' @return An object of class [gym_search], which [print()], [summary()][summary.gym_search()],
-#'   [plot()][plot.gym_search()], [as.data.frame()][as.data.frame.gym_search()] and
-#'   [predict()][predict.gym_search()] know; a list with the elements
+#'   [plot()][plot.gym_search()], [as.data.frame()][as.data.frame.gym_search()] and [predict()]
+#'   know. It is a `gym_training`, too, see [train_agent()], in which each round is an iteration
+#'   with one candidate. Beside the elements of every training, it has some of its own; these are
+#'   the ones to know:
 #'   \describe{
 #'     \item{policy}{The policy with the best mean return, the one that solved the environment
 #'       when one did, the first of equal ones. `NULL` when no round was finished.}
@@ -121,24 +125,21 @@ format.gym_agent_random <- function(x, ...) {
 #'       `sub_env` (integers), `return` (double), `length` (integer, in steps), `terminated`,
 #'       `truncated` (logical).}
 #'     \item{target}{The target, a double, or `NULL`.}
-#'     \item{env_id}{The environment's id, a string.}
-#'     \item{env}{The environment when an object was given, otherwise `NULL`.}
+#'     \item{env_id, env}{The environment's id, a string, and the environment as given.}
 #'     \item{num_envs}{How many sub-environments played, an integer. Where they share the seed of
 #'       an episode, [rollout()] says how to begin one again.}
 #'     \item{client}{The client of the environment.}
 #'     \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
 #'     \item{seed}{The seed, as given or drawn: with it the same call gives the same search.}
-#'     \item{history, agent, steps}{As those of a training, see [train_agent()]: a search is one,
-#'       too, in which each round is an iteration with one candidate.}
 #'     \item{elapsed}{The seconds that it took, a double.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, before
 #'   anything is made, or for a network that does not fit the environment;
-#'   `gym_error_checkpoint` for a checkpoint that is damaged, is no search's, belongs to a
-#'   search with other arguments (the message names them, and so does the field `argument`) or
-#'   cannot be written; `gym_error_search` for any error while it plays, with the classes of
-#'   that error, `gym_error_http` or `gym_error_connection` for instance.
+#'   `gym_error_checkpoint` for a checkpoint that is damaged, was not made by a search, was written
+#'   by an older version, belongs to a search with other arguments (the message names them, and so
+#'   does the field `argument`) or cannot be written; `gym_error_search` for any error while it
+#'   plays, with the classes of that error, `gym_error_http` or `gym_error_connection` for instance.
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @references The method: the tutorial *Artificial Intelligence in R (I)* (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
@@ -154,27 +155,15 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
                           episodes = 5, target = NULL, max_steps = NULL, seed = NULL,
                           progress = rlang::is_interactive(), client = gym_client(),
                           checkpoint = NULL, resume = TRUE) {
-  check_seed(seed)
-  check_flag(progress)
-  check_string(checkpoint, allow_null = TRUE)
-  check_flag(resume)
-  call <- rlang::current_env()
-  settings <- search_settings(env, policy, rounds, episodes, target, max_steps)
-  settings["env"] <- list(if (!is.character(env)) env)
-  settings["seed"] <- list(seed)
-  file <- if (!is.null(checkpoint)) {
-    open_checkpoint(checkpoint, search_arguments(env, settings), resume)
-  }
-  if (isTRUE(file$saved$finished)) {
-    client <- if (is_made_by_server(env)) client else if (is_playable(env)) env$client
-    return(finished_search(file$saved, settings, client, file$path))
-  }
-  settings$seed <- file$saved$seed %||% seed %||% draw_seed()
-  play <- function(vector_env) {
-    settings <- settings_in(vector_env, settings)
-    bound <- policy_bind(settings$policy, vector_env, call = call)
-    agent <- agent_start(agent_random(), bound)
-    play_search(agent, vector_env, settings, progress, call, file)
-  }
-  with_vector_env(env, as.numeric(rounds) * episodes, play, max_steps, client = client)
+  check_count(rounds)
+  # What a new network draws is none of the search's weights.
+  keep_random_state(force(policy))
+  naming_own_call(
+    train_agent(
+      agent_random(), env, policy, iterations = as.integer(rounds), episodes = episodes,
+      target = target, max_steps = max_steps, seed = seed, solved_by = "candidate",
+      checkpoint = checkpoint, resume = resume, progress = progress, client = client
+    ),
+    "train_agent"
+  )
 }

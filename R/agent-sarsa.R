@@ -80,16 +80,9 @@ format.gym_agent_sarsa <- function(x, ...) {
 
 #' @rdname agent_sarsa
 #' @export
-learn_sarsa <- function(env, iterations = NULL, steps = NULL, target = NULL, episodes = 10,
+learn_sarsa <- function(env, iterations = NULL, total_steps = NULL, target = NULL, episodes = 10,
                         discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
                         initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0,
                         mask = NULL, ...) {
-  naming_own_call({
-    agent <- agent_sarsa(
-      discount, learning_rate, epsilon, temperature, initial, features, expected, n, lambda,
-      mask
-    )
-    train_agent(agent, env, iterations = iterations, steps = steps, episodes = episodes,
-                target = target, ...)
-  }, c("agent_sarsa", "train_agent"))
+  make_and_train("agent_sarsa", rlang::current_env(), ...)
 }

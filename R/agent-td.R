@@ -8,7 +8,10 @@
 #' @inheritParams agent_sarsa
 #' @param policy The policy whose values are learned, and which plays: any that [rollout()] plays.
 #' @param initial The value that all states have at first, a number; the default is 0.
-#' @param iterations,steps The budget, as for [train_agent()]. An iteration are `episodes` episodes.
+#' @param iterations,total_steps The budget, as for [train_agent()]. An iteration are `episodes`
+#'   episodes.
+#' @param target The mean return at which training ends; the default is none, as learning values has
+#'   no return to reach.
 #' @return `agent_td()` an agent of class `gym_agent_td`; `learn_td()` makes that agent, trains it
 #'   and returns what [train_agent()] does. [state_values()] gives the values.
 #' @inheritSection agent_q Errors
@@ -74,14 +77,8 @@ format.gym_agent_td <- function(x, ...) {
 
 #' @rdname agent_td
 #' @export
-learn_td <- function(env, policy, iterations = NULL, steps = NULL, episodes = 10, discount = 0.99,
-                     learning_rate = 0.1, initial = 0, features = NULL, n = 1, lambda = 0, ...) {
-  further <- list(...)
-  # Learning values has no return to reach.
-  if (!"target" %in% names(further)) further$target <- Inf
-  naming_own_call({
-    agent <- agent_td(policy, discount, learning_rate, initial, features, n, lambda)
-    rlang::exec("train_agent", agent, env, iterations = iterations, steps = steps,
-                episodes = episodes, !!!further)
-  }, c("agent_td", "train_agent"))
+learn_td <- function(env, policy, iterations = NULL, total_steps = NULL, episodes = 10,
+                     discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL, n = 1,
+                     lambda = 0, target = Inf, ...) {
+  make_and_train("agent_td", rlang::current_env(), ...)
 }

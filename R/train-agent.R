@@ -20,10 +20,20 @@
 #' # Going on
 #'
 #' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
-#' so often that it takes a tenth of the time at most. The same call goes on from there, to the
-#' result to which an undisturbed training comes. `iterations` and `steps` may be others then. (A
-#' network of given sizes has drawn its weights before: make it after [set.seed()], or with the
-#' sizes `NA`, or it is another policy in the next session.)
+#' so often that it takes a tenth of the time at most. The same call goes on from there, to the same
+#' result as an uninterrupted training; one that had ended is returned at once. `iterations` and
+#' `total_steps` may differ then, but not those of a search. (A network of given sizes has drawn its
+#' weights before: make it after [set.seed()], or with the sizes `NA`, or it is another policy in
+#' the next session.)
+#'
+#' # The tutorial's rule
+#'
+#' `solved_by = "candidate"` is the rule of the tutorial *Artificial Intelligence in R (I)* (2018).
+#' Nothing is evaluated: the candidates of [agent_random()] are judged one after the other, each by
+#' its own `episodes`, and the first whose mean return reaches the target ends the training. Each of
+#' them is an iteration, called a round. As none depends on another they are played side by side, as
+#' many as a batch of episodes has room for. The result has the class [gym_search], too.
+#' [search_random()] trains in this way.
 #'
 #' @param agent The agent, as [agent_ars()], [agent_cem()] or [agent_hill_climb()] make it, or one
 #'   of your own, see [agent_ask()].
@@ -31,9 +41,9 @@
 #' @param policy The policy whose weights are to be found: a network, by default
 #'   [policy_linear()]. Most agents begin with the weights that it has. A learner such as
 #'   [agent_q()] makes a policy of its own, and may begin with a [policy_table()] of values.
-#' @param iterations,steps After how many iterations, or steps of the environment, to end, whole
-#'   numbers of at least 1. The iteration in which the steps are used up is played to its end. One
-#'   of the two must be given.
+#' @param iterations,total_steps After how many iterations, or steps of the environment, to end,
+#'   whole numbers of at least 1. The iteration in which the steps are used up is played to its end.
+#'   One of the two must be given.
 #' @param episodes How many episodes each candidate, or the learner, plays in an iteration, a whole
 #'   number of at least 1; the default is 1.
 #' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
@@ -50,9 +60,12 @@
 #'   `"training-7.rds"`, and `log` has a folder for each, such as `seed-7`.
 #' @param ... The environment's own arguments, by name, such as `continuous = TRUE` for
 #'   LunarLander, where it is named by its id.
-#' @param callback `NULL`, the default, or a function that is called after each iteration with the
-#'   training so far, an object as `train_agent()` returns it. Training ends when it returns
-#'   `FALSE`.
+#' @param solved_by What decides that the environment is solved, and ends the training:
+#'   `"evaluation"`, the default, a stopping evaluation of the agent's policy; or `"candidate"`, for
+#'   [agent_random()] alone, the tutorial's rule.
+#' @param callback `NULL`, the default, or a function that is called after each iteration (of a
+#'   search after those that were played side by side) with the training so far, an object as
+#'   `train_agent()` returns it. Training ends when it returns `FALSE`.
 #' @param log `NULL`, the default, or a folder, which is made where it does not exist: each
 #'   iteration appends a row to `progress.csv` there, and `config.json` says what was trained. What
 #'   an earlier training has left there keeps its rows as `progress-1.csv`, and so on.
@@ -71,16 +84,18 @@
 #'   \describe{
 #'     \item{policy}{The agent's policy, with the weights that it has at the end.}
 #'     \item{agent}{The agent as it is at the end.}
-#'     \item{solved}{Whether a stopping evaluation has reached the target, a logical.}
+#'     \item{solved}{Whether a stopping evaluation, or a round by the tutorial's rule, has reached
+#'       the target, a logical.}
 #'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps`
 #'       (those of the training so far, double), `min_return`, `median_return`, `mean_return`,
-#'       `max_return` (of the candidates' mean returns, double), `evaluation` (the mean return of
-#'       the agent's policy, `NA` where it was not looked at) and `elapsed` (seconds).}
+#'       `max_return` (of the candidates' mean returns, double), `mean_length` (of
+#'       their episodes, in steps), `evaluation` (the mean return of the agent's policy, `NA` where
+#'       it was not looked at) and `elapsed` (seconds, `NA` for the rounds of a search).}
 #'     \item{evaluations}{A data frame with a row for each evaluation: `iteration`, `kind`
 #'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
 #'       `mean_return` on.}
 #'     \item{final}{The last of these rows, the final evaluation. `NULL` where training was
-#'       interrupted.}
+#'       interrupted, and for a search.}
 #'     \item{target, env_id, seed}{As given, found or drawn.}
 #'     \item{env}{The environment as given: its id, or the object.}
 #'     \item{kwargs}{The environment's own arguments, a named list.}
@@ -91,8 +106,8 @@
 #'   }
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a policy
 #'   that does not fit; `gym_error_checkpoint` for a file that cannot be gone on with. An error in
-#'   the middle has the class `gym_error_training`, too, and the iterations before it are the
-#'   element `result` of the condition.
+#'   the middle has the class `gym_error_training`, too (and `gym_error_search` by the tutorial's
+#'   rule), and the iterations before it are the element `result` of the condition.
 #' @seealso [evaluate_policy()], [rollout()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -102,23 +117,22 @@
 #' )
 #' trained
 #' trained$final
-train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NULL,
+train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_steps = NULL,
                         episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
-                        eval_episodes = 100, seed = NULL, seeds = NULL, ..., callback = NULL,
-                        log = NULL, checkpoint = NULL, resume = TRUE,
-                        progress = rlang::is_interactive(), num_envs = NULL, num_workers = NULL,
-                        client = gym_client()) {
+                        eval_episodes = 100, seed = NULL, seeds = NULL, ...,
+                        solved_by = c("evaluation", "candidate"), callback = NULL, log = NULL,
+                        checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
+                        num_envs = NULL, num_workers = NULL, client = gym_client()) {
   call <- rlang::current_env()
   check_agent(agent, call)
-  policy <- policy %||% first_policy(agent)
-  settings <- structure(
-    list(
-      what = "training", agent = agent, env = env, kwargs = list(...), policy = policy,
-      iterations = iterations, steps = steps, episodes = episodes, target = target,
-      max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes, seed = seed,
-      callback = callback
-    ),
-    class = "gym_training_settings"
+  check_no_steps(...names(), call)
+  kwargs <- list(...)
+  solved_by <- check_choice(solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
+  settings <- list(
+    agent = agent, env = env, kwargs = kwargs, policy = policy %||% first_policy(agent),
+    iterations = iterations, total_steps = total_steps, episodes = episodes, target = target,
+    max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes, seed = seed,
+    callback = callback, solved_by = solved_by
   )
   check_training(settings, call)
   check_flag(progress)
@@ -127,38 +141,48 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, steps = NU
   check_string(checkpoint, allow_null = TRUE)
   seeds <- plain_numbers(seeds)
   if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
+  settings[c("what", "unit")] <- if (is_search(settings)) {
+    c("search", "round")
+  } else {
+    c("training", "iteration")
+  }
   settings$num_envs <- num_envs %||% learner_envs(agent, env)
   settings$num_workers <- num_workers
+  log <- if (!is.null(log)) absolute_path(log)
+  files <- list(checkpoint = checkpoint, log = log, resume = resume)
+  run <- if (is.null(seeds)) new_run(settings, files, call)
+  settings$seed <- run$settings$seed
+  settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
+  settings$model <- judging_model(settings, client)
   in_env <- function(use, max_steps = NULL) {
     with_training_env(settings, use, max_steps, client, call)
   }
-  log <- if (!is.null(log)) absolute_path(log)
-  files <- list(checkpoint = checkpoint, log = log, resume = resume)
   if (is.null(seeds)) {
-    file <- training_file(settings, files, call)
-    settings$seed <- file$saved$seed %||% seed %||% draw_seed()
-  }
-  settings$kwargs <- with_random_map(env, settings$kwargs, settings$seed %||% seeds)
-  settings$model <- judging_model(settings, client)
-  if (is.null(seeds)) {
-    in_env(function(vector_env) {
-      train_in(vector_env, settings, file, log, progress, call)
-    }, max_steps)
+    run$settings <- settings
+    do_run(run, in_env, max_steps, client, progress, call)
   } else {
-    train_seeds(in_env, settings, seeds, files, progress, call)
+    train_seeds(in_env, settings, seeds, files, progress, client, call)
   }
 }
+
+# The tutorial's rule, by which the episodes of a candidate decide: the training is a search then,
+# and each of its candidates an iteration, called a round.
+is_search <- function(settings) settings$solved_by == "candidate"
 
 least_sub_envs <- 100
 
 # However few episodes an evaluation has, candidates are played side by side.
 with_training_env <- function(settings, use, max_steps, client, call) {
-  episodes <- iteration_candidates(settings$agent) * settings$episodes
+  candidates <- iteration_candidates(settings$agent)
+  episodes <- if (is_search(settings)) {
+    as.numeric(settings$iterations %||% candidates) * settings$episodes
+  } else {
+    max(settings$eval_episodes, candidates * settings$episodes, least_sub_envs)
+  }
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    settings$env, max(settings$eval_episodes, episodes, least_sub_envs), use, max_steps,
-    !!!settings$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
-    client = client, call = call
+    settings$env, episodes, use, max_steps, !!!settings$kwargs, num_envs = settings$num_envs,
+    num_workers = settings$num_workers, client = client, call = call
   ))
 }
 
@@ -172,31 +196,48 @@ iteration_candidates <- function(agent) {
   )
 }
 
-# Reads the checkpoint of a training, where it is to have one.
-training_file <- function(settings, files, call) {
-  if (!is.null(files$checkpoint)) {
-    open_checkpoint(files$checkpoint, training_arguments(settings), files$resume, "training", call)
+#' Prepare a run: one training, with its seed and its files
+#' @param files A list of `checkpoint`, `log` and `resume`, as [train_agent()] takes them.
+#' @return A list: `settings`, `file`, as [open_checkpoint()] returns it (`NULL` for none), and
+#'   `log`, the folder.
+#' @noRd
+new_run <- function(settings, files, call) {
+  file <- if (!is.null(files$checkpoint)) {
+    open_checkpoint(
+      files$checkpoint, training_arguments(settings), files$resume, settings$what, call
+    )
   }
+  settings$seed <- file$saved$seed %||% settings$seed %||% draw_seed()
+  list(settings = settings, file = file, log = files$log)
 }
 
-#' Train in an environment that was made
-#' @param file As [training_file()] returns it.
-#' @noRd
-train_in <- function(vector_env, settings, file, log, progress, call) {
+# One that had ended needs no environment.
+do_run <- function(run, in_env, max_steps, client, progress, call) {
+  finished_training(run, client) %||% in_env(function(vector_env) {
+    train_in(vector_env, run, progress, call)
+  }, max_steps)
+}
+
+# Trains in an environment that was made.
+train_in <- function(vector_env, run, progress, call) {
+  settings <- run$settings
   settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
   settings$env_id <- environment_label(vector_env)
-  playing <- if (learns_online(settings$agent)) stepped(vector_env) else vector_env
-  settings$provenance <- file$saved$provenance %||% new_provenance(playing, settings)
-  bound <- if (learns_online(settings$agent)) {
+  settings[c("num_envs", "batch_size", "client")] <-
+    unclass(vector_env)[c("num_envs", "batch_size", "client")]
+  online <- learns_online(settings$agent)
+  playing <- if (online) stepped(vector_env) else vector_env
+  settings$provenance <- run$file$saved$provenance %||% new_provenance(playing, settings)
+  bound <- if (online) {
     spaces_policy(settings$policy, vector_env, settings$model, call)
   } else {
     bind_with_seed(settings$policy, vector_env, settings$seed, call)
   }
-  state <- new_training(settings$agent, settings)
+  state <- new_state(settings)
   state$agent <- with_generator(state$streams$agent, agent_start(settings$agent, bound))
   check_is_agent(state$agent, "agent_start()", call)
-  state$checkpoint <- training_checkpoint(state, file, settings, vector_env, call)
-  state$log <- training_log(log, settings, state$iteration, call)
+  state$checkpoint <- training_checkpoint(state, run$file, settings, call)
+  state$log <- training_log(run$log, settings, state, call)
   run_training(state, vector_env, settings, progress, call)
 }
 
@@ -214,7 +255,7 @@ bind_with_seed <- function(policy, vector_env, seed, call) {
 check_training <- function(settings, call) {
   check_environment(settings$env, "env", call)
   check_trained_policy(settings$policy, settings$agent, call)
-  check_number(settings$steps, min = 1, allow_null = TRUE, arg = "steps", call = call)
+  check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   check_seed(settings$seed, arg = "seed", call = call)
   for (name in c("iterations", "max_steps")) {
@@ -224,15 +265,34 @@ check_training <- function(settings, call) {
     check_count(settings[[name]], arg = name, call = call)
   }
   check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
-  if (is.null(settings$iterations) && is.null(settings$steps)) {
-    gym_abort(
-      "Training needs a budget: give `iterations`, or `steps` of the environment.",
-      class = "gym_error_argument", argument = "iterations", call = call
-    )
+  if (is.null(settings$iterations) && is.null(settings$total_steps)) {
+    abort_no_budget(call = call)
   }
   if (!is.null(settings$callback) && !is.function(settings$callback)) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
   }
+  if (is_search(settings) && !inherits(settings$agent, "gym_agent_random")) {
+    must <- "\"evaluation\" for this agent: only the policy of `agent_random()` is a candidate's"
+    abort_argument(settings$solved_by, must, "solved_by", call)
+  }
+}
+
+# It would be taken for one of the environment's own arguments.
+check_no_steps <- function(names, call) {
+  if ("steps" %in% names) {
+    gym_abort(
+      c("`steps` is called `total_steps`: the budget of a training, in steps of the environment.",
+        i = "An environment with an argument of this name can be made by `gym_make()`."),
+      class = "gym_error_argument", argument = "steps", call = call
+    )
+  }
+}
+
+abort_no_budget <- function(hints = NULL, call) {
+  gym_abort(
+    c("Training needs a budget: give `iterations`, or `total_steps` of the environment.", hints),
+    class = "gym_error_argument", argument = "iterations", call = call
+  )
 }
 
 check_trained_policy <- function(policy, agent, call) {
@@ -258,28 +318,4 @@ check_agent <- function(agent, call) {
   if (!inherits(agent, "gym_agent")) {
     abort_argument(agent, "an agent, as `agent_ars()` makes it", "agent", call)
   }
-}
-
-# What must be the same in two runs of one training. The budget may be another.
-training_arguments <- function(settings) {
-  numbers <- c("episodes", "target", "max_steps", "eval_every", "eval_episodes", "seed")
-  c(
-    list(
-      env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
-      agent = comparable_agent(settings$agent), policy = comparable_policy(settings$policy)
-    ),
-    lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
-  )
-}
-
-# Where its settings come from makes no difference.
-comparable_agent <- function(agent) {
-  agent$preset <- NULL
-  agent
-}
-
-# The seed of weights that are not drawn yet is the training's own.
-comparable_policy <- function(policy) {
-  policy$weights_seed <- NULL
-  policy
 }

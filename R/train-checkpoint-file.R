@@ -2,9 +2,9 @@
 # not at all.
 
 # The version of the file's format. Files with another version are refused.
-checkpoint_format <- 5L
+checkpoint_format <- 6L
 
-#' Read the file of a search
+#' Read the file of a training
 #' @return What [training_checkpoint()] wrote, `NULL` where there is no file.
 #' @noRd
 read_checkpoint <- function(path, call) {
@@ -16,12 +16,13 @@ read_checkpoint <- function(path, call) {
     error = function(cnd) abort_checkpoint(path, "cannot be read", conditionMessage(cnd), call)
   )
   if (!inherits(file, "gym_checkpoint")) {
-    abort_checkpoint(path, "is none of a search", call = call)
+    abort_checkpoint(path, "was not made by a training or a search", call = call)
   }
   if (!identical(file$format, checkpoint_format)) {
-    abort_checkpoint(
-      path, paste("was written by another version of this package,", file$version), call = call
-    )
+    which <- if (isTRUE(file$format < checkpoint_format)) "an older" else "another"
+    problem <- paste0("was written by ", which, " version of this package (", file$version,
+                      ", format ", file$format, "), which this one does not read")
+    abort_checkpoint(path, problem, call = call)
   }
   if (!is.raw(file$state) || !identical(rlang::hash(file$state), file$hash)) {
     abort_checkpoint(path, "is damaged", "Its content is not what was written.", call)
@@ -37,7 +38,6 @@ remove_parts <- function(path) {
   unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
 }
 
-# Writes the file of a search.
 write_checkpoint <- function(path, state) {
   state <- serialize(state, NULL)
   file <- structure(

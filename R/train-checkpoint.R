@@ -1,7 +1,11 @@
-# A search keeps what it has played in a file, the checkpoint, from which it can go on after it was
-# ended.
+# A training keeps what it has come to in a file, the checkpoint, from which it can go on after it
+# was ended. How that file is read and written stands in train-checkpoint-file.R.
 
-#' Prepare to keep a search or a training in a file
+kept_of_training <- c(
+  "agent", "iteration", "steps", "history", "evaluations", "episodes", "final", "solved", "ended"
+)
+
+#' Look into the file of a training, and prepare to keep it there
 #'
 #' @param path The file.
 #' @param arguments What fixes it, a list, in which the file must agree.
@@ -10,8 +14,7 @@
 #' @return A list: `path`, `arguments`, `saved`, what the file has, `NULL` where there is none to
 #'   go on with, and `mark`, by which the file is known again.
 #' @noRd
-open_checkpoint <- function(path, arguments, resume, what = "search",
-                            call = rlang::caller_env()) {
+open_checkpoint <- function(path, arguments, resume, what, call) {
   # The file that a link leads to is replaced, not the link.
   path <- normalizePath(absolute_path(path), mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
@@ -25,21 +28,102 @@ open_checkpoint <- function(path, arguments, resume, what = "search",
     if (!identical(saved$what, what)) {
       abort_checkpoint(path, paste("is that of a", saved$what), call = call)
     }
-    check_same_search(path, saved$arguments, arguments, what, call)
+    check_same_arguments(path, saved$arguments, arguments, what, call)
   }
   list(path = path, arguments = arguments, saved = saved, mark = mark)
 }
 
-# What must be the same in two runs of one search. Policies are compared by what is drawn from them,
-# not by the weights that they have.
-search_arguments <- function(env, settings) {
-  double <- function(x) if (!is.null(x)) as.numeric(x)
-  list(
-    env = environment_traits(env),
-    policy = with_generator(new_generator(1), policy_resample(settings$policy)),
-    rounds = settings$rounds, episodes = settings$episodes,
-    target = double(settings$target), max_steps = double(settings$max_steps),
-    seed = double(settings$seed)
+#' Go on from a training's file, and keep the training in it from now on
+#'
+#' The file grows, and where iterations are short writing might take longer than playing: then it is
+#' not written after each, and those since the last time would be played again.
+#' @param file As [open_checkpoint()] returns it, `NULL` for none.
+#' @return A function that is called after each iteration, and at the end with `last = TRUE`.
+#' @noRd
+training_checkpoint <- function(state, file, settings, call) {
+  if (is.null(file)) {
+    return(function(last = FALSE) NULL)
+  }
+  # What the server decides, beside the arguments.
+  server <- settings[c("target", "env_id", "num_envs", "batch_size")]
+  if (!is.null(file$saved)) {
+    check_same_server(file$path, file$saved$server, server, call)
+    resume_training(state, file$saved)
+    # Where the budget is a larger one now, the final evaluation comes later.
+    state$final <- NULL
+    state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
+    played <- played_text(settings, state)
+    inform_resumed("Going on from {.path {file$path}}, after {played}.")
+  }
+  state$path <- file$path
+  write <- checkpoint_writer(file, function() {
+    list(
+      what = settings$what, arguments = file$arguments, server = server,
+      policy = settings$policy, seed = settings$seed, provenance = settings$provenance,
+      training = mget(kept_of_training, state), streams = saved_streams(state$streams),
+      evaluation_streams = saved_streams(state$evaluation_streams),
+      elapsed = proc.time()[["elapsed"]] - state$started
+    )
+  }, settings$what, call)
+  function(last = FALSE) write(now = last)
+}
+
+resume_training <- function(state, saved) {
+  list2env(saved$training, state)
+  state$streams <- restore_streams(saved$streams)
+  state$evaluation_streams <- restore_streams(saved$evaluation_streams)
+  state$started <- state$started - saved$elapsed
+}
+
+#' Make the result of a training whose file says that it had ended
+#' @param client The client that the result of a search names.
+#' @return A training; `NULL` where there is something to play.
+#' @noRd
+finished_training <- function(run, client) {
+  saved <- run$file$saved
+  if (is.null(saved)) {
+    return(NULL)
+  }
+  settings <- run$settings
+  settings[names(saved$server)] <- saved$server
+  settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
+  state <- rlang::env(started = proc.time()[["elapsed"]])
+  resume_training(state, saved)
+  search <- is_search(settings)
+  if (!is_over(settings, state) || !search && is.null(state$final)) {
+    return(NULL)
+  }
+  if (search && is_made_by_server(settings$env)) {
+    settings$client <- client
+  } else if (is_playable(settings$env)) {
+    settings$client <- settings$env$client
+  }
+  inform_resumed(paste(
+    "This", settings$what, "had ended: {.path {run$file$path}} has its result.",
+    "{.code resume = FALSE} plays it anew."
+  ))
+  training_result(settings, state)
+}
+
+# Says that a part of the result comes from an earlier run.
+inform_resumed <- function(text, .envir = parent.frame()) {
+  cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
+}
+
+# The same training --------------------------------------------------------------------
+
+# What must be the same in two runs of one training. The budget may be another, but for a search,
+# whose rounds are cut into batches by it.
+training_arguments <- function(settings) {
+  numbers <- c("episodes", "target", "max_steps", "eval_every", "eval_episodes", "seed")
+  c(
+    list(
+      env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
+      agent = comparable_agent(settings$agent),
+      policy = comparable_policy(settings$policy, settings$agent)
+    ),
+    if (is_search(settings)) list(rounds = settings$iterations),
+    lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
 }
 
@@ -59,9 +143,23 @@ environment_traits <- function(env) {
   }
 }
 
-# The same search ------------------------------------------------------------------
+# Where its settings come from makes no difference.
+comparable_agent <- function(agent) {
+  agent$preset <- NULL
+  agent
+}
 
-check_same_search <- function(path, there, here, what, call) {
+# The seed of weights that are not drawn yet is the training's own. An agent that draws all weights
+# makes no use of those that the policy has: what is drawn from the policy is compared.
+comparable_policy <- function(policy, agent) {
+  if (inherits(agent, "gym_agent_random")) {
+    policy <- with_generator(new_generator(1), policy_resample(policy))
+  }
+  policy$weights_seed <- NULL
+  policy
+}
+
+check_same_arguments <- function(path, there, here, what, call) {
   differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
   if (length(differ)) {
     lines <- vapply(differ, function(name) {
@@ -94,15 +192,14 @@ argument_text <- function(name, value) {
 
 # Another server may run the sub-environments in another way, and with it play other episodes.
 check_same_server <- function(path, there, now, call) {
+  names <- c(
+    target = "the environment's reward threshold", env_id = "the environment",
+    batch_size = "how many episodes make a batch", num_envs = "how many sub-environments there are"
+  )
   differ <- Filter(function(name) !is_same(there[[name]], now[[name]]), names(now))
   if (length(differ)) {
     lines <- vapply(differ, function(name) {
-      what <- switch(
-        name, target = "the environment's reward threshold", env_id = "the environment",
-        batch_size = "how many episodes make a batch",
-        num_envs = "how many sub-environments there are"
-      )
-      paste0("There ", what, " is ", describe_value(there[[name]]), ", and ",
+      paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
              describe_value(now[[name]]), " on this server.")
     }, "")
     abort_checkpoint(path, "is from a server that played otherwise", lines, call)
@@ -122,19 +219,4 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
     class = c("gym_error_checkpoint", "gym_error_argument"),
     path = path, ..., call = call
   )
-}
-
-# Resuming -------------------------------------------------------------------------
-
-# Settings that the server decides, beside the arguments.
-settings_of_server <- function(vector_env, settings) {
-  list(
-    target = settings$target, env_id = settings$env_id, num_envs = settings$num_envs,
-    batch_size = vector_env$batch_size
-  )
-}
-
-# Says that a part of the result comes from an earlier run.
-inform_resumed <- function(text, .envir = parent.frame()) {
-  cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
 }

@@ -1,4 +1,4 @@
-# The rule by which train_agent() ends: evaluations of the agent's own policy.
+# When training ends, and the evaluations of the agent's own policy.
 
 # Seeds of episodes: those of training are up to this number, those of evaluations above it; of
 # these the final evaluation has the upper half. So an evaluation plays no episode that the training
@@ -8,22 +8,18 @@ last_training_seed <- 2^30
 # How many episodes make a point of the learning curve.
 curve_episodes <- 10L
 
-#' @exportS3Method
-is_used_up.gym_training_settings <- function(settings, state) {
-  state$iteration >= (settings$iterations %||% Inf) || state$steps >= (settings$steps %||% Inf)
-}
+draw_training_seeds <- function(n) sample.int(last_training_seed, n, replace = TRUE)
 
-#' @exportS3Method
-agent_to_ask.gym_training_settings <- function(settings, state, vector_env) state$agent
-
-#' @exportS3Method
-seed_drawer.gym_training_settings <- function(settings) {
-  function(n) sample.int(last_training_seed, n, replace = TRUE)
-}
-
-#' @exportS3Method
-training_ends.gym_training_settings <- function(settings, state, vector_env) {
+#' Does training end after the last iteration, because the target is reached?
+#'
+#' The only place that sets `solved`. A search is solved by the round that reaches the target; later
+#' ones were not played. Otherwise a stopping evaluation decides.
+#' @noRd
+training_ends <- function(state, vector_env, settings) {
   reached <- reaches(state$history[[state$iteration]]$mean_return, settings$target)
+  if (is_search(settings)) {
+    return(state$solved <- reached)
+  }
   if (!reached && state$iteration %% settings$eval_every == 0) {
     episodes <- min(curve_episodes, settings$eval_episodes)
     curve <- evaluate_agent(state, vector_env, settings, "curve", episodes)
@@ -34,14 +30,6 @@ training_ends.gym_training_settings <- function(settings, state, vector_env) {
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
-}
-
-#' @exportS3Method
-finish_training.gym_training_settings <- function(settings, state, vector_env) {
-  if (is.null(state$final)) {
-    state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
-    state$checkpoint(last = TRUE)
-  }
 }
 
 #' Evaluate the agent's policy: in fresh episodes, or exactly where it is judged by a model
@@ -77,36 +65,4 @@ play_evaluation <- function(state, vector_env, settings, policy, episodes, final
     vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf
   )
   evaluate_episodes(episodes_table(history$batches), policy)
-}
-
-# Showing ------------------------------------------------------------------------------
-
-#' @exportS3Method
-played_text.gym_training_settings <- function(settings, state, of_all = FALSE) {
-  count_of(state$iteration, "iteration")
-}
-
-#' @exportS3Method
-training_progress.gym_training_settings <- function(settings, state, progress,
-                                                    frame = parent.frame()) {
-  by_steps <- is.null(settings$iterations)
-  bar <- progress_bar(
-    settings$iterations %||% settings$steps, if (by_steps) "Step" else "Iteration",
-    shown = progress, frame = frame
-  )
-  function(state) {
-    row <- state$history[[state$iteration]]
-    evaluated <- if (length(state$evaluations)) {
-      state$evaluations[[length(state$evaluations)]]$mean_return
-    }
-    bar(
-      if (by_steps) min(state$steps, settings$steps) else state$iteration,
-      paste0(
-        "median ", number_text(row$median_return), ", best ", number_text(row$max_return),
-        if (!is.null(evaluated)) paste0(", evaluation ", number_text(evaluated)),
-        ", ", number_text(row$steps / max(row$elapsed, 1e-3)), " steps/s, ",
-        workers_note()
-      )
-    )
-  }
 }

@@ -118,7 +118,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
     vector_env <- with_masks(vector_env, agent$mask, note, call)
   }
   history <- new_history(1L, settings$episodes, state$streams)
-  history$draw_seeds <- seed_drawer(settings)
+  history$draw_seeds <- draw_training_seeds
   play_batches(
     vector_env, history, function(which) NULL, learner = learner,
     report = function(ended) state$report(history$played_episodes + ended),

@@ -8,58 +8,78 @@ log_columns <- c(
   "rollout/ep_len_mean", "eval/mean_reward", "eval/mean_ep_length"
 )
 
-log_row <- function(state) {
-  row <- state$history[[state$iteration]]
-  evaluated <- Filter(function(one) one$iteration == state$iteration, state$evaluations)
-  last <- if (length(evaluated)) evaluated[[length(evaluated)]]
-  values <- data.frame(
-    row$iteration, row$steps, round(row$elapsed, 3), round(row$steps / max(row$elapsed, 1e-3)),
-    row$mean_return, row$min_return, row$median_return, row$max_return,
-    row$mean_length,
-    if (is.null(last)) NA else last$mean_return,
-    if (is.null(last) || is_exact(last)) NA else last$steps / last$episodes
+# The lines of the table for these iterations, the first of which has the names of the columns.
+log_lines <- function(state, iterations) {
+  rows <- rows_table(state$history[iterations], no_iterations)
+  evaluations <- rows_table(state$evaluations, no_evaluations)
+  # Of several evaluations of an iteration the last, which had the most episodes.
+  evaluations <- evaluations[!duplicated(evaluations$iteration, fromLast = TRUE), ]
+  evaluated <- evaluations[match(rows$iteration, evaluations$iteration), ]
+  length <- evaluated$steps / evaluated$episodes
+  # One that was calculated by a model has no episodes.
+  length[!is.finite(length)] <- NA
+  table <- data.frame(
+    rows$iteration, rows$steps, round(rows$elapsed, 3),
+    round(rows$steps / pmax(rows$elapsed, 1e-3)), rows$mean_return, rows$min_return,
+    rows$median_return, rows$max_return, rows$mean_length, evaluated$mean_return, length
   )
-  rlang::set_names(values, log_columns)
+  # Numbers with as many digits as they need and without an exponent, and nothing for what was not
+  # evaluated.
+  old <- options(scipen = 15)
+  on.exit(options(old))
+  utils::capture.output(with_decimal_point(utils::write.table(
+    rlang::set_names(table, log_columns), sep = ",", na = "", row.names = FALSE, quote = FALSE
+  )))
 }
 
 #' Prepare to log a training
-#' @param iteration After which iteration the training goes on. Later rows, of iterations that a
-#'   checkpoint did not have, are taken out.
+#'
+#' The table is written anew when the training begins or goes on, so that it has what the history
+#' has, and after a line could not be written. Otherwise lines are appended.
+#' @param state The training as it begins or goes on.
 #' @return A function that is called after each iteration.
 #' @noRd
-training_log <- function(folder, settings, iteration, call) {
+training_log <- function(folder, settings, state, call) {
   if (is.null(folder)) {
-    return(function(state) NULL)
+    return(function() NULL)
   }
   table <- file.path(folder, "progress.csv")
-  missing <- tryCatch(
+  write_all <- function() {
+    replace_content(table, as_lines(log_lines(state, seq_len(state$iteration))))
+  }
+  tryCatch(
     {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
       write_config(file.path(folder, "config.json"), settings)
-      keep_iterations(table, iteration)
+      # One that is there when a training begins is another training's.
+      if (state$iteration == 0L && file.exists(table)) file.rename(table, free_name(table))
+      write_all()
     },
     error = function(cnd) abort_log(folder, cnd, call),
     warning = function(cnd) abort_log(folder, cnd, call)
   )
-  if (missing > 0L) warn_incomplete(table, missing)
+  logged <- state$iteration
+  whole <- TRUE
   failed <- FALSE
-  cut <- FALSE
-  function(state) {
+  function() {
+    new <- seq_len(state$iteration - logged) + logged
+    logged <<- state$iteration
     # A full disk must not end what has trained for hours.
     tryCatch(
       {
-        if (cut) keep_iterations(table, Inf)
-        cut <<- TRUE
-        append_row(table, log_row(state))
-        cut <<- FALSE
+        if (whole) append_lines(table, log_lines(state, new)[-1L]) else write_all()
+        whole <<- TRUE
       },
       error = function(cnd) {
+        whole <<- FALSE
         if (!failed) warn_not_logged(table, cnd)
         failed <<- TRUE
       }
     )
   }
 }
+
+append_lines <- function(table, lines) write_bytes(table, as_lines(lines), "ab")
 
 abort_log <- function(folder, cnd, call) {
   gym_abort(
@@ -77,16 +97,8 @@ warn_not_logged <- function(table, cnd) {
   )
 }
 
-warn_incomplete <- function(table, missing) {
-  rlang::warn(
-    c(paste0("The log \"", table, "\" lacks ", count_of(missing, "iteration"), "."),
-      x = "Its lines were not written completely, as on a full disk, and are left out."),
-    class = "gym_warning_log"
-  )
-}
-
 write_config <- function(file, settings) {
-  numbers <- c("iterations", "steps", "episodes", "target", "max_steps", "eval_every",
+  numbers <- c("iterations", "total_steps", "episodes", "target", "max_steps", "eval_every",
                "eval_episodes", "seed")
   config <- c(
     list(
@@ -94,7 +106,7 @@ write_config <- function(file, settings) {
       kwargs = empty_as_object(settings$kwargs),
       policy = if (is.null(settings$policy)) "the learner's own" else policy_text(settings$policy)
     ),
-    unclass(settings)[numbers],
+    settings[numbers],
     list(provenance = plain_provenance(settings$provenance))
   )
   json <- with_decimal_point(jsonlite::toJSON(
@@ -114,36 +126,6 @@ plain_provenance <- function(from) {
   from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
 }
 
-#' Take out of a log the lines of later iterations, and those that were not written completely
-#' @return How many iterations are missing because their lines were not complete.
-#' @noRd
-keep_iterations <- function(table, iteration) {
-  if (!file.exists(table)) {
-    return(0L)
-  }
-  if (iteration == 0L) {
-    # It is another training's.
-    file.rename(table, free_name(table))
-    return(0L)
-  }
-  lines <- readLines(table, warn = FALSE, skipNul = TRUE)
-  complete <- are_complete(table, lines)
-  # The first column counts iterations, and has no number in the first line.
-  of_lines <- suppressWarnings(as.numeric(sub(",.*", "", lines)))
-  kept <- complete & !is.na(of_lines) & of_lines <= iteration
-  replace_content(table, as_lines(c(paste(log_columns, collapse = ","), lines[kept])))
-  looked_for <- if (!all(complete) && is.finite(iteration)) seq_len(iteration)
-  length(setdiff(looked_for, of_lines[kept]))
-}
-
-# A line that was cut has no end, or the next one was written behind it.
-are_complete <- function(table, lines) {
-  commas <- nchar(gsub("[^,]", "", lines, useBytes = TRUE))
-  bytes <- readBin(table, "raw", file.size(table))
-  ends <- identical(utils::tail(bytes, 1L), charToRaw("\n"))
-  commas == length(log_columns) - 1L & (ends | seq_along(lines) < length(lines))
-}
-
 # "progress-1.csv" for "progress.csv", or the first such name that is free.
 free_name <- function(file) {
   number <- 1L
@@ -151,16 +133,4 @@ free_name <- function(file) {
     number <- number + 1L
   }
   name
-}
-
-append_row <- function(table, row) {
-  first <- !file.exists(table)
-  # Numbers with as many digits as they need and without an exponent, and nothing for what was not
-  # evaluated.
-  old <- options(scipen = 15)
-  on.exit(options(old))
-  lines <- utils::capture.output(with_decimal_point(utils::write.table(
-    row, sep = ",", na = "", row.names = FALSE, col.names = first, quote = FALSE
-  )))
-  write_bytes(table, as_lines(lines), "ab")
 }

@@ -1,76 +1,23 @@
-# The result of a search, whatever its method: class gym_search.
+# The result of a search, class gym_search: a training that keeps its episodes.
 
-#' Make the result of a search
-#'
-#' @param state What was played, as [new_training()] makes it. Rounds that have finished count.
-#' @noRd
-search_result <- function(settings, state, interrupted = FALSE) {
-  agent <- state$agent
-  episodes <- rounds_episodes(state$episodes)
-  rounds <- rounds_table(episodes, settings$episodes)
-  found <- agent$played > 0L
-  structure(
-    list(
-      policy = if (found) agent_policy(agent),
-      solved = found && reaches(agent$best_return, settings$target),
-      round = if (found) agent$best else NA_integer_,
-      rounds = rounds,
-      episodes = episodes,
-      history = rounds_history(rounds, settings$episodes),
-      agent = agent,
-      target = settings$target,
-      env_id = settings$env_id,
-      env = settings[["env"]],
-      num_envs = settings$num_envs,
-      client = settings$client,
-      template = settings$policy,
-      max_rounds = settings$rounds,
-      max_steps = settings$max_steps,
-      seed = settings$seed,
-      steps = sum(as.numeric(rounds$steps)),
-      elapsed = proc.time()[["elapsed"]] - state$started,
-      interrupted = interrupted,
-      provenance = settings$provenance
-    ),
-    class = c("gym_search", "gym_training")
-  )
-}
-
-# The episodes of all iterations; their rounds count on from one iteration to the next.
-rounds_episodes <- function(iterations) {
-  before <- 0L
-  for (i in seq_along(iterations)) {
-    iterations[[i]]$candidate <- iterations[[i]]$candidate + before
-    before <- max(iterations[[i]]$candidate)
-  }
-  episodes <- do.call(rbind, c(list(episodes_table(list(), several = TRUE)), iterations))
+# What a search has beside what every training has.
+search_parts <- function(settings, state, history) {
+  episodes <- do.call(rbind, c(list(episodes_table(list(), several = TRUE)), state$episodes))
   names(episodes)[[1L]] <- "round"
-  episodes
-}
-
-rounds_table <- function(episodes, each) {
-  rounds <- nrow(episodes) %/% each
-  of_rounds <- function(values) matrix(values, ncol = rounds)
-  data.frame(
-    round = seq_len(rounds), mean_return = colMeans(of_rounds(episodes$return)),
-    steps = as.integer(colSums(of_rounds(episodes$length)))
-  )
-}
-
-# As that of a training: a round is an iteration with one candidate, whose time was not taken.
-rounds_history <- function(rounds, each) {
-  mean <- rounds$mean_return
-  data.frame(
-    iteration = rounds$round, steps = cumsum(as.numeric(rounds$steps)), min_return = mean,
-    median_return = mean, mean_return = mean, max_return = mean,
-    mean_length = rounds$steps / each, evaluation = rep(NA_real_, length(mean)),
-    elapsed = rep(NA_real_, length(mean))
+  list(
+    round = if (nrow(history)) state$agent$best else NA_integer_,
+    rounds = data.frame(
+      round = history$iteration, mean_return = history$mean_return,
+      steps = as.integer(diff(c(0, history$steps)))
+    ),
+    episodes = episodes, template = settings$policy, max_rounds = settings$iterations,
+    num_envs = settings$num_envs, client = settings$client
   )
 }
 
 #' Use what a search has found
 #'
-#' A search returns an object of class `gym_search`, which R's usual functions know:
+#' A search returns an object of class `gym_search`, a training that R's usual functions know:
 #' `print()` says in a few lines what came of it, `as.data.frame()` gives its episodes,
 #' `predict()` what the policy that was found does, and `summary()` plays that policy in
 #' fresh episodes to estimate how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
@@ -82,7 +29,6 @@ rounds_history <- function(rounds, each) {
 #'
 #' @param x,object A search, as [search_random()] returns it.
 #' @param row.names,optional,... Not used.
-#' @param newdata,type As for [predict()][predict.gym_policy()] of a policy.
 #' @param episodes How many fresh episodes to play, a whole number of at least 1; the
 #'   default is 100.
 #' @param seed A whole number that fixes the fresh episodes and leaves the session's
@@ -91,14 +37,12 @@ rounds_history <- function(rounds, each) {
 #'   their order: `round`, `episode`, `seed`, `sub_env` (integers),
 #'   `return` (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
 #'
-#'   `predict()`: for `n` observations the actions, an integer vector of length `n` (a
-#'   matrix with `n` rows where an action has several numbers), or the outputs, a numeric
-#'   vector of length `n` (a matrix with `n` rows where the network has several).
+#'   `predict()`: as that of the [policy][predict.gym_policy()].
 #'
 #'   `summary()`: an object of class `summary.gym_search`, a list with the elements `search`
 #'   (the search), `rounds`, `episodes`, `steps` (how many the search used, integers),
 #'   `fresh` (the [rollout()] of the policy found), `mean` and `se` (its mean return and the
-#'   standard error, doubles) and `solved` (logical: has the mean of the fresh episodes
+#'   standard error, doubles) and `reached` (logical: has the mean of the fresh episodes
 #'   reached the target?).
 #' @section Errors: `gym_error_argument` when the search has no policy because it was ended
 #'   in its first round, or `newdata` does not fit the policy. `summary()` needs the
@@ -122,53 +66,13 @@ as.data.frame.gym_search <- function(x, row.names = NULL, optional = FALSE, ...)
   x$episodes
 }
 
-#' @export
-print.gym_search <- function(x, ...) {
-  cat(search_lines(x), sep = "\n")
-  invisible(x)
-}
-
-search_lines <- function(x) {
-  c(
-    paste("Random search in", x$env_id),
-    paste0("Policy: ", policy_text(x$template)),
-    "",
-    outcome_line(x),
-    effort_line(x)
-  )
-}
-
-outcome_line <- function(x) {
-  if (is.null(x$policy)) {
+best_round_line <- function(x) {
+  if (!nrow(x$rounds)) {
     return("Ended before the first round was played to its end")
   }
-  mean <- number_text(x$rounds$mean_return[[x$round]])
-  target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
-  if (x$solved) {
-    paste0("Solved in round ", x$round, " of at most ", x$max_rounds, ": mean return ", mean,
-           target)
-  } else {
-    paste0(if (!is.null(x$target)) "Not solved. ", "Best of ", count_of(nrow(x$rounds), "round"),
-           ": round ", x$round, ", mean return ", mean, target)
-  }
-}
-
-effort_line <- function(x) {
-  paste0(
-    if (x$interrupted) "Interrupted after " else "Played ",
-    count_of(nrow(x$rounds), "round"), ", ", count_of(nrow(x$episodes), "episode"), ", ",
-    count_of(sum(x$rounds$steps), "step"), " in ", seconds_text(x$elapsed)
-  )
-}
-
-# Predicting -------------------------------------------------------------------
-
-#' @rdname gym_search
-#' @export
-predict.gym_search <- function(object, newdata, type = c("action", "output"), ...) {
-  type <- check_choice(type[1L], c("action", "output"), arg = "type")
-  check_found(object)
-  predict_policy(object$policy, newdata, type)
+  paste0("Best of ", count_of(nrow(x$rounds), "round"), ": round ", x$round, ", mean return ",
+         number_text(x$rounds$mean_return[[x$round]]), " in ",
+         count_of(nrow(x$episodes) / nrow(x$rounds), "episode"))
 }
 
 check_found <- function(object, call = rlang::caller_env()) {
@@ -202,7 +106,7 @@ summary.gym_search <- function(object, episodes = 100, seed = NULL, ...) {
       fresh = fresh,
       mean = mean(returns),
       se = standard_error(returns),
-      solved = reaches(mean(returns), object$target)
+      reached = reaches(mean(returns), object$target)
     ),
     class = "summary.gym_search"
   )
@@ -210,10 +114,10 @@ summary.gym_search <- function(object, episodes = 100, seed = NULL, ...) {
 
 #' @export
 print.summary.gym_search <- function(x, ...) {
-  cat(search_lines(x$search), sep = "\n")
+  cat(training_lines(x$search), sep = "\n")
   fresh <- nrow(x$fresh$episodes)
   verdict <- if (!is.null(x$search$target)) {
-    paste0(", target ", number_text(x$search$target), if (x$solved) " reached" else " not reached")
+    paste0(", target ", number_text(x$search$target), if (x$reached) " reached" else " not reached")
   }
   cat(
     "",

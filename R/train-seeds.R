@@ -17,13 +17,13 @@ check_training_seeds <- function(seeds, seed, call) {
 #' met is the last of them.
 #' @param in_env A function that makes the environment and calls a function with it. All trainings
 #'   play in the same, unless it remembers earlier episodes.
-#' @param files A list of `checkpoint`, `log` and `resume`, as [train_agent()] takes them.
+#' @param files As for [new_run()].
 #' @return As [gym_trainings].
 #' @noRd
-train_seeds <- function(in_env, settings, seeds, files, progress, call) {
+train_seeds <- function(in_env, settings, seeds, files, progress, client, call) {
   started <- proc.time()[["elapsed"]]
-  of_seeds <- lapply(seeds, function(seed) training_of_seed(settings, seed, files, call))
-  kept <- sum(!vapply(of_seeds, function(one) is.null(one$file$saved), NA))
+  runs <- lapply(seeds, function(seed) run_of_seed(settings, seed, files, call))
+  kept <- sum(!vapply(runs, function(run) is.null(run$file$saved), NA))
   if (kept > 0L) {
     inform_resumed("Going on from the files of {kept} of {length(seeds)} seed{?s}.")
   }
@@ -38,13 +38,14 @@ train_seeds <- function(in_env, settings, seeds, files, progress, call) {
     if (!training$interrupted) show(length(trainings), paste0(solved, " solved, "))
   }
   train_all <- function(vector_env) {
+    if (is_search(settings)) check_has_target(settings, vector_env, call)
     if (seeds_go_to_workers(vector_env, settings)) {
-      return(train_in_futures(vector_env, of_seeds, keep, call))
+      return(train_in_futures(vector_env, runs, keep, call))
     }
     anew <- length(vector_env$remembers) && !is_playable(settings$env)
-    with_env <- if (anew) in_env else function(use) use(vector_env)
-    for (one in of_seeds) {
-      training <- train_seed(one, with_env, call)
+    with_env <- if (anew) in_env else function(use, max_steps) use(vector_env)
+    for (run in runs) {
+      training <- train_seed(run, with_env, client, call)
       keep(training)
       if (training$interrupted) {
         rlang::interrupt()
@@ -54,19 +55,32 @@ train_seeds <- function(in_env, settings, seeds, files, progress, call) {
   interrupted <- keeping_trainings(
     until_interrupted(
       in_env(train_all, settings$max_steps),
-      "Interrupted after {finished} of {total} seed{?s}; what was trained is returned.",
+      "Interrupted after {finished} of {total} seed{?s}; what was finished is returned.",
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
-    function() trainings, keep, result, files, call
+    function() trainings, keep, result, settings$what, files, call
   )
   result(interrupted)
 }
 
+# Without a target no search is solved, whatever its seed.
+check_has_target <- function(settings, vector_env, call) {
+  if (is.null(settings$target %||% vector_env$spec$reward_threshold)) {
+    gym_abort(
+      c(paste(environment_label(vector_env), "has no reward threshold, so that nothing says when a",
+              "search has solved it."),
+        i = "Give the mean return that does as `target`."),
+      class = "gym_error_argument", argument = "target", call = call
+    )
+  }
+}
+
 # An error carries the trainings so far, with the one that was being trained.
-keeping_trainings <- function(code, trained, keep, result, files, call) {
+keeping_trainings <- function(code, trained, keep, result, what, files, call) {
   tryCatch(code, error = function(cnd) {
-    if (!length(trained()) && !inherits(cnd, "gym_error_training")) {
+    in_training <- inherits(cnd, "gym_error_training")
+    if (!length(trained()) && !in_training) {
       rlang::cnd_signal(cnd)
     }
     finished <- count_of(length(trained()), "seed")
@@ -76,8 +90,8 @@ keeping_trainings <- function(code, trained, keep, result, files, call) {
       keep(begun)
     }
     abort_with_result(
-      if (inherits(cnd, "gym_error_training")) cnd$parent %||% cnd else cnd, "The training",
-      result(), finished, "gym_error_training", call,
+      if (in_training) cnd$parent %||% cnd else cnd, paste("The", what), result(), finished,
+      unique(paste0("gym_error_", c(what, "training"))), call,
       if (!is.null(files$checkpoint)) {
         "The same call goes on from the checkpoints when what is wrong is fixed."
       }
@@ -85,10 +99,14 @@ keeping_trainings <- function(code, trained, keep, result, files, call) {
   })
 }
 
-train_seed <- function(one, with_env, call) {
-  quietly_for_seed(with_env(function(vector_env) {
-    train_in(vector_env, one$settings, one$file, one$log, progress = FALSE, call)
-  }))
+# Messages come once, for all seeds.
+train_seed <- function(run, with_env, client, call) {
+  withCallingHandlers(
+    do_run(run, with_env, NULL, client, progress = FALSE, call),
+    gym_message_interrupted = rlang::cnd_muffle,
+    gym_message_resumed = rlang::cnd_muffle,
+    gym_message_remembers = rlang::cnd_muffle
+  )
 }
 
 # On workers -----------------------------------------------------------------------------
@@ -151,18 +169,18 @@ workers_of_plan <- function(plan) {
 }
 
 # A future for each seed. What they return is kept in the order of the seeds.
-train_in_futures <- function(vector_env, of_seeds, keep, call) {
-  recipe <- training_recipe(vector_env, of_seeds[[1L]]$settings)
-  trained <- vector("list", length(of_seeds))
+train_in_futures <- function(vector_env, runs, keep, call) {
+  recipe <- training_recipe(vector_env, runs[[1L]]$settings)
+  trained <- vector("list", length(runs))
   begun <- kept <- 0L
   next_seed <- function() {
-    if (begun == length(of_seeds)) {
+    if (begun == length(runs)) {
       return(NULL)
     }
     begun <<- begun + 1L
     at <- begun
-    one <- of_seeds[[at]]
-    task <- new_worker_task("training", recipe, server_versions(vector_env$client), one = one)
+    run <- runs[[at]]
+    task <- new_worker_task("training", recipe, server_versions(vector_env$client), run = run)
     list(
       task = task, here = function() run_task(task),
       done = function(training) {
@@ -179,21 +197,21 @@ train_in_futures <- function(vector_env, of_seeds, keep, call) {
 
 #' @exportS3Method
 run_task.gym_task_training <- function(task) {
-  settings <- task$one$settings
+  settings <- task$run$settings
   # The plan uses the cores.
   if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
-  with_env <- function(use) {
+  with_env <- function(use, max_steps) {
     with_training_env(settings, function(vector_env) {
       check_worker_gymnasium(task, vector_env$client)
       use(vector_env)
     }, NULL, gym_client(), call)
   }
-  train_seed(task$one, with_env, call)
+  train_seed(task$run, with_env, gym_client(), call)
 }
 
 # What a seed has of its own: its settings, its checkpoint, the folder of its log.
-training_of_seed <- function(settings, seed, files, call) {
+run_of_seed <- function(settings, seed, files, call) {
   settings$seed <- seed
   text <- format(seed, scientific = FALSE)
   if (!is.null(files$checkpoint)) {
@@ -202,18 +220,6 @@ training_of_seed <- function(settings, seed, files, call) {
       substr(files$checkpoint, 1L, end - 1L), "-", text, substring(files$checkpoint, end)
     )
   }
-  list(
-    settings = settings, file = training_file(settings, files, call),
-    log = if (!is.null(files$log)) file.path(files$log, paste0("seed-", text))
-  )
-}
-
-# Messages come once, for all seeds.
-quietly_for_seed <- function(code) {
-  withCallingHandlers(
-    code,
-    gym_message_interrupted = function(cnd) rlang::cnd_muffle(cnd),
-    gym_message_resumed = function(cnd) rlang::cnd_muffle(cnd),
-    gym_message_remembers = function(cnd) rlang::cnd_muffle(cnd)
-  )
+  if (!is.null(files$log)) files$log <- file.path(files$log, paste0("seed-", text))
+  new_run(settings, files, call)
 }

@@ -15,7 +15,7 @@ agents <- list(
 )
 
 train <- function(agent) {
-  train_agent(agent, "CartPole-v1", policy_network(c(NA, 2, 1)), steps = budget, seeds = 1:20,
+  train_agent(agent, "CartPole-v1", policy_network(c(NA, 2, 1)), total_steps = budget, seeds = 1:20,
               eval_every = 4)
 }
 trained <- lapply(agents, train)

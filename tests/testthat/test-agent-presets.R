@@ -33,13 +33,14 @@ test_that("a search takes its preset, says so, and lets arguments go before it",
   skip_unless_all()
   client <- test_client()
   expect_message(
-    trained <- search_ars("CartPole-v1", steps = 500, eval_episodes = 2, seed = 1, client = client),
+    trained <- search_ars("CartPole-v1", total_steps = 500, eval_episodes = 2, seed = 1,
+                          client = client),
     "preset for CartPole-v1 .*ours", class = "gym_message_preset"
   )
   preset <- find_preset("ars", "CartPole-v1", list())
   by_hand <- train_agent(
     agent_ars(preset$directions, preset$top, preset$step_size, preset$noise, preset$version),
-    "CartPole-v1", policy_linear(bias = preset$bias), steps = 500, target = preset$target,
+    "CartPole-v1", policy_linear(bias = preset$bias), total_steps = 500, target = preset$target,
     eval_episodes = 2, seed = 1, client = client
   )
   expect_identical(trained$history$mean_return, by_hand$history$mean_return)
@@ -85,4 +86,14 @@ test_that("without a preset agents have their own defaults, and training needs a
   expect_error(search_cem("CartPole-v1"), "another agent: \"ars\"",
                class = "gym_error_argument")
   expect_error(agent_ars(4, 2, version = "V1"), "V1-t", class = "gym_error_argument")
+})
+
+test_that("whoever still writes `steps` is told its new name, before anything is made", {
+  calls <- list(search_ars, search_cem, search_hill_climb, learn_q, learn_sarsa, learn_monte_carlo)
+  for (call in calls) {
+    expect_error(call("CartPole-v1", steps = 100, client = no_client()), "`total_steps`",
+                 class = "gym_error_argument")
+  }
+  expect_error(learn_td("Taxi-v4", policy_random(), steps = 100, client = no_client()),
+               "`total_steps`", class = "gym_error_argument")
 })

@@ -115,7 +115,7 @@ test_that("bad arguments are refused before anything is made, naming argument an
   bad(seeds = c(3, 1, 3), message = "`seeds` must differ")
   bad(rounds = 0, message = "`rounds`")
   bad(env = NA, message = "`env`")
-  bad(policy = policy_random(), message = "needs a policy with weights")
+  bad(policy = policy_random(), message = "must be a policy with weights")
   expect_error(search_repeat(fake_environment(), seeds = 1), "has no reward threshold",
                class = "gym_error_argument")
 })
@@ -137,7 +137,7 @@ test_that("a progress bar is shown when asked for and nothing is said otherwise"
     ),
     type = "message"
   )
-  expect_match(paste(shown, collapse = " "), "Search [0-9]+ of 40 .*0 solved")
+  expect_match(paste(shown, collapse = " "), "Seed [0-9]+ of 40 .*0 solved")
 })
 
 test_that("CartPole: each seed's row is the search with that seed, and nothing stays open", {

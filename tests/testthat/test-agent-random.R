@@ -67,6 +67,46 @@ test_that("each round draws fresh weights, the first too", {
   expect_true(all(abs(weights) <= 1))
 })
 
+test_that("a search is a training by the tutorial's rule", {
+  env <- fake_environment(reward = first_action)
+  search <- search_random(env, rounds = 9, target = 13, seed = 2)
+  trained <- train_agent(agent_random(), env, policy_network(), iterations = 9, episodes = 5,
+                         target = 13, seed = 2, solved_by = "candidate")
+  expect_s3_class(trained, c("gym_search", "gym_training"), exact = TRUE)
+  same <- setdiff(names(search), c("elapsed", "template", "max_rounds", "provenance"))
+  expect_identical(trained[same], search[same])
+  expect_identical(search$history$iteration, search$rounds$round)
+  expect_identical(search$history$steps, cumsum(as.numeric(search$rounds$steps)))
+  expect_identical(nrow(search$evaluations), 0L)
+})
+
+test_that("a search logs its rounds, and calls back after those that were played together", {
+  folder <- withr::local_tempdir()
+  seen <- integer()
+  trained <- train_agent(
+    agent_random(), fake_vector_env(4, "sync", reward = first_action), policy_network(),
+    iterations = 9, episodes = 4, target = Inf, seed = 2, solved_by = "candidate", log = folder,
+    callback = function(search) {
+      seen <<- c(seen, nrow(search$rounds))
+      TRUE
+    }
+  )
+  # A batch of 16 episodes has room for four rounds.
+  expect_identical(seen, c(4L, 8L, 9L))
+  log <- utils::read.csv(file.path(folder, "progress.csv"))
+  expect_identical(log$time.iterations, 1:9)
+  expect_equal(log$rollout.ep_rew_mean, trained$rounds$mean_return)
+})
+
+test_that("many searches are trainings, too, and each says whether it was solved", {
+  env <- fake_environment(reward = first_action)
+  trained <- train_agent(agent_random(), env, policy_network(), iterations = 4, episodes = 3,
+                         target = 11, seeds = 1:4, solved_by = "candidate")
+  searches <- search_repeat(env, rounds = 4, episodes = 3, target = 11, seeds = 1:4)
+  expect_identical(as.data.frame(trained)$solved, as.data.frame(searches)$solved)
+  expect_output(print(trained), "Solved with [0-9] of 4 seeds")
+})
+
 test_that("set.seed() alone fixes a search, whose seed gives it again and moves no generator", {
   figures <- function(search) search[c("policy", "rounds", "episodes", "round", "seed")]
   env <- fake_environment(reward = first_action)
@@ -136,7 +176,7 @@ test_that("bad arguments are refused before anything is made, naming argument an
   bad(progress = 1, message = "`progress`")
   bad(env = NA, message = "`env`")
   bad(policy = 3, message = "`policy`")
-  bad(policy = policy_random(), message = "needs a policy with weights to draw, not random.")
+  bad(policy = policy_random(), message = "`policy` must be a policy with weights, not random.")
   bad(policy = function(observation) 1, message = "not a function")
 })
 
@@ -160,7 +200,7 @@ test_that("an interrupt returns the rounds that were finished, with a message", 
   expect_true(search$interrupted)
   expect_identical(search$rounds$mean_return, c(1.5, 3.5))
   expect_identical(search$round, 2L)
-  expect_output(print(search), "Interrupted after 2 rounds, 4 episodes", fixed = TRUE)
+  expect_output(print(search), "Interrupted after 2 rounds, 4 steps", fixed = TRUE)
 })
 
 test_that("an interrupt in the first round leaves a search that says it has nothing", {
@@ -190,7 +230,7 @@ test_that("an error in the middle carries what was played, with its own classes 
   expect_identical(cnd$url, "http://there")
   expect_identical(cnd$result$rounds$mean_return, c(1.5, 3.5))
   expect_identical(cnd$result$round, 2L)
-  expect_match(conditionMessage(cnd), "after 2 rounds")
+  expect_match(conditionMessage(cnd), "after 2 of 50 rounds")
   expect_identical(conditionMessage(cnd$parent), "lost")
   expect_false(cnd$result$interrupted)
 })

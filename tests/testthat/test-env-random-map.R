@@ -22,7 +22,8 @@ test_that("a random map follows from the seed, whatever plays", {
 })
 
 test_that("what is learned on a random map is judged on the same", {
-  learned <- random_lake(learn_q, steps = 2000, seed = 1, is_slippery = FALSE, max_steps = 100)
+  learned <- random_lake(learn_q, total_steps = 2000, seed = 1, is_slippery = FALSE,
+                         max_steps = 100)
   lake <- env_model(
     "FrozenLake-v1", desc = provenance(learned)$kwargs$desc, is_slippery = FALSE,
     client = test_client()

@@ -1,13 +1,13 @@
 searches_of <- function(round, max_rounds = 10L) {
-  rows <- Map(function(seed, round) {
-    data.frame(
-      seed = seed, solved = !is.na(round), round = round,
-      rounds = if (is.na(round)) max_rounds else round, mean_return = 1, steps = 1L, elapsed = 0
+  searches <- Map(function(seed, round) {
+    played <- if (is.na(round)) max_rounds else round
+    list(
+      seed = seed, solved = !is.na(round), round = round, interrupted = FALSE, elapsed = 0,
+      rounds = data.frame(round = seq_len(played), mean_return = 1, steps = 1L)
     )
   }, seq_along(round), as.integer(round))
-  settings <- list(env_id = "Fake-v0", target = 1, policy = policy_network(), rounds = max_rounds,
-                   episodes = 5L)
-  new_searches(rows, settings, proc.time()[["elapsed"]], FALSE)
+  given <- list(target = 1, template = policy_network(), max_rounds = max_rounds, episodes = 5L)
+  new_searches(list(trainings = searches, env_id = "Fake-v0"), given)
 }
 
 test_that("bars count the searches, the curve is geometric with the estimated chance", {

@@ -97,7 +97,7 @@ test_that("policies of other classes are asked by their own method, in vector en
   map <- decision_map(fake_environment(), follower, x = 3, y = 4)
   expect_output(print(map), "Policy: an object of class follower")
   expect_error(search_random(fake_environment(), follower),
-               "weights to draw, not an object of class follower", class = "gym_error_argument")
+               "policy with weights, not an object of class follower", class = "gym_error_argument")
   expect_error(rollout(fake_environment(), structure(list(), class = "stranger")),
                "must be a policy or a function", class = "gym_error_argument")
 })

@@ -18,7 +18,7 @@ test_that("of rounds played at once the first in order wins, not the first in ti
     expect_identical(search$episodes$length, c(4L, 2L, 9L, 3L))
     expect_identical(search$episodes$round, rep(1:2, each = 2))
     expect_identical(search$episodes$episode, rep(1:2, 2))
-    expect_output(print(search), "2 rounds, 4 episodes, 18 steps")
+    expect_output(print(search), "2 rounds, 18 steps")
   }
 })
 
@@ -130,7 +130,7 @@ test_that("an error in the middle carries the rounds that were finished", {
   cnd <- tryCatch(search_random(env, episodes = 2, target = Inf), gym_error_search = identity)
   expect_s3_class(cnd, "gym_error_connection")
   expect_identical(cnd$result$rounds$mean_return, c(1.5, 3.5))
-  expect_match(conditionMessage(cnd), "after 2 rounds")
+  expect_match(conditionMessage(cnd), "after 2 of 50 rounds")
 })
 
 test_that("the progress bar counts the rounds of a batch in their order, with the best so far", {

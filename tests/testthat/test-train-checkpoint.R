@@ -177,6 +177,18 @@ test_that("a damaged or foreign file is an error, and stays as it is", {
   expect_identical(nrow(quiet_search(env, rounds = 2, checkpoint = path)$rounds), 2L)
 })
 
+test_that("a file of an older version says that it is one", {
+  # As version 1.0.0 wrote them.
+  old <- structure(
+    list(format = 5L, version = "1.0.0", hash = "", state = raw(1)), class = "gym_checkpoint"
+  )
+  path <- local_checkpoint(serialize(old, NULL))
+  play <- function(...) quiet_search(fake_environment(), rounds = 1, checkpoint = path, ...)
+  expect_error(play(), "was written by an older version of this package",
+               class = "gym_error_checkpoint")
+  expect_s3_class(play(resume = FALSE), "gym_search")
+})
+
 test_that("a place where no file can be is refused before anything is made", {
   folder <- withr::local_tempdir()
   for (path in c(folder, file.path(folder, "none", "search.rds"))) {
@@ -247,7 +259,7 @@ test_that("a relative path is that of the folder at the start", {
   }
   quiet_search(env, rounds = 2, checkpoint = "here.rds")
   expect_identical(list.files(folder), "here.rds")
-  expect_true(read_checkpoint(file.path(folder, "here.rds"))$finished)
+  expect_identical(read_checkpoint(file.path(folder, "here.rds"), NULL)$training$iteration, 2L)
   expect_identical(list.files(other), character())
 })
 
@@ -296,20 +308,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   expect_no_condition(play(path), class = "gym_message_resumed")
   expect_message(play(path), "had ended", class = "gym_message_resumed")
   half <- local_checkpoint(kept$list[[3]])
-  expect_message(play(half), "with 2 of 4 rounds", class = "gym_message_resumed")
-})
-
-test_that("in a vector environment the file is written after each batch, however long that takes", {
-  written <- function(env) {
-    kept <- local_kept_files()
-    local_functions(rest_per_writing = 1e6)
-    quiet_search(env, rounds = 6, episodes = 4, target = Inf, seed = 1,
-                 checkpoint = local_checkpoint())
-    length(kept$list)
-  }
-  # One before the first batch.
-  expect_identical(written(fake_vector_env(2, "sync", reward = first_action)), 4L)
-  expect_lt(written(fake_environment(reward = first_action)), 25L)
+  expect_message(play(half), "after 2 of 4 rounds", class = "gym_message_resumed")
 })
 
 test_that("of two searches on one file the one that is further is kept, with a warning", {
@@ -321,7 +320,7 @@ test_that("of two searches on one file the one that is further is kept, with a w
       list(what = "search", arguments = arguments, training = list(steps = played$steps),
            rest = numeric(played$steps))
     }
-    opened <- open_checkpoint(path, arguments, resume = TRUE)
+    opened <- open_checkpoint(path, arguments, resume = TRUE, "search", NULL)
     played$write <- checkpoint_writer(opened, state, "search", NULL)
     played
   }
@@ -349,12 +348,12 @@ test_that("files that cannot be written leave no connection behind", {
   before <- connections()
   nowhere <- file.path(withr::local_tempdir(), "no", "file")
   for (i in 1:3) {
-    expect_error(append_row(nowhere, data.frame(a = 1)), "cannot open")
+    expect_error(append_lines(nowhere, "1,2"), "cannot open")
     expect_error(write_checkpoint(nowhere, 1), "cannot open")
     expect_error(write_config(nowhere, list(seed = 1)))
   }
   skip_if_not(file.exists("/dev/full"))
   expect_error(write_bytes("/dev/full", raw(10), "wb"), "not all")
-  expect_error(append_row("/dev/full", data.frame(a = 1)), "not all")
+  expect_error(append_lines("/dev/full", "1,2"), "not all")
   expect_identical(connections(), before)
 })

@@ -2,13 +2,13 @@ test_that("a search prints in under ten lines what came of it", {
   search <- search_random(scripted_environment(c(1, 2, 30)), rounds = 3, episodes = 1, target = 20)
   lines <- capture.output(print(search))
   expect_lt(length(lines), 10)
-  expect_match(lines[1], "Random search in Fake-v0", fixed = TRUE)
+  expect_match(lines[1], "Training in Fake-v0 by random search", fixed = TRUE)
   expect_match(lines[2], "network 4-2-1, tanh, logistic, 10 weights", fixed = TRUE)
-  expect_match(lines[4], "Solved in round 3 of at most 3: mean return 30 (target 20)", fixed = TRUE)
-  expect_match(lines[5], "3 rounds, 3 episodes, 3 steps", fixed = TRUE)
+  expect_match(lines[3], "^Solved after 3 rounds, 3 steps in .* \\(target 20\\)$")
+  expect_identical(lines[4], "Best of 3 rounds: round 3, mean return 30 in 1 episode")
   search <- search_random(scripted_environment(c(1, 4, 2)), rounds = 3, episodes = 1, target = 20)
-  expect_output(print(search), "Not solved. Best of 3 rounds: round 2, mean return 4 (target 20)",
-                fixed = TRUE)
+  expect_output(print(search), "Played 3 rounds, 3 steps")
+  expect_output(print(search), "Best of 3 rounds: round 2, mean return 4")
 })
 
 test_that("predicting gives actions or the outputs behind them, and leaves the generator alone", {
@@ -47,7 +47,7 @@ test_that("a summary plays the policy found in fresh episodes", {
   returns <- rollout(env, search$policy, 50, seed = 2)$episodes$return
   expect_identical(summary$mean, mean(returns))
   expect_equal(summary$se, sd(returns) / sqrt(50))
-  expect_identical(summary$solved, mean(returns) >= 12)
+  expect_identical(summary$reached, mean(returns) >= 12)
   expect_identical(summary$steps, sum(search$episodes$length))
   expect_identical(summary$episodes, nrow(search$episodes))
   expect_output(print(summary), "50 fresh episodes")

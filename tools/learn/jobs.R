@@ -11,7 +11,7 @@ learn_jobs <- list(
     env_id = "FrozenLake-v1", goal = 0.73, seeds = 10, measure = "exact", judge = by_training,
     learn = function(seed) {
       learn_q(
-        "FrozenLake-v1", steps = 3e5, learning_rate = schedule_exponential(0.5, 0.005, 2.5e5),
+        "FrozenLake-v1", total_steps = 3e5, learning_rate = schedule_exponential(0.5, 0.005, 2.5e5),
         epsilon = schedule_linear(1, 0.1, 2e5), episodes = 64, num_envs = 16, num_workers = 0,
         target = Inf, seed = seed, progress = FALSE
       )
@@ -21,7 +21,7 @@ learn_jobs <- list(
     env_id = "FrozenLake8x8-v1", goal = 0.87, seeds = 10, measure = "exact", judge = by_training,
     learn = function(seed) {
       learn_q(
-        "FrozenLake8x8-v1", steps = 2e6, discount = 0.999,
+        "FrozenLake8x8-v1", total_steps = 2e6, discount = 0.999,
         learning_rate = schedule_exponential(0.5, 0.005, 1.6e6),
         epsilon = schedule_linear(1, 0.1, 1.5e6), episodes = 256, num_envs = 64, num_workers = 0,
         target = Inf, seed = seed, progress = FALSE
@@ -32,7 +32,7 @@ learn_jobs <- list(
     env_id = "CliffWalking-v1", goal = -13, seeds = 20, measure = "exact", judge = by_training,
     learn = function(seed) {
       learn_q(
-        "CliffWalking-v1", steps = 5e4, discount = 1, learning_rate = 0.5, num_envs = 8,
+        "CliffWalking-v1", total_steps = 5e4, discount = 1, learning_rate = 0.5, num_envs = 8,
         num_workers = 0, target = Inf, seed = seed, progress = FALSE
       )
     }

@@ -3,9 +3,11 @@
 #' One training says little about an agent: another seed may fail. `train_agent(seeds = )` trains
 #' anew with each of many seeds and returns all of them, failures included.
 #'
-#' How often the target is reached is judged by the final evaluations, of episodes that no training
-#' has seen: a training counts as solved where its final mean return has reached the target. The
-#' interval of that share is Wilson's, which makes sense also where all or none have.
+#' A training is `solved` where its stopping evaluation has reached the target. The time of that
+#' evaluation is one at which the policy was lucky, so that how often the target is reached is
+#' judged by the final evaluations, of episodes that no training has seen: `reached` says whether
+#' the final mean return has reached the target. The interval of that share is Wilson's, which makes
+#' sense also where all or none have.
 #'
 #' @param x,object Trainings, as `train_agent(seeds = )` returns them.
 #' @param row.names,optional,... Not used.
@@ -19,18 +21,17 @@
 #'     \item{interrupted}{Whether it was interrupted, a logical. The last of the trainings may then
 #'       have ended early.}
 #'     \item{provenance}{What [provenance()] tells, with all seeds.}
-#'   }
-#'   `as.data.frame()` gives a row for each seed: `seed` (whole number), `solved` (logical: has the
-#'   final evaluation reached the target?), `iterations` (integer), `steps` (double), `mean_return`,
-#'   `se`, `lower`, `upper` (of the final evaluation, doubles), `elapsed` (seconds, a double),
-#'   `interrupted` (logical).
+#'   } `as.data.frame()` gives a row for each seed: `seed` (whole number), `solved` (logical: has
+#'   the stopping evaluation reached the target?), `iterations` (integer), `steps` (double),
+#'   `mean_return`, `se`, `lower`, `upper` (of the final evaluation, doubles), `reached` (logical:
+#'   has that mean reached the target?), `elapsed` (seconds, a double), `interrupted` (logical).
 #'
 #'   `coef()` gives the weights of the policies, a matrix with a row for each seed.
 #'
-#'   `summary()` gives an object of class `summary.gym_trainings`, a list of `trainings`, `solved`
-#'   and `finished` (how many, integers), `lower` and `upper` (the 95% interval of the share that
-#'   solves, doubles), `returns` and `steps` (quartiles and mean of the final mean returns and of
-#'   the steps of the training, named numeric vectors of length 6).
+#'   `summary()` gives an object of class `summary.gym_trainings`, a list of `trainings`,
+#'   `finished`, `solved` and `reached` (how many, integers), `lower` and `upper` (the 95% interval
+#'   of the share that reaches the target, doubles), `returns` and `steps` (quartiles and mean of
+#'   the final mean returns and of the steps of the training, named numeric vectors of length 6).
 #' @references E. B. Wilson (1927), Probable inference, the law of succession, and statistical
 #'   inference, Journal of the American Statistical Association 22, 209-212.
 #' @seealso [train_agent()], [plot()][plot.gym_trainings()]
@@ -65,11 +66,11 @@ as.data.frame.gym_trainings <- function(x, row.names = NULL, optional = FALSE, .
   mean_return <- of_final("mean_return")
   data.frame(
     seed = narrow_whole(column(function(training) as.numeric(training$seed), 0)),
-    solved = vapply(mean_return, reaches, NA, target = x$target),
+    solved = column(function(training) training$solved, NA),
     iterations = column(function(training) NROW(training$history), 0L),
     steps = column(function(training) training$steps, 0),
     mean_return = mean_return, se = of_final("se"), lower = of_final("lower"),
-    upper = of_final("upper"),
+    upper = of_final("upper"), reached = vapply(mean_return, reaches, NA, target = x$target),
     elapsed = column(function(training) training$elapsed, 0),
     interrupted = column(function(training) training$interrupted, NA)
   )
@@ -87,12 +88,12 @@ coef.gym_trainings <- function(object, ...) {
 summary.gym_trainings <- function(object, ...) {
   table <- as.data.frame(object)
   done <- table[!table$interrupted, ]
-  interval <- wilson_interval(sum(done$solved), nrow(done))
+  interval <- wilson_interval(sum(done$reached), nrow(done))
   structure(
     list(
-      trainings = object, solved = sum(done$solved), finished = nrow(done),
-      lower = interval[[1L]], upper = interval[[2L]], returns = quartiles(done$mean_return),
-      steps = quartiles(done$steps)
+      trainings = object, finished = nrow(done), solved = sum(done$solved),
+      reached = sum(done$reached), lower = interval[[1L]], upper = interval[[2L]],
+      returns = quartiles(done$mean_return), steps = quartiles(done$steps)
     ),
     class = "summary.gym_trainings"
   )
@@ -124,16 +125,15 @@ trainings_lines <- function(x) {
     return("Ended before the first training was finished")
   }
   done <- table[!table$interrupted, ]
-  returns <- done$mean_return
+  returns <- done$mean_return[!is.na(done$mean_return)]
   c(
     paste0("Training in ", x$env_id, " by ", format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
-    if (length(returns) && !is.null(x$target)) {
-      interval <- wilson_interval(sum(done$solved), nrow(done))
+    if (nrow(done) && !is.null(x$target)) {
       paste0("Solved with ", sum(done$solved), " of ", count_of(nrow(done), "seed"), " (target ",
-             number_text(x$target), ", 95% interval from ", percent_text(interval[[1L]]), " to ",
-             percent_text(interval[[2L]]), ")")
+             number_text(x$target), ")")
     },
+    if (length(returns) && !is.null(x$target)) reached_line(done$reached),
     if (length(returns)) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))
@@ -142,6 +142,13 @@ trainings_lines <- function(x) {
            count_of(nrow(table), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
            seconds_text(x$elapsed))
   )
+}
+
+reached_line <- function(reached) {
+  interval <- wilson_interval(sum(reached), length(reached))
+  paste0("Final evaluations that reach the target: ", sum(reached), " of ", length(reached),
+         " (95% interval from ", percent_text(interval[[1L]]), " to ",
+         percent_text(interval[[2L]]), ")")
 }
 
 #' @export

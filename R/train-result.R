@@ -1,27 +1,35 @@
 # The result of a training: class gym_training.
 
-#' @exportS3Method
-training_result.gym_training_settings <- function(settings, state, interrupted = FALSE) {
+#' Make the result of a training
+#' @param state As [new_state()] makes it: the iterations that were finished count.
+#' @noRd
+training_result <- function(settings, state, interrupted = FALSE) {
+  search <- is_search(settings)
+  history <- rows_table(state$history, no_iterations)
   structure(
-    list(
-      policy = agent_policy(state$agent),
-      agent = state$agent,
-      solved = state$solved,
-      history = rows_table(state$history, no_iterations),
-      evaluations = rows_table(state$evaluations, no_evaluations),
-      final = state$final,
-      target = settings$target,
-      env_id = settings$env_id,
-      env = settings$env,
-      kwargs = settings$kwargs,
-      seed = settings$seed,
-      steps = state$steps,
-      elapsed = proc.time()[["elapsed"]] - state$started,
-      interrupted = interrupted,
-      max_steps = settings$max_steps,
-      provenance = settings$provenance
+    c(
+      list(
+        # A policy of which nothing was played is no finding of a search.
+        policy = if (!search || state$iteration > 0L) agent_policy(state$agent),
+        agent = state$agent,
+        solved = state$solved,
+        history = history,
+        evaluations = rows_table(state$evaluations, no_evaluations),
+        final = state$final,
+        target = settings$target,
+        env_id = settings$env_id,
+        env = settings$env,
+        kwargs = settings$kwargs,
+        seed = settings$seed,
+        steps = state$steps,
+        elapsed = proc.time()[["elapsed"]] - state$started,
+        interrupted = interrupted,
+        max_steps = settings$max_steps,
+        provenance = settings$provenance
+      ),
+      if (search) search_parts(settings, state, history)
     ),
-    class = "gym_training"
+    class = c(if (search) "gym_search", "gym_training")
   )
 }
 
@@ -57,15 +65,17 @@ print.gym_training <- function(x, ...) {
 }
 
 training_lines <- function(x) {
+  search <- inherits(x, "gym_search")
   outcome <- if (x$interrupted) "Interrupted after" else if (x$solved) "Solved after" else "Played"
   target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
   c(
-    paste0("Training in ", x$env_id, " by ", format(x$agent)),
-    paste0("Policy: ", policy_text(x$policy)),
+    paste0("Training in ", x$env_id, " by ", if (search) "random search" else format(x$agent)),
+    paste0("Policy: ", policy_text(x$policy %||% x$template)),
     paste0(
-      outcome, " ", count_of(max(0L, x$history$iteration), "iteration"), ", ",
+      outcome, " ", count_of(nrow(x$history), if (search) "round" else "iteration"), ", ",
       count_of(x$steps, "step"), " in ", seconds_text(x$elapsed), target
     ),
+    if (search) best_round_line(x),
     if (is_exact(x$final)) {
       paste("Expected return, by the model:", number_text(x$final$mean_return))
     } else if (!is.null(x$final)) {
@@ -89,6 +99,7 @@ evaluation_text <- function(row) {
 #' @export
 predict.gym_training <- function(object, newdata, type = c("action", "output"), ...) {
   type <- check_choice(type[1L], c("action", "output"), arg = "type")
+  check_found(object)
   predict_policy(object$policy, newdata, type)
 }
 

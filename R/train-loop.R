@@ -1,0 +1,260 @@
+# The one loop that trains agents: ask the agent, play its candidates, tell it what came of it. A
+# learner plays by itself (train-learner.R). When training ends stands in train-evaluation.R.
+
+#' Make what changes while an agent is trained
+#'
+#' @return An environment. Between iterations what `kept_of_training` names, with the streams, is
+#'   all that is needed to go on.
+#' @noRd
+new_state <- function(settings) {
+  generator <- new_generator(settings$seed)
+  rlang::env(
+    agent = settings$agent, iteration = 0L, steps = 0, history = list(), evaluations = list(),
+    episodes = list(), final = NULL, solved = FALSE, ended = FALSE,
+    streams = new_streams(settings$seed),
+    # Evaluations draw from streams of their own, so that training does not depend on them.
+    evaluation_streams = new_streams(with_generator(generator, draw_seed())),
+    started = proc.time()[["elapsed"]], report = function(ended) NULL
+  )
+}
+
+#' Train until the end, an interrupt or an error, which carries what was played
+#' @param state As [new_state()] makes it, with an agent that has begun.
+#' @param call The user's call.
+#' @return As [training_result()].
+#' @noRd
+run_training <- function(state, vector_env, settings, progress, call) {
+  show <- training_progress(settings, state, progress)
+  play <- function() {
+    while (!is_over(settings, state)) {
+      train_iteration(state, vector_env, settings, call)
+      state$ended <- training_ends(state, vector_env, settings)
+      state$log()
+      show()
+      if (!is.null(settings$callback)) {
+        stop_now <- isFALSE(settings$callback(training_result(settings, state)))
+        state$ended <- state$ended || stop_now
+      }
+      state$checkpoint(last = is_search(settings) && is_over(settings, state))
+    }
+    if (!is_search(settings) && is.null(state$final)) {
+      state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
+      state$checkpoint(last = TRUE)
+    }
+  }
+  what <- settings$what
+  interrupted <- tryCatch(
+    until_interrupted(
+      play(), paste("The", what, "was interrupted after {finished}; it returns what it has."),
+      function() played_text(settings, state)
+    ),
+    error = function(cnd) {
+      abort_with_result(
+        cnd, paste("The", what), training_result(settings, state), played_text(settings, state),
+        unique(paste0("gym_error_", c(what, "training"))), call,
+        if (!is.null(state$path)) {
+          paste0("The same call goes on from \"", state$path, "\" when what is wrong is fixed.")
+        }
+      )
+    }
+  )
+  training_result(settings, state, interrupted)
+}
+
+is_over <- function(settings, state) {
+  state$ended || state$iteration >= (settings$iterations %||% Inf) ||
+    state$steps >= (settings$total_steps %||% Inf)
+}
+
+# "3 of 20 iterations"
+played_text <- function(settings, state) {
+  of_all <- if (!is.null(settings$iterations)) paste(state$iteration, "of ")
+  paste0(of_all, count_of(settings$iterations %||% state$iteration, settings$unit))
+}
+
+train_iteration <- function(state, vector_env, settings, call) {
+  if (learns_online(state$agent)) {
+    results <- learn_episodes(state, vector_env, settings, call)
+    return(enter_iteration(state, settings, results$agent, results, results$lengths))
+  }
+  agent <- state$agent
+  if (is_search(settings)) agent$candidates <- rounds_together(state, vector_env, settings)
+  asked <- with_generator(state$streams$agent, agent_ask(agent))
+  policy <- agent_policy(agent)
+  asked <- plain_numbers(asked, "agent_ask()", call)
+  check_asked(asked, policy, call)
+  candidates <- policy_candidates(policy, asked)
+  needs <- check_needs(agent_needs(agent), call)
+  history <- new_history(nrow(asked), settings$episodes, state$streams)
+  if (!is_search(settings)) history$draw_seeds <- draw_training_seeds
+  play_batches(
+    vector_env, history, function(which) policy_subset(candidates, which),
+    report = function(ended) state$report(history$played_episodes + ended),
+    max_steps = settings$max_steps %||% Inf,
+    # Candidates after one that has reached the target need not be played.
+    target = if (is_search(settings)) settings$target,
+    keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
+    keep_next = "trajectories" %in% needs
+  )
+  results <- candidate_results(history, asked, call)
+  if ("trajectories" %in% needs) {
+    results$trajectories <- played_trajectories(history, vector_env)
+  }
+  agent <- with_generator(state$streams$agent, agent_tell(agent, results))
+  check_is_agent(agent, "agent_tell()", call)
+  steps <- round(results$lengths * settings$episodes)
+  episodes <- if (is_search(settings)) episodes_table(history$batches, several = TRUE)
+  enter_iteration(state, settings, agent, results, steps, episodes)
+}
+
+# As many rounds of a search are played side by side as a batch of episodes has room for.
+rounds_together <- function(state, vector_env, settings) {
+  left <- (settings$iterations %||% Inf) - state$iteration
+  room <- if (length(vector_env$remembers)) Inf else vector_env$batch_size %/% settings$episodes
+  together <- max(1, min(left, room))
+  if (is.finite(together)) as.integer(together) else 1L
+}
+
+#' Enter what was played into the history
+#'
+#' An interrupt finds it entered completely, or not at all.
+#' @param steps How many steps each candidate, or each episode of a learner, has taken.
+#' @param episodes The table of a search's episodes.
+#' @noRd
+enter_iteration <- function(state, settings, agent, results, steps, episodes = NULL) {
+  if (is_search(settings)) {
+    # Each candidate is an iteration; how long it took is not known of one among others.
+    history <- Map(
+      history_row, state$iteration + seq_along(steps), state$steps + cumsum(steps),
+      results$returns, steps / settings$episodes, NA_real_
+    )
+    episodes$candidate <- episodes$candidate + state$iteration
+  } else {
+    elapsed <- proc.time()[["elapsed"]] - state$started
+    history <- list(history_row(
+      state$iteration + 1L, state$steps + sum(steps), results$returns, results$lengths, elapsed
+    ))
+  }
+  last <- history[[length(history)]]
+  suspendInterrupts({
+    state$agent <- agent
+    state$iteration <- last$iteration
+    state$steps <- last$steps
+    if (is_search(settings)) state$episodes[[length(state$episodes) + 1L]] <- episodes
+    state$history[seq_along(history) + length(state$history)] <- history
+  })
+}
+
+history_row <- function(iteration, steps, returns, lengths, elapsed) {
+  list(
+    iteration = iteration, steps = steps, min_return = min(returns),
+    median_return = stats::median(returns), mean_return = mean(returns),
+    max_return = max(returns), mean_length = mean(lengths), evaluation = NA_real_,
+    elapsed = elapsed
+  )
+}
+
+check_is_agent <- function(agent, method, call) {
+  if (!inherits(agent, "gym_agent")) {
+    abort_agent(agent, method, "an agent", call)
+  }
+}
+
+check_asked <- function(asked, policy, call) {
+  count <- length(stats::coef(policy))
+  if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
+    must <- paste("a numeric matrix with", count_of(count, "column"))
+    abort_agent(asked, "agent_ask()", must, call)
+  }
+  if (!all(is.finite(asked))) {
+    abort_agent(asked, "agent_ask()", "finite numbers", call)
+  }
+}
+
+abort_agent <- function(value, method, must, call) {
+  gym_abort(
+    paste0("`", method, "` must return ", must, ", not ", describe_argument(value), "."),
+    class = "gym_error_agent", value = value, call = call
+  )
+}
+
+check_needs <- function(needs, call) {
+  known <- c("returns", "moments", "trajectories")
+  if (!is.character(needs) || !all(needs %in% known)) {
+    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
+    abort_agent(needs, "agent_needs()", must, call)
+  }
+  needs
+}
+
+# The steps of all candidates, as a rollout of them has them.
+played_trajectories <- function(history, vector_env) {
+  episodes <- episodes_table(history$batches, several = TRUE)
+  steps_table(history$batches, episodes, vector_env, several = TRUE, next_observation = TRUE)
+}
+
+# What an agent is told of its candidates. Those after one that has ended the search were not
+# played.
+candidate_results <- function(history, asked, call) {
+  each <- function(name) {
+    values <- unlist(lapply(history$batches, function(batch) batch[[name]]))
+    colMeans(matrix(values, history$episodes))
+  }
+  returns <- each("return")
+  if (!all(is.finite(returns))) {
+    wrong <- which(!is.finite(returns))[[1L]]
+    gym_abort(
+      paste0("The mean return of candidate ", wrong, " of ", length(returns), " is ",
+             returns[[wrong]], ": a reward of the environment was no finite number."),
+      class = "gym_error_agent", candidate = wrong, weights = asked[wrong, ], call = call
+    )
+  }
+  if (length(returns) < nrow(asked)) {
+    asked <- asked[seq_along(returns), , drop = FALSE]
+  }
+  list(
+    weights = asked, returns = returns, lengths = each("length"),
+    moments = Reduce(
+      merge_moments,
+      unlist(lapply(history$batches, function(batch) batch$moments), recursive = FALSE)
+    )
+  )
+}
+
+reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
+
+# A progress bar: a function that is called after each iteration. While rounds of a search are
+# played side by side, it is told as well how many of their episodes have ended.
+training_progress <- function(settings, state, progress, frame = parent.frame()) {
+  by_steps <- is.null(settings$iterations)
+  unit <- if (by_steps) "Step" else if (is_search(settings)) "Round" else "Iteration"
+  bar <- progress_bar(
+    settings$iterations %||% settings$total_steps, unit, shown = progress, frame = frame
+  )
+  show <- function(episodes = 0) {
+    finished <- if (by_steps) {
+      min(state$steps, settings$total_steps)
+    } else {
+      state$iteration + episodes %/% settings$episodes
+    }
+    bar(finished, if (is_search(settings)) best_note(state) else iteration_note(state))
+  }
+  if (is_search(settings)) state$report <- show
+  if (state$iteration > 0L) show()
+  show
+}
+
+best_note <- function(state) {
+  best <- state$agent$best_return
+  paste0("best mean return ", if (is.finite(best)) number_text(best) else "-", ", ")
+}
+
+iteration_note <- function(state) {
+  row <- state$history[[state$iteration]]
+  last <- length(state$evaluations)
+  paste0(
+    "median ", number_text(row$median_return), ", best ", number_text(row$max_return),
+    if (last) paste0(", evaluation ", number_text(state$evaluations[[last]]$mean_return)),
+    ", ", number_text(row$steps / max(row$elapsed, 1e-3)), " steps/s, ", workers_note()
+  )
+}
