@@ -128,11 +128,16 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   check_no_steps(...names(), call)
   kwargs <- list(...)
   solved_by <- check_choice(solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
+  online <- learns_online(agent)
   settings <- list(
-    agent = agent, env = env, kwargs = kwargs, policy = policy %||% first_policy(agent),
+    agent = agent, env = env, kwargs = kwargs,
+    # A learner makes its own.
+    policy = policy %||% if (!online) policy_linear(),
     iterations = iterations, total_steps = total_steps, episodes = episodes, target = target,
     max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes, seed = seed,
-    callback = callback, solved_by = solved_by
+    callback = callback,
+    # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
+    search = solved_by == "candidate"
   )
   check_training(settings, call)
   check_flag(progress)
@@ -141,19 +146,19 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   check_string(checkpoint, allow_null = TRUE)
   seeds <- plain_numbers(seeds)
   if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
-  settings[c("what", "unit")] <- if (is_search(settings)) {
+  settings[c("what", "unit")] <- if (settings$search) {
     c("search", "round")
   } else {
     c("training", "iteration")
   }
-  settings$num_envs <- num_envs %||% learner_envs(agent, env)
+  settings$num_envs <- num_envs %||% if (online) learner_envs(env)
   settings$num_workers <- num_workers
   log <- if (!is.null(log)) absolute_path(log)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
   run <- if (is.null(seeds)) new_run(settings, files, call)
   settings$seed <- run$settings$seed
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
-  settings$model <- judging_model(settings, client)
+  settings$model <- if (online) judging_model(settings, client)
   in_env <- function(use, max_steps = NULL) {
     with_training_env(settings, use, max_steps, client, call)
   }
@@ -165,18 +170,14 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   }
 }
 
-# The tutorial's rule, by which the episodes of a candidate decide: the training is a search then,
-# and each of its candidates an iteration, called a round.
-is_search <- function(settings) settings$solved_by == "candidate"
-
 least_sub_envs <- 100
 
 # However few episodes an evaluation has, candidates are played side by side.
 with_training_env <- function(settings, use, max_steps, client, call) {
-  candidates <- iteration_candidates(settings$agent)
-  episodes <- if (is_search(settings)) {
-    as.numeric(settings$iterations %||% candidates) * settings$episodes
+  episodes <- if (settings$search) {
+    as.numeric(settings$iterations %||% least_sub_envs) * settings$episodes
   } else {
+    candidates <- iteration_candidates(settings$agent)
     max(settings$eval_episodes, candidates * settings$episodes, least_sub_envs)
   }
   # Unlike exec(), inject() leaves `client` unevaluated.
@@ -213,9 +214,8 @@ new_run <- function(settings, files, call) {
 
 # One that had ended needs no environment.
 do_run <- function(run, in_env, max_steps, client, progress, call) {
-  finished_training(run, client) %||% in_env(function(vector_env) {
-    train_in(vector_env, run, progress, call)
-  }, max_steps)
+  finished <- if (!is.null(run$file$saved)) finished_training(run, client)
+  finished %||% in_env(function(vector_env) train_in(vector_env, run, progress, call), max_steps)
 }
 
 # Trains in an environment that was made.
@@ -236,8 +236,8 @@ train_in <- function(vector_env, run, progress, call) {
   state <- new_state(settings)
   state$agent <- with_generator(state$streams$agent, agent_start(settings$agent, bound))
   check_is_agent(state$agent, "agent_start()", call)
-  state$checkpoint <- training_checkpoint(state, run$file, settings, call)
-  state$log <- training_log(run$log, settings, state, call)
+  if (!is.null(run$file)) state$checkpoint <- training_checkpoint(state, run$file, settings, call)
+  if (!is.null(run$log)) state$log <- training_log(run$log, settings, state, call)
   run_training(state, vector_env, settings, progress, call)
 }
 
@@ -271,9 +271,9 @@ check_training <- function(settings, call) {
   if (!is.null(settings$callback) && !is.function(settings$callback)) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
   }
-  if (is_search(settings) && !inherits(settings$agent, "gym_agent_random")) {
+  if (settings$search && !inherits(settings$agent, "gym_agent_random")) {
     must <- "\"evaluation\" for this agent: only the policy of `agent_random()` is a candidate's"
-    abort_argument(settings$solved_by, must, "solved_by", call)
+    abort_argument("candidate", must, "solved_by", call)
   }
 }
 

@@ -37,13 +37,10 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
 #'
 #' The file grows, and where iterations are short writing might take longer than playing: then it is
 #' not written after each, and those since the last time would be played again.
-#' @param file As [open_checkpoint()] returns it, `NULL` for none.
+#' @param file As [open_checkpoint()] returns it.
 #' @return A function that is called after each iteration, and at the end with `last = TRUE`.
 #' @noRd
 training_checkpoint <- function(state, file, settings, call) {
-  if (is.null(file)) {
-    return(function(last = FALSE) NULL)
-  }
   # What the server decides, beside the arguments.
   server <- settings[c("target", "env_id", "num_envs", "batch_size")]
   if (!is.null(file$saved)) {
@@ -81,15 +78,12 @@ resume_training <- function(state, saved) {
 #' @noRd
 finished_training <- function(run, client) {
   saved <- run$file$saved
-  if (is.null(saved)) {
-    return(NULL)
-  }
   settings <- run$settings
   settings[names(saved$server)] <- saved$server
   settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
   state <- rlang::env(started = proc.time()[["elapsed"]])
   resume_training(state, saved)
-  search <- is_search(settings)
+  search <- settings$search
   if (!is_over(settings, state) || !search && is.null(state$final)) {
     return(NULL)
   }
@@ -122,7 +116,7 @@ training_arguments <- function(settings) {
       agent = comparable_agent(settings$agent),
       policy = comparable_policy(settings$policy, settings$agent)
     ),
-    if (is_search(settings)) list(rounds = settings$iterations),
+    if (settings$search) list(rounds = settings$iterations),
     lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
 }

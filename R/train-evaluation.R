@@ -17,7 +17,7 @@ draw_training_seeds <- function(n) sample.int(last_training_seed, n, replace = T
 #' @noRd
 training_ends <- function(state, vector_env, settings) {
   reached <- reaches(state$history[[state$iteration]]$mean_return, settings$target)
-  if (is_search(settings)) {
+  if (settings$search) {
     return(state$solved <- reached)
   }
   if (!reached && state$iteration %% settings$eval_every == 0) {

@@ -69,14 +69,10 @@ agent_observe <- function(agent, transitions) UseMethod("agent_observe")
 
 learns_online <- function(agent) inherits(agent, "gym_learner")
 
-# The policy that an agent begins with, where none was given: a learner makes its own.
-first_policy <- function(agent) if (!learns_online(agent)) policy_linear()
-
 # A learner plays in one sub-environment unless more are asked for. One that was made before has as
 # many as it has.
-learner_envs <- function(agent, env) {
-  made_here <- is.character(env) || inherits(env, c("gym_wrapped", "gym_model", "gym_r_env"))
-  if (learns_online(agent) && made_here) 1L
+learner_envs <- function(env) {
+  if (is.character(env) || inherits(env, c("gym_wrapped", "gym_model", "gym_r_env"))) 1L
 }
 
 # What a learner's `agent_start()` gets: a policy that was given, with the spaces, and with a model
@@ -147,9 +143,6 @@ check_rewards <- function(reward, call) {
 #' @noRd
 judging_model <- function(settings, client) {
   env <- settings$env
-  if (!learns_online(settings$agent)) {
-    return(NULL)
-  }
   if (inherits(env, c("gym_model", "gym_r_env"))) {
     return(model_or_null(env_model(env)))
   }

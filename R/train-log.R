@@ -40,9 +40,6 @@ log_lines <- function(state, iterations) {
 #' @return A function that is called after each iteration.
 #' @noRd
 training_log <- function(folder, settings, state, call) {
-  if (is.null(folder)) {
-    return(function() NULL)
-  }
   table <- file.path(folder, "progress.csv")
   write_all <- function() {
     replace_content(table, as_lines(log_lines(state, seq_len(state$iteration))))

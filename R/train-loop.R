@@ -14,7 +14,8 @@ new_state <- function(settings) {
     streams = new_streams(settings$seed),
     # Evaluations draw from streams of their own, so that training does not depend on them.
     evaluation_streams = new_streams(with_generator(generator, draw_seed())),
-    started = proc.time()[["elapsed"]], report = function(ended) NULL
+    started = proc.time()[["elapsed"]], report = function(ended) NULL, log = function() NULL,
+    checkpoint = function(last = FALSE) NULL
   )
 }
 
@@ -35,9 +36,9 @@ run_training <- function(state, vector_env, settings, progress, call) {
         stop_now <- isFALSE(settings$callback(training_result(settings, state)))
         state$ended <- state$ended || stop_now
       }
-      state$checkpoint(last = is_search(settings) && is_over(settings, state))
+      state$checkpoint(last = settings$search && is_over(settings, state))
     }
-    if (!is_search(settings) && is.null(state$final)) {
+    if (!settings$search && is.null(state$final)) {
       state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
       state$checkpoint(last = TRUE)
     }
@@ -78,21 +79,21 @@ train_iteration <- function(state, vector_env, settings, call) {
     return(enter_iteration(state, settings, results$agent, results, results$lengths))
   }
   agent <- state$agent
-  if (is_search(settings)) agent$candidates <- rounds_together(state, vector_env, settings)
+  if (settings$search) agent$candidates <- rounds_together(state, vector_env, settings)
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   policy <- agent_policy(agent)
   asked <- plain_numbers(asked, "agent_ask()", call)
-  check_asked(asked, policy, call)
+  needs <- agent_needs(agent)
+  check_asked(asked, needs, policy, call)
   candidates <- policy_candidates(policy, asked)
-  needs <- check_needs(agent_needs(agent), call)
   history <- new_history(nrow(asked), settings$episodes, state$streams)
-  if (!is_search(settings)) history$draw_seeds <- draw_training_seeds
+  if (!settings$search) history$draw_seeds <- draw_training_seeds
   play_batches(
     vector_env, history, function(which) policy_subset(candidates, which),
     report = function(ended) state$report(history$played_episodes + ended),
     max_steps = settings$max_steps %||% Inf,
     # Candidates after one that has reached the target need not be played.
-    target = if (is_search(settings)) settings$target,
+    target = if (settings$search) settings$target,
     keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
     keep_next = "trajectories" %in% needs
   )
@@ -103,7 +104,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
   steps <- round(results$lengths * settings$episodes)
-  episodes <- if (is_search(settings)) episodes_table(history$batches, several = TRUE)
+  episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 
@@ -122,7 +123,7 @@ rounds_together <- function(state, vector_env, settings) {
 #' @param episodes The table of a search's episodes.
 #' @noRd
 enter_iteration <- function(state, settings, agent, results, steps, episodes = NULL) {
-  if (is_search(settings)) {
+  if (settings$search) {
     # Each candidate is an iteration; how long it took is not known of one among others.
     history <- Map(
       history_row, state$iteration + seq_along(steps), state$steps + cumsum(steps),
@@ -140,7 +141,7 @@ enter_iteration <- function(state, settings, agent, results, steps, episodes = N
     state$agent <- agent
     state$iteration <- last$iteration
     state$steps <- last$steps
-    if (is_search(settings)) state$episodes[[length(state$episodes) + 1L]] <- episodes
+    if (settings$search) state$episodes[[length(state$episodes) + 1L]] <- episodes
     state$history[seq_along(history) + length(state$history)] <- history
   })
 }
@@ -160,7 +161,7 @@ check_is_agent <- function(agent, method, call) {
   }
 }
 
-check_asked <- function(asked, policy, call) {
+check_asked <- function(asked, needs, policy, call) {
   count <- length(stats::coef(policy))
   if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
     must <- paste("a numeric matrix with", count_of(count, "column"))
@@ -169,6 +170,11 @@ check_asked <- function(asked, policy, call) {
   if (!all(is.finite(asked))) {
     abort_agent(asked, "agent_ask()", "finite numbers", call)
   }
+  known <- c("returns", "moments", "trajectories")
+  if (!is.character(needs) || !all(needs %in% known)) {
+    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
+    abort_agent(needs, "agent_needs()", must, call)
+  }
 }
 
 abort_agent <- function(value, method, must, call) {
@@ -176,15 +182,6 @@ abort_agent <- function(value, method, must, call) {
     paste0("`", method, "` must return ", must, ", not ", describe_argument(value), "."),
     class = "gym_error_agent", value = value, call = call
   )
-}
-
-check_needs <- function(needs, call) {
-  known <- c("returns", "moments", "trajectories")
-  if (!is.character(needs) || !all(needs %in% known)) {
-    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
-    abort_agent(needs, "agent_needs()", must, call)
-  }
-  needs
 }
 
 # The steps of all candidates, as a rollout of them has them.
@@ -227,7 +224,7 @@ reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return 
 # played side by side, it is told as well how many of their episodes have ended.
 training_progress <- function(settings, state, progress, frame = parent.frame()) {
   by_steps <- is.null(settings$iterations)
-  unit <- if (by_steps) "Step" else if (is_search(settings)) "Round" else "Iteration"
+  unit <- if (by_steps) "Step" else if (settings$search) "Round" else "Iteration"
   bar <- progress_bar(
     settings$iterations %||% settings$total_steps, unit, shown = progress, frame = frame
   )
@@ -237,9 +234,9 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
     } else {
       state$iteration + episodes %/% settings$episodes
     }
-    bar(finished, if (is_search(settings)) best_note(state) else iteration_note(state))
+    bar(finished, if (settings$search) best_note(state) else iteration_note(state))
   }
-  if (is_search(settings)) state$report <- show
+  if (settings$search) state$report <- show
   if (state$iteration > 0L) show()
   show
 }

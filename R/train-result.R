@@ -4,7 +4,7 @@
 #' @param state As [new_state()] makes it: the iterations that were finished count.
 #' @noRd
 training_result <- function(settings, state, interrupted = FALSE) {
-  search <- is_search(settings)
+  search <- settings$search
   history <- rows_table(state$history, no_iterations)
   structure(
     c(

@@ -38,7 +38,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
     if (!training$interrupted) show(length(trainings), paste0(solved, " solved, "))
   }
   train_all <- function(vector_env) {
-    if (is_search(settings)) check_has_target(settings, vector_env, call)
+    if (settings$search) check_has_target(settings, vector_env, call)
     if (seeds_go_to_workers(vector_env, settings)) {
       return(train_in_futures(vector_env, runs, keep, call))
     }
