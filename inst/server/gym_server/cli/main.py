@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from gym_server import logs
@@ -81,18 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             temporary_monitors=is_private,
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
-            limits=Limits(
-                options.max_instances,
-                options.max_num_envs,
-                options.max_total_sub_envs,
-                options.max_processes,
-                options.max_rollout_processes,
-                options.max_memory_mb,
-                options.max_monitor_mb,
-                options.max_watchers,
-                options.max_call_seconds,
-                options.idle_minutes,
-            ),
+            limits=Limits(**{one.name: getattr(options, one.name) for one in fields(Limits)}),
             isolate=options.isolate,
             max_worker_mb=options.max_worker_mb,
             stop=stop,

@@ -73,70 +73,59 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         default=16,
         help="size of the largest request (%(default)s)",
     )
-    limits.add_argument(
-        "--max-instances",
-        type=_number(1, 1_000_000),
-        default=Limits.max_instances,
-        help="environments at a time (%(default)s)",
+
+    def add(name: str, kind: Callable[[str], float], text: str, metavar: str | None = None) -> None:
+        """Add the option of a field of ``Limits``."""
+        option = f"--{name.replace('_', '-')}"
+        default = getattr(Limits, name)
+        limits.add_argument(option, type=kind, default=default, help=text, metavar=metavar)
+
+    add("max_instances", _number(1, 1_000_000), "environments at a time (%(default)s)")
+    add(
+        "max_num_envs",
+        _number(1, 1_000_000),
+        "sub-environments of the largest vector environment (%(default)s)",
     )
-    limits.add_argument(
-        "--max-num-envs",
-        type=_number(1, 1_000_000),
-        default=Limits.max_num_envs,
-        help="sub-environments of the largest vector environment (%(default)s)",
+    add(
+        "max_total_sub_envs",
+        _number(1, 100_000_000),
+        "sub-environments of all environments together (four times --max-num-envs)",
     )
-    limits.add_argument(
-        "--max-total-sub-envs",
-        type=_number(1, 100_000_000),
-        default=Limits.max_total_sub_envs,
-        help="sub-environments of all environments together (four times --max-num-envs)",
-    )
-    limits.add_argument(
-        "--max-processes",
-        type=_number(1, 100_000),
-        default=Limits.max_processes,
-        help="processes of all environments together: those that run sub-environments, and of "
+    add(
+        "max_processes",
+        _number(1, 100_000),
+        "processes of all environments together: those that run sub-environments, and of "
         "environments that have one of their own (%(default)s)",
     )
-    limits.add_argument(
-        "--max-rollout-processes",
-        type=_number(1, 1_000),
-        default=Limits.max_rollout_processes,
-        help="processes that play whole episodes, beside these (one for each core)",
+    add(
+        "max_rollout_processes",
+        _number(1, 1_000),
+        "processes that play whole episodes, beside these (one for each core)",
     )
-    limits.add_argument(
-        "--max-memory-mb",
-        type=_number(1, 2**24),
-        default=Limits.max_memory_mb,
-        help="memory that all environments together may take, estimated before they are created "
+    add(
+        "max_memory_mb",
+        _number(1, 2**24),
+        "memory that all environments together may take, estimated before they are created "
         "and measured afterwards (%(default)s)",
     )
-    limits.add_argument(
-        "--max-monitor-mb",
-        type=_number(1, 2**30),
-        default=Limits.max_monitor_mb,
-        help="what all monitors together may write on the disk until the server ends (%(default)s)",
+    add(
+        "max_monitor_mb",
+        _number(1, 2**30),
+        "what all monitors together may write on the disk until the server ends (%(default)s)",
     )
-    limits.add_argument(
-        "--max-watchers",
-        type=_number(1, 1_000_000),
-        default=Limits.max_watchers,
-        help="watch pages at a time (%(default)s)",
+    add("max_watchers", _number(1, 1_000_000), "watch pages at a time (%(default)s)")
+    add(
+        "max_call_seconds",
+        _duration,
+        "that a call may take before its environment is evicted; 0 for ever (%(default)g)",
+        "SECONDS",
     )
-    limits.add_argument(
-        "--max-call-seconds",
-        type=_duration,
-        default=Limits.max_call_seconds,
-        metavar="SECONDS",
-        help="that a call may take before its environment is evicted; 0 for ever (%(default)g)",
-    )
-    limits.add_argument(
-        "--idle-minutes",
-        type=_duration,
-        default=Limits.idle_minutes,
-        metavar="MINUTES",
-        help="after which an environment that nobody uses or watches is closed; 0 for never "
+    add(
+        "idle_minutes",
+        _duration,
+        "after which an environment that nobody uses or watches is closed; 0 for never "
         "(%(default)g, a day)",
+        "MINUTES",
     )
 
 
