@@ -18,10 +18,9 @@
 #' answers without doing it a second time.
 #'
 #' A server that has the protocol of gym-http-api alone, as the original one does, is played
-#' by the classic calls and by [gym_make()]. What it would ignore (`num_envs`, a seed of a
-#' reset) is an error of class `gym_error_http` with code `not_supported`, so [rollout()] and
-#' the searches do not play there. Nor is a call repeated there when its connection breaks, as
-#' such a server would do it twice.
+#' by the classic calls. What it would ignore (`num_envs`, a seed of a reset) is an error of class
+#' `gym_error_http` with code `not_supported`, and so are [gym_make()] and all that is played with
+#' it. Nor is a call repeated there when its connection breaks, as such a server would do it twice.
 #'
 #' @param remote_base The server's address, a string such as
 #'   `"http://127.0.0.1:5000"`.

@@ -215,7 +215,7 @@ single_env <- function(env) {
   actions <- env$action_space
   list(
     observation_space = observed, action_space = actions, num_envs = 1L, one_seed = FALSE,
-    reset = function(seeds, which = 1L) batch_of(observed, list(begin_all(env, seeds))),
+    reset = function(seeds, which = 1L) batch_of(observed, list(first_observation(env, seeds))),
     step = function(action, which = 1L) {
       out <- take_step(env, 1L, batch_value(actions, action, 1L))
       out$observation <- batch_of(observed, list(out$observation))
@@ -235,15 +235,12 @@ independent_sub_envs <- function(env) {
   was_reset <- FALSE
   reset <- function(seeds, which) {
     some <- was_reset && length(which) < n
-    if (some && is_server_env(env)) {
-      return(reset_bare(env, seeds, which))
-    }
     seed <- rep(if (some) NA_real_ else seeds, length.out = n)
     seed[which] <- seeds
     observation <- if (some) {
-      narrow_values(env$reset(seed = seed, mask = seq_len(n) %in% which))
+      first_observation(env, seed, mask = seq_len(n) %in% which)
     } else {
-      begin_all(env, seed)
+      first_observation(env, seed)
     }
     was_reset <<- TRUE
     batch_rows(space, observation, which)
@@ -321,7 +318,7 @@ joint_sub_envs <- function(env) {
   }
   list(
     observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,
-    reset = function(seeds, which = NULL) begin_all(env, seeds),
+    reset = function(seeds, which = NULL) first_observation(env, seeds),
     step = function(action, which) {
       out <- take_step(env, n, actions_of_all(actions, action, which, n))
       out$next_observation <- out$next_observation %||% out$observation

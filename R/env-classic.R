@@ -171,7 +171,7 @@ env_list_all <- function(x) {
 env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info = FALSE,
                       mask = NULL) {
   check_flag(return_info)
-  reset_instance(x, known_instance(x, instance_id), seed, options, return_info, mask)
+  reset_instance(known_instance(x, instance_id), seed, options, return_info, mask)
 }
 
 #' Take one step
@@ -242,9 +242,9 @@ env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
   check_flag(render)
   instance <- known_instance(x, instance_id)
   if (render && !instance$classic) {
-    watch_once(x, instance)
+    watch_once(instance)
   }
-  step_instance(x, instance, action, render, which)
+  step_instance(instance, action, which, render)
 }
 
 #' Close an environment
@@ -306,7 +306,7 @@ upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
 #' shutdown_server(server)
 shutdown_server <- function(x) {
   check_client(x)
-  response <- send(x, "/v1/shutdown/", character())
+  response <- any_response(x, "/v1/shutdown/")
   # The original server answers with plain text instead of JSON.
   if (response$status_code != 200L) {
     read_answer(response, "POST")

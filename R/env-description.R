@@ -67,7 +67,9 @@ ask_description <- function(client, env_id, arguments, call) {
   )
   answer <- tryCatch(
     withCallingHandlers(
-      post_repeatable(client, rollouts_route, fields, call),
+      perform_request(
+        prepare_request(client, rollouts_route, fields = fields, repeatable = TRUE), call = call
+      ),
       gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(arguments), call)
     ),
     gym_error_http = function(cnd) {

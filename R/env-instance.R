@@ -31,18 +31,22 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
     check_viewer(call)
   }
   close_queued(client)
-  instance_id <- create_on_server(client, fields, call)
-  if (isTRUE(client_state(client)$classic)) {
-    withCallingHandlers(
-      check_classic_fields(client, fields, c("env_id", "seed"), call),
-      gym_error = function(cnd) close_if_there(client, instance_id, call)
-    )
+  answer <- create_on_server(client, fields, call)
+  instance_id <- answer$instance_id
+  ready <- FALSE
+  on.exit(if (!ready) close_unused(client, instance_id))
+  if (!is.null(answer$action_space)) {
+    instances <- client_state(client)$instances
+    instances[[instance_id]] <- new_instance(client, instance_id, answer)
+  } else if (isTRUE(client_state(client)$classic)) {
+    check_classic_fields(client, fields, c("env_id", "seed"), call)
   }
+  ready <- TRUE
   instance_id
 }
 
 close_instance <- function(client, instance_id, call = rlang::caller_env()) {
-  post_once(client, paste0(instance_route(instance_id), "close/"), call = call)
+  post_once(client, paste0(instance_route(instance_id), "close/"), call)
   forget_instance(instance_place(client, instance_id))
   instances <- client_state(client)$instances
   if (!is.null(instances[[instance_id]])) {
@@ -86,57 +90,56 @@ read_space <- function(answer, name, space_of) {
 }
 
 ask_instance <- function(client, instance_id, call) {
-  route <- instance_route(instance_id)
   answer <- tryCatch(
-    get_answer(client, route, call = call),
+    get_answer(client, instance_route(instance_id), call = call),
     gym_error_http_404 = function(cnd) classic_description(client, instance_id, cnd, call)
   )
-  check_about(answer)
+  new_instance(client, instance_id, answer)
+}
+
+# Makes an instance of what the server says about it, when it creates it or when it is asked.
+new_instance <- function(client, instance_id, about) {
+  check_about(about)
   instance <- new.env(parent = emptyenv())
-  instance$classic <- isTRUE(answer$classic)
-  space_of <- if (instance$classic) new_classic_space else new_space
+  instance$client <- client
   instance$id <- instance_id
-  instance$route <- route
-  instance$reset_route <- paste0(route, "reset/")
-  instance$step_route <- paste0(route, "step/")
-  instance$num_envs <- answer$num_envs
-  instance$num_workers <- answer$num_workers
-  instance$vectorization_mode <- shown_line(answer$vectorization_mode)
-  instance$autoreset_mode <- shown_line(answer$autoreset_mode)
-  instance$single_action_space <- read_space(answer, "action_space", space_of)
-  instance$single_observation_space <- read_space(answer, "observation_space", space_of)
-  instance$single_observation_space$names <- observation_names(
-    answer$env_id, instance$single_observation_space, answered_wrapper_names(answer$wrappers)
-  )
-  instance$name_observation <- naming(
-    instance$single_observation_space, batch = !is.null(answer$num_envs)
-  )
-  instance$actions <- sent_space(instance$single_action_space, answer$num_envs)
-  instance$observations <- sent_space(instance$single_observation_space, answer$num_envs)
-  as_tensors <- function(space) !instance$classic && travels_as_tensors(space, answer$num_envs)
-  instance$read_observation <- if (is.null(answer$num_envs)) json_reader(instance$observations)
-  instance$takes_tensors <- as_tensors(instance$single_observation_space)
+  instance$route <- instance_route(instance_id)
+  instance$classic <- isTRUE(about$classic)
+  instance$num_envs <- about$num_envs
+  instance$num_workers <- about$num_workers
+  instance$vectorization_mode <- shown_line(about$vectorization_mode)
+  instance$autoreset_mode <- shown_line(about$autoreset_mode)
+  space_of <- if (instance$classic) new_classic_space else new_space
+  instance$single_action_space <- read_space(about, "action_space", space_of)
+  observed <- read_space(about, "observation_space", space_of)
+  observed$names <- observation_names(about$env_id, observed, wrappers_of(about))
+  instance$single_observation_space <- observed
+  instance$name_observation <- naming(observed, batch = !is.null(about$num_envs))
+  instance$actions <- sent_space(instance$single_action_space, about$num_envs)
+  instance$observations <- sent_space(observed, about$num_envs)
+  as_tensors <- function(space) !instance$classic && travels_as_tensors(space, about$num_envs)
+  instance$takes_tensors <- as_tensors(observed)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
   instance$spec <- list(
-    id = shown_line(answer$env_id),
-    reward_threshold = if (!is.null(answer$reward_threshold)) {
-      number_from(answer$reward_threshold, "reward_threshold")
+    id = shown_line(about$env_id),
+    reward_threshold = if (!is.null(about$reward_threshold)) {
+      number_from(about$reward_threshold, "reward_threshold")
     },
-    max_episode_steps = answer$max_episode_steps,
+    max_episode_steps = about$max_episode_steps,
     # The environment's own metadata may be anything.
-    render_fps = if (is_number(answer$render_fps)) answer$render_fps
+    render_fps = if (is_number(about$render_fps)) about$render_fps
   )
-  instance$draws <- !is.null(answer$render_mode)
+  instance$draws <- !is.null(about$render_mode)
   instance$done <- FALSE
-  # One for each combination of a call's flags, made when it is first called so.
-  instance$prepared_resets <- vector("list", 4L)
-  instance$prepared_steps <- vector("list", 16L)
+  # One for each combination of a call's flags, prepared when it is first called so.
+  instance$resets <- vector("list", 4L)
+  instance$steps <- vector("list", 16L)
   instance
 }
 
-# The names of the wrappers in an answer, which classic servers do not send.
-answered_wrapper_names <- function(wrappers) {
-  as.character(unlist(lapply(wrappers, function(wrapper) wrapper["name"])))
+# The names of the wrappers around an instance, which classic servers do not send.
+wrappers_of <- function(about) {
+  as.character(unlist(lapply(about$wrappers, function(wrapper) wrapper["name"])))
 }
 
 # The space of all sub-environments together is made only when it is asked for: the bounds of
@@ -170,14 +173,15 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   json_array(ifelse(is.na(seed), "null", whole_text(seed)))
 }
 
-# A vector of seeds for each sub-environment, `NULL` for those that are not reset.
+# A vector of seeds for each sub-environment, `NA` for those that are not reset.
 encode_seed_lists <- function(seeds, num_envs, call) {
-  fits <- function(one) is.null(one) || length(one) && are_whole(one, 0, largest_seed)
+  is_none <- function(one) identical(one, NA_real_)
+  fits <- function(one) is_none(one) || length(one) && are_whole(one, 0, largest_seed)
   if (is.null(num_envs) || length(seeds) != num_envs || !all(vapply(seeds, fits, NA))) {
-    abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seeds", call)
+    abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seed", call)
   }
   json_array(vapply(seeds, function(one) {
-    if (is.null(one)) "null" else json_array(whole_text(one))
+    if (is_none(one)) "null" else json_array(whole_text(one))
   }, ""))
 }
 

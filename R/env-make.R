@@ -48,10 +48,12 @@
 #'   [set.seed()] fixes it.
 #' @param client A client, by default that of [gym_client()].
 #' @return An object of class `gym_env` with
-#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL)`: starts an
-#'     episode and returns the first observation, as [env_reset()],
-#'   * `$step(action, which = NULL)`: takes a step and returns a list, as [env_step()]; after an
-#'     episode's end see below,
+#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL, infos = TRUE)`:
+#'     starts an episode and returns the first observation, as [env_reset()]; with `infos = FALSE`
+#'     the server makes no infos, which is quicker,
+#'   * `$step(action, which = NULL, infos = TRUE, finals = TRUE)`: takes a step and returns a list,
+#'     as [env_step()]; after an episode's end see below; with `finals = FALSE` its
+#'     `next_observation` is the same as its `observation`,
 #'   * `$render(which = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: takes it off the server,
@@ -134,6 +136,9 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
     ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
+  if (isTRUE(client_state(client)$classic)) {
+    abort_classic(client, "the classic calls, such as `env_create()`, and no `gym_make()`", call)
+  }
   env <- server_env$new(client, instance_id, c(noted_wrappers(env_id), wrappers), kwargs)
   env
 }
@@ -175,7 +180,6 @@ server_env <- R6Class(
     initialize = function(client, instance_id, wrappers = list(), kwargs = list()) {
       private$instance <- known_instance(client, instance_id)
       private$pid <- Sys.getpid()
-      private$connected <- client
       self$instance_id <- instance_id
       for (name in c("single_action_space", "single_observation_space", "num_envs",
                      "vectorization_mode", "num_workers", "autoreset_mode")) {
@@ -185,25 +189,26 @@ server_env <- R6Class(
       self$spec$wrappers <- wrapper_names(wrappers)
       self$spec$kwargs <- kwargs
     },
-    reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL) {
-      private$check_open()
+    reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL,
+                     infos = TRUE) {
+      check_open(self)
       check_flag(return_info)
       reset_instance(
-        self$client, private$instance, seed, options, return_info, mask, named = TRUE
+        private$instance, seed, options, return_info, mask, named = TRUE, infos = infos
       )
     },
-    step = function(action, which = NULL) {
-      if (private$closed) private$check_open()
+    step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
+      if (private$closed) check_open(self)
       step_instance(
-        private$connected, private$instance, action, render = FALSE, which, named = TRUE
+        private$instance, action, which, named = TRUE, infos = infos, finals = finals
       )
     },
     render = function(which = 1) {
-      private$check_open()
+      check_open(self)
       env_render(self$client, self$instance_id, which)
     },
     watch = function() {
-      private$check_open()
+      check_open(self)
       env_watch(self$client, self$instance_id)
     },
     close = function() {
@@ -220,18 +225,15 @@ server_env <- R6Class(
     }
   ),
   active = list(
-    client = function() private$connected,
+    client = function() private$instance$client,
     action_space = function() instance_space(private$instance, "action_space"),
     observation_space = function() instance_space(private$instance, "observation_space"),
     is_open = function() !private$closed
   ),
   private = list(
     instance = NULL,
-    # The client. Each step reads it, and `private$` costs less than `self$`.
-    connected = NULL,
     pid = NULL,
     closed = FALSE,
-    check_open = function(call = rlang::caller_env()) if (private$closed) check_open(self, call),
     finalize = function() {
       # In a forked child the environment is still the parent's.
       if (!private$closed && identical(private$pid, Sys.getpid())) {

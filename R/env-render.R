@@ -25,7 +25,7 @@ env_render <- function(x, instance_id, which = 1) {
   check_count(which)
   query <- if (which != 1) paste0("?sub_env=", whole_text(which - 1))
   route <- paste0(instance_route(instance_id), "render/", query)
-  answer <- get_answer(x, route, take_tensors = TRUE)
+  answer <- get_answer(x, route, takes_tensors = TRUE)
   new_frame(check_frame(answer$tensors$frame))
 }
 

@@ -6,8 +6,14 @@ flags <- c("terminated", "truncated")
 is_server_env <- function(env) inherits(env, "gym_server_env")
 
 # Nobody wants the infos of what is played: they are not asked for where a server would send them.
-begin_all <- function(env, seeds) {
-  if (is_server_env(env)) reset_bare(env, seeds) else narrow_values(env$reset(seed = seeds))
+# A server's environment takes a list of seeds from here alone.
+first_observation <- function(env, seed, ...) {
+  if (is_server_env(env)) {
+    if (is.list(seed)) class(seed) <- "gym_seed_lists"
+    env$reset(seed = seed, ..., infos = FALSE)
+  } else {
+    narrow_values(env$reset(seed = seed, ...))
+  }
 }
 
 #' Take a step, and check what it returns where a user has written the environment
@@ -17,7 +23,7 @@ begin_all <- function(env, seeds) {
 #' @noRd
 take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   if (is_server_env(env)) {
-    return(step_bare(env, action, which, finals))
+    return(env$step(action, which, infos = FALSE, finals = finals))
   }
   out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
   if (!inherits(env, "gym_r_env")) {

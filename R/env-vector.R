@@ -22,36 +22,42 @@ travels_as_tensors <- function(space, num_envs) {
 # Steps ---------------------------------------------------------------------------------
 
 #' Prepare the steps of sub-environments
-#' @param n How many step, `which` the numbers of these.
+#' @param which The numbers of those that step, `NULL` for all.
 #' @noRd
-prepare_vector_step <- function(client, instance, fields, n, which, named, infos) {
+prepare_vector_step <- function(instance, fields, which, named, infos) {
   single <- instance$single_action_space
+  sends <- instance$sends_tensors
+  n <- instance$num_envs
+  if (length(which) && length(which) < n) {
+    fields <- c(fields, step_mask = json_array(json_atoms(seq_len(n) %in% which)))
+    n <- length(which)
+  }
   actions <- batch_space(single, n)
   observed <- batch_space(instance$single_observation_space, n)
-  read_answer <- function(answer) read_vector_step(instance, answer, observed, n, named, infos)
-  prepared <- prepare_instance_call(
-    client, instance, instance$step_route, instance$sends_tensors, fields, named, read_answer,
-    read_quickly = read_answer,
+  read_observation <- observation_reader(instance, observed, named)
+  request <- prepare_instance_request(
+    instance, "step/", fields, named,
+    read_answer = function(answer) {
+      read_vector_step(instance, answer, read_observation, n, named, infos)
+    },
     finish = function(tensors) {
-      observation <- tensors_observation(instance, observed, tensors, named)
+      observation <- known_observation(tensors, read_observation)
       vector_step_result(observation, tensors, empty_object)
-    }
+    },
+    body = if (sends) new_tensors_body(fields, n) else new_json_body(fields),
+    sends_tensors = sends
   )
-  if (instance$sends_tensors) {
-    prepared$write <- tensors_writer(single, n)
-    prepared$integers_table <- integers_table(n)
-  } else {
-    prepared$write <- function(action) NULL
-  }
-  prepared$check <- function(action, call) {
+  request$which <- which
+  request$write <- if (sends) tensors_writer(single, n) else function(action) NULL
+  request$check_and_write <- function(action, call) {
     check_batch(single, actions, action, n, call, which)
-    if (instance$sends_tensors) {
+    if (sends) {
       to_tensors(actions, action, "action", call)
     } else {
       paste0('"action":', write_batch(single, action, n), ",")
     }
   }
-  prepared
+  request
 }
 
 vector_step_result <- function(observation, parts, info, next_observation = observation) {
@@ -61,12 +67,12 @@ vector_step_result <- function(observation, parts, info, next_observation = obse
   )
 }
 
-read_vector_step <- function(instance, answer, observed, n, named, infos) {
+read_vector_step <- function(instance, answer, read_observation, n, named, infos) {
   result <- read_values(results_by_sub_env(answer), "Its `reward`")
   check_answer_results(result, n)
   check_answer_info(answer)
   info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
-  observation <- read_observation(instance, observed, answer, named)
+  observation <- read_observation(answer)
   if (!length(answer$final_sub_envs)) {
     return(vector_step_result(observation, result, info))
   }
@@ -91,8 +97,8 @@ final_observations <- function(instance, answer, n, named) {
   ended <- unlist(answer$final_sub_envs)
   check_final_sub_envs(ended, n)
   batch <- batch_space(instance$single_observation_space, length(ended))
-  values <- decode_observation(batch, answer, "final_obs")
-  list(sub_envs = ended + 1L, values = if (named) with_names(instance, values) else values)
+  read_final <- observation_reader(instance, batch, named, "final_obs")
+  list(sub_envs = ended + 1L, values = read_final(answer))
 }
 
 # A list: the last observation of each sub-environment that ended, NULL for the others.

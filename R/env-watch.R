@@ -34,31 +34,33 @@
 #' for (i in 1:10) env$step(i %% 2)
 #' env$close()
 env_watch <- function(x, instance_id) {
-  open_watch(x, known_instance(x, instance_id))
+  open_watch(known_instance(x, instance_id))
 }
 
 # Creates an instance, and opens its page where people want to see it.
 create_and_watch <- function(client, env_id, seed, render_mode, ..., call = rlang::caller_env()) {
   instance_id <- create_instance(client, env_id, seed, render_mode, ..., call = call)
   if (identical(render_mode, "human")) {
-    watch_once(client, known_instance(client, instance_id, call), call)
+    watch_once(known_instance(client, instance_id, call), call)
   }
   instance_id
 }
 
 # Opens the page unless it was opened before.
-watch_once <- function(client, instance, call = rlang::caller_env()) {
+watch_once <- function(instance, call = rlang::caller_env()) {
   if (is.null(instance$shown)) {
-    open_watch(client, instance, call)
+    open_watch(instance, call)
   }
 }
 
-open_watch <- function(client, instance, call = rlang::caller_env()) {
+open_watch <- function(instance, call = rlang::caller_env()) {
   viewer <- check_viewer(call)
-  address <- paste0(client$remote_base, instance$route, "watch/", watch_key(client, instance, call))
+  address <- paste0(
+    instance$client$remote_base, instance$route, "watch/", watch_key(instance, call)
+  )
   # Before the page is opened, so that a viewer that fails does so only once.
   instance$shown <- TRUE
-  comes <- open_address(address, viewer) && await_watcher(client, instance)
+  comes <- open_address(address, viewer) && await_watcher(instance)
   if (!comes && !isFALSE(viewer)) {
     rlang::inform(
       paste0("Watch ", instance$spec$id, " at ", address), class = "gym_message_watch"
@@ -68,8 +70,8 @@ open_watch <- function(client, instance, call = rlang::caller_env()) {
 }
 
 # A browser sends no token. Where the server asks for one, the link has a key in its place.
-watch_key <- function(client, instance, call) {
-  key <- post_answer(client, paste0(instance$route, "watch/key/"), call = call)$key
+watch_key <- function(instance, call) {
+  key <- post_answer(instance$client, paste0(instance$route, "watch/key/"), call = call)$key
   if (!is.null(key) && !(rlang::is_string(key) && grepl("^[A-Za-z0-9_-]{1,200}$", key))) {
     refuse_field(key, "key", "a string of letters and digits")
   }
@@ -82,10 +84,10 @@ watch_key <- function(client, instance, call) {
 #' see.
 #' @return Whether somebody does, logical: opening a browser may fail without an error.
 #' @noRd
-await_watcher <- function(client, instance) {
+await_watcher <- function(instance) {
   deadline <- Sys.time() + watcher_timeout
   repeat {
-    if (isTRUE(get_answer(client, instance$route)$watched)) {
+    if (isTRUE(get_answer(instance$client, instance$route)$watched)) {
       return(TRUE)
     }
     if (Sys.time() >= deadline) {

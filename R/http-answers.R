@@ -1,12 +1,11 @@
 # Reading an answer: its JSON or tensors, or the error that it reports.
 
 #' Read an answer or raise the error that it reports
-#' @param response What [send()] returned.
+#' @param response From [with_answer()].
 #' @return The parsed answer, `NULL` for an empty one.
 #' @noRd
 read_answer <- function(response, method, call = rlang::caller_env()) {
   answer <- response$answer
-  check_echo(response, answer, call)
   if (response$status_code >= 400L) {
     abort_http(response, method, call)
   }
@@ -16,14 +15,24 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer
 }
 
+# A response with its `answer` parsed: `NULL` for none, or one that cannot be read. An error of ours
+# says why that is.
+with_answer <- function(response) {
+  answer <- tryCatch(
+    parsed_body(response),
+    error = function(cnd) if (inherits(cnd, "gym_error")) rlang::cnd_signal(cnd)
+  )
+  response["answer"] <- list(answer)
+  response
+}
+
 # Returns an answer as a list, NULL for an empty one; what cannot be parsed is an error.
-parsed_body <- function(response, layouts = NULL, key = NULL) {
+parsed_body <- function(response) {
   if (response$status_code == 204L) {
     NULL
-  } else if (identical(response$type, column_tensors_type)) {
-    tensors_answer(response$content, layouts, key, by_column = TRUE)
-  } else if (identical(response$type, tensors_type)) {
-    tensors_answer(response$content, layouts, key)
+  } else if (is_tensors_type(response$type)) {
+    by_column <- response$type == column_tensors_type
+    tensors_answer(response$content, read_layout(response$content, by_column))
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
   } else {
@@ -33,39 +42,10 @@ parsed_body <- function(response, layouts = NULL, key = NULL) {
   }
 }
 
-# The server repeats a request's idempotency key in its answer: with another key the answer
-# belongs to another request.
-check_echo <- function(response, answer, call) {
-  sent <- response$key
-  if (is.null(sent)) {
-    return()
-  }
-  echo <- if (response$status_code == 204L) echo_in_header(response) else answer$request
-  if (!is.null(echo) && !is_same_key(echo, sent)) {
-    abort_connection(response$url, "The answer that came belongs to another call.", call)
-  }
-}
-
-is_same_key <- function(echo, sent) {
-  is.list(echo) && identical(echo$key, sent$key) && is_number(echo$number) &&
-    echo$number == sent$number
-}
-
-echo_in_header <- function(response) {
-  echo <- curl::parse_headers_list(response$headers)[["gym-request"]]
-  if (!is.null(echo)) {
-    parts <- strsplit(echo, " ", fixed = TRUE)[[1L]]
-    list(key = parts[[1L]], number = suppressWarnings(as.numeric(parts[2L])))
-  }
-}
-
 # An answer with tensors has the fields of the JSON answer that it replaces, and beside them the
 # tensors and the texts by their names.
-tensors_answer <- function(bytes, layouts, key = NULL, by_column = FALSE) {
-  file <- read_tensors(bytes, layouts, if (!is.null(key)) bare_metadata(key), by_column)
-  if (is.null(file$metadata)) {
-    return(list(tensors = file$tensors, info = empty_object, request = key))
-  }
+tensors_answer <- function(bytes, layout) {
+  file <- read_tensors(bytes, layout)
   field <- function(name) {
     text <- file$metadata[[name]]
     if (!is.null(text)) from_json(text)
@@ -75,16 +55,7 @@ tensors_answer <- function(bytes, layouts, key = NULL, by_column = FALSE) {
     texts = field("texts"),
     info = if (identical(file$metadata$info, "{}")) empty_object else field("info"),
     final_sub_envs = field("final_sub_envs"),
-    request = field("request"),
     error = field("error")
-  )
-}
-
-# The metadata of an answer that repeats the idempotency key and has an empty info.
-bare_metadata <- function(key) {
-  sprintf(
-    '{"info":"{}","request":"{\\"key\\":\\"%s\\",\\"number\\":%.0f}"}}',
-    key$key, key$number
   )
 }
 

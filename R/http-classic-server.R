@@ -20,8 +20,7 @@ classic_description <- function(client, instance_id, missing, call) {
     observation_space = get_answer(client, paste0(route, "observation_space/"), call = call)$info,
     env_id = get_answer(client, "/v1/envs/", call = call)$all_envs[[instance_id]]
   )
-  state <- client_state(client)
-  state$classic <- TRUE
+  note_protocol(client_state(client), description)
   description
 }
 
@@ -39,13 +38,17 @@ check_classic_fields <- function(client, fields, known, call) {
   ignored <- setdiff(names(fields), known)
   if (length(ignored)) {
     name <- sub("^reset_", "", ignored[[1L]])
-    gym_abort(
-      c(
-        paste0("The server at ", client$remote_base, " knows the protocol of gym-http-api alone, ",
-               "which has no `", name, "` here."),
-        i = "`gym_server_start()` starts a server that has it."
-      ),
-      class = "gym_error_http", code = "not_supported", call = call
-    )
+    abort_classic(client, paste0("no `", name, "` here"), call)
   }
+}
+
+abort_classic <- function(client, lacks, call) {
+  gym_abort(
+    c(
+      paste0("The server at ", client$remote_base, " knows the protocol of gym-http-api alone, ",
+             "which has ", lacks, "."),
+      i = "`gym_server_start()` starts a server that has more."
+    ),
+    class = "gym_error_http", code = "not_supported", call = call
+  )
 }

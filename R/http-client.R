@@ -52,8 +52,7 @@ client_state <- function(client) {
       state$creation_keys <- new_idempotency_keys()
       state$to_close <- character()
       state$health <- NULL
-      state$several <- NULL
-      state$layouts <- new.env(parent = emptyenv())
+      state$line <- NULL
       state$pid <- Sys.getpid()
       state$session <- the_session
     })

@@ -15,11 +15,9 @@ new_connection <- function(client, keys = keys_of_process(client),
   connection
 }
 
-# The connection that a request may use. R may run a finalizer at any time, also while curl waits
-# for an answer, and a finalizer may close an environment: a request inside of another one gets a
-# connection of its own.
-free_connection <- function(client) {
-  connection <- client_state(client)$connection
+# The connection for a request inside of another one. R may run a finalizer at any time, also while
+# curl waits for an answer, and a user's finalizer may make a request.
+inner_connection <- function(client, connection) {
   while (connection$busy) {
     if (is.null(connection$inner)) {
       connection$inner <- new_connection(client, new_idempotency_keys(), fetch_in_own_pool())
@@ -108,6 +106,14 @@ handle_kinds <- list(
   send_tensors = list(post = TRUE, sends = tensors_type, accepts = accepted_tensors)
 )
 
+handle_kind <- function(method, sends_tensors, takes_tensors) {
+  if (sends_tensors) {
+    "send_tensors"
+  } else {
+    paste0(if (method == "GET") "get" else "post", if (takes_tensors) "_tensors")
+  }
+}
+
 # A connection's handle of one kind: curl's handle, and the length of body that is set on it. New
 # ones are made when httr::set_config() or httr::reset_config() has changed what the session has.
 handle_of_kind <- function(client, connection, kind) {
@@ -122,14 +128,10 @@ handle_of_kind <- function(client, connection, kind) {
 new_handle_of_kind <- function(client, connection, kind) {
   handle <- new.env(parent = emptyenv())
   handle$kind <- kind
-  kind <- handle_kinds[[kind]]
-  handle$curl <- new_handle(client, kind$sends, kind$accepts)
+  handle$curl <- new_handle(client, kind)
   handle$body_size <- -1
-  handle$sends <- kind$sends
-  if (kind$post) {
-    set_curl(handle$curl, post = TRUE, readfunction = function(nbytes, ...) {
-      read_body(connection, nbytes)
-    })
+  if (handle_kinds[[kind]]$post) {
+    set_curl(handle$curl, readfunction = function(nbytes, ...) read_body(connection, nbytes))
   }
   handle
 }
@@ -147,8 +149,23 @@ replace_handle <- function(client, connection, handle) {
   fresh
 }
 
+# Has a connection send this body.
+load_body <- function(connection, handle, bytes) {
+  connection$body <- bytes
+  if (length(bytes) != handle$body_size) {
+    set_body_size(handle, length(bytes))
+  }
+}
+
+set_body_size <- function(handle, size) {
+  suspendInterrupts({
+    set_curl(handle$curl, postfieldsize_large = size)
+    handle$body_size <- size
+  })
+}
+
 # Called by curl when it wants more of the body. When curl repeats a request by itself it asks for
-# the body a second time. Then nothing is left, and curl fails: only send() may repeat a request.
+# the body a second time. Then nothing is left, and curl fails: only repeat_request() may do that.
 read_body <- function(connection, nbytes) {
   if (connection$sent == 0L && length(connection$body) <= nbytes) {
     connection$sent <- length(connection$body)
@@ -160,11 +177,14 @@ read_body <- function(connection, nbytes) {
   chunk
 }
 
-new_handle <- function(client, sends, accepts) {
+# A handle of curl's with the settings of a client, for requests of one kind.
+new_handle <- function(client, kind) {
   config <- client_config(client)
+  kind <- handle_kinds[[kind]]
   handle <- httr::handle(client$remote_base)$handle
   set_curl(
     handle,
+    post = kind$post,
     connecttimeout_ms = min(10, client$timeout) * 1000,
     timeout_ms = client$timeout * 1000,
     followlocation = FALSE,
@@ -179,7 +199,7 @@ new_handle <- function(client, sends, accepts) {
   limit_answer_size(handle, client$state)
   # An empty Expect keeps curl from asking for permission before it sends a body.
   headers <- c(
-    "Content-Type" = sends, "Accept" = accepts, "Expect" = "",
+    "Content-Type" = kind$sends, "Accept" = kind$accepts, "Expect" = "",
     "User-Agent" = paste0("gym-R/", utils::packageVersion("gym"))
   )
   if (!is.null(client$token)) {

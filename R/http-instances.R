@@ -16,17 +16,18 @@ closing_time <- 2
 #' 4. When the next instance is created or reset, or instances are listed, or the session ends, the
 #'    request is repeated. The server does not create another instance; it answers with the id, and
 #'    the instance is closed.
-#' @return The instance's id.
+#' @return The answer, in which the instance's id was checked.
 #' @noRd
 create_on_server <- function(client, fields, call) {
   state <- client_state(client)
+  request <- prepare_request(client, "/v1/envs/", fields = fields, once = TRUE)
   key <- next_key(state$creation_keys)
   place <- paste(key$key, key$number)
   outcome <- "lost"
   on.exit(end_creation(state, place, outcome))
-  remember_instance(place, client, body = padded(request_body(fields, key), json_type))
+  remember_instance(place, client, body = request$body(NULL, key))
   answer <- withCallingHandlers(
-    post_once(client, "/v1/envs/", fields, key = key, call = call),
+    perform_request(request, call = call, key = key),
     gym_error_http = function(cnd) outcome <<- "refused",
     gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
   )
@@ -36,7 +37,7 @@ create_on_server <- function(client, fields, call) {
     remember_instance(instance_place(client, answer$instance_id), client, answer$instance_id)
     outcome <- "created"
   })
-  answer$instance_id
+  answer
 }
 
 instance_route <- function(instance_id) {
@@ -125,9 +126,9 @@ close_session_instances <- function(seconds) {
 
 #' Close instances, all at once, in a limited time
 #'
-#' The one place beside [send()] that makes requests. It does not use a client's connection, which
-#' may be in the middle of a request, repeats nothing, and does not close one instance after the
-#' other, as each may hang. A forked child closes nothing that its parent created.
+#' It does not use a client's connection, which may be in the middle of a request, repeats nothing,
+#' and does not close one instance after the other, as each may hang. A forked child closes nothing
+#' that its parent created.
 #' @param places Where they stand in `the_session$instances`.
 #' @noRd
 close_together <- function(places, seconds) {
@@ -138,10 +139,13 @@ close_together <- function(places, seconds) {
   }
   pool <- curl::new_pool()
   on.exit(lapply(curl::multi_list(pool), curl::multi_cancel))
-  deadline <- proc.time()[["elapsed"]] + seconds
+  deadline <- now() + seconds
   post <- function(entry, route, body, done) {
-    handle <- closing_handle(entry$client, route, body, deadline - proc.time()[["elapsed"]])
-    curl::multi_add(handle, done = done, fail = function(reason) NULL, pool = pool)
+    left <- max(1, (deadline - now()) * 1000)
+    handle <- new_handle(entry$client, "post")
+    set_curl(handle, timeout_ms = left, connecttimeout_ms = left)
+    url <- paste0(entry$client$remote_base, route)
+    start_post(handle, url, body, pool, done, fail = function(reason) NULL)
   }
   close_place <- function(place) {
     entry <- the_session$instances[[place]]
@@ -167,15 +171,4 @@ close_together <- function(places, seconds) {
   }
   curl::multi_run(timeout = seconds, pool = pool)
   invisible()
-}
-
-closing_handle <- function(client, route, body, seconds) {
-  handle <- new_handle(client, json_type, json_type)
-  set_curl(
-    handle,
-    url = paste0(client$remote_base, route), post = TRUE,
-    postfieldsize = length(body), postfields = body,
-    timeout_ms = max(1, seconds * 1000), connecttimeout_ms = max(1, seconds * 1000)
-  )
-  handle
 }

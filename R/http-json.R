@@ -106,7 +106,9 @@ json_atoms <- function(x) {
 
 # Parses JSON. Integers beyond 2^53 become text, so that none is rounded.
 from_json <- function(text) {
-  check_json_depth(text)
+  if (nchar(text, "bytes") > 2L * deepest_json) {
+    check_json_depth(text)
+  }
   Encoding(text) <- "UTF-8"
   if (grepl("\\u0000", text, fixed = TRUE, useBytes = TRUE)) {
     refuse_nul(text)
@@ -118,9 +120,9 @@ from_json <- function(text) {
 # overflow the stack at some ten thousand levels, and what reads the values sooner.
 deepest_json <- 320L
 
+# Each level opens and closes a bracket, so that a shorter text need not be looked at.
 check_json_depth <- function(text) {
-  # Each level opens and closes a bracket.
-  if (nchar(text, "bytes") > 2L * deepest_json && json_depth(text) > deepest_json) {
+  if (json_depth(text) > deepest_json) {
     abort_answer(paste("Its JSON is nested more than", deepest_json, "levels deep"))
   }
 }

@@ -1,47 +1,49 @@
 # Requests of which several are under way at once: while the server works on one, R reads the answer
-# to another. They change nothing on the server, so that one whose connection broke is sent again.
-# When the call ends, by an interrupt or an error, too, the connections of those under way are
-# dropped, by which the server knows that nobody wants their answers.
+# to another. When the call ends, by an interrupt or an error, too, the connections of those under
+# way are dropped, by which the server knows that nobody wants their answers.
 
-#' Send requests, several at once
+#' Perform a request several times, some at once
 #'
-#' @param next_request A function that returns the next request, a list with `body`, raw; `NULL`
-#'   when there is none for now.
-#' @param received A function of a request, its response, as [send()] returns it, and the seconds
-#'   that it took. It is called once for each request, in the order in which answers come, and
+#' @param request A POST from [prepare_request()].
+#' @param next_content A function that returns what is sent next, a list whose `body` is the
+#'   request's content; `NULL` when there is nothing for now.
+#' @param received A function of what was sent, its response with the parsed `answer`, and the
+#'   seconds that it took. It is called once for each, in the order in which answers come, and
 #'   returns whether to end.
-#' @param sends The type of the bodies.
-#' @param at_once How many requests are under way at most.
+#' @param at_once How many are under way at most.
 #' @noRd
-send_several <- function(client, route, next_request, received, sends = tensors_type,
-                         at_once = 2L, call = rlang::caller_env()) {
-  crew <- rlang::env(
-    client = client, url = paste0(client$remote_base, route), sends = sends, call = call,
-    line = several_line(client), under_way = list()
+perform_several <- function(request, next_content, received, at_once = 2L,
+                            call = rlang::caller_env()) {
+  several <- rlang::env(
+    request = request, client = request$client, call = call, line = line_of(request$client),
+    under_way = list()
   )
-  on.exit(suspendInterrupts(lapply(crew$under_way, drop_request, crew = crew)))
+  on.exit(suspendInterrupts(lapply(several$under_way, drop_one, several)))
   repeat {
-    take_requests(crew, next_request, at_once)
-    if (!length(crew$under_way)) break
-    launch_waiting(crew)
-    await_answers(crew)
-    if (take_answers(crew, received)) break
+    take_up(several, next_content, at_once)
+    if (!length(several$under_way)) break
+    await_outcomes(several)
+    if (hand_over(several, received)) break
   }
 }
 
-take_requests <- function(crew, next_request, at_once) {
-  while (length(crew$under_way) < at_once && !is.null(request <- next_request())) {
-    crew$under_way <- c(crew$under_way, list(new_under_way(request)))
+# Takes up what there is to send, and sends it, and what is to be sent again.
+take_up <- function(several, next_content, at_once) {
+  while (length(several$under_way) < at_once && !is.null(content <- next_content())) {
+    several$under_way <- c(several$under_way, list(new_under_way(content)))
+  }
+  for (one in several$under_way) {
+    if (is.null(one$handle) && one$not_before <= now()) send_one(one, several)
   }
 }
 
-# Returns whether to end.
-take_answers <- function(crew, received) {
-  for (one in Filter(has_outcome, crew$under_way)) {
-    response <- settle(crew, one)
+# Hands over the responses that have come. Returns whether to end.
+hand_over <- function(several, received) {
+  for (one in Filter(has_outcome, several$under_way)) {
+    response <- settle(one, several)
     if (!is.null(response)) {
-      crew$under_way <- Filter(function(other) !identical(other, one), crew$under_way)
-      if (isTRUE(received(one$request, response, now() - one$launched))) {
+      several$under_way <- Filter(function(other) !identical(other, one), several$under_way)
+      if (isTRUE(received(one$content, response, now() - one$sent))) {
         return(TRUE)
       }
     }
@@ -49,104 +51,93 @@ take_answers <- function(crew, received) {
   FALSE
 }
 
-has_outcome <- function(one) !is.null(one$outcome)
-
-now <- function() proc.time()[["elapsed"]]
-
 # The client's pool and its idle handles, which keep their connections from call to call.
-several_line <- function(client) {
+line_of <- function(client) {
   state <- client_state(client)
   config <- getOption("httr_config")
-  if (is.null(state$several) || !identical(state$several$config, config)) {
-    state$several <- rlang::env(
-      pool = curl::new_pool(), idle = list(), config = config,
-      limits = new.env(parent = emptyenv())
-    )
+  if (is.null(state$line) || !identical(state$line$config, config)) {
+    state$line <- rlang::env(pool = curl::new_pool(), idle = list(), config = config)
   }
-  state$several
+  state$line
 }
 
-new_under_way <- function(request) {
+new_under_way <- function(content) {
   rlang::env(
-    request = request, handle = NULL, outcome = NULL, attempt = 1L, not_before = 0, heard = 0,
-    launched = 0
+    content = content, handle = NULL, outcome = NULL, attempt = 1L, not_before = 0, heard = 0,
+    sent = 0
   )
 }
 
-# Sends what is not sent yet, or is to be sent again.
-launch_waiting <- function(crew) {
-  for (one in crew$under_way) {
-    if (is.null(one$handle) && one$not_before <= now()) launch_request(crew, one)
-  }
-}
+has_outcome <- function(one) !is.null(one$outcome)
 
-launch_request <- function(crew, one) {
-  line <- crew$line
-  handle <- take_handle(crew)
-  set_curl(
-    handle, url = crew$url, postfieldsize = length(one$request$body),
-    postfields = one$request$body
-  )
-  line$limits$too_large <- FALSE
-  one$launched <- one$heard <- now()
+send_one <- function(one, several) {
+  request <- several$request
+  handle <- take_handle(several)
+  one$sent <- one$heard <- now()
   suspendInterrupts({
-    curl::multi_add(
-      handle, done = function(response) one$outcome <- response,
-      fail = function(reason) one$outcome <- simpleError(reason), pool = line$pool
+    start_post(
+      handle, request$url, request$body(one$content$body, NULL), several$line$pool,
+      done = function(response) one$outcome <- response,
+      fail = function(reason) one$outcome <- simpleError(reason)
     )
     one$handle <- handle
   })
 }
 
-take_handle <- function(crew) {
-  line <- crew$line
-  idle <- line$idle[[crew$sends]]
+# Puts a POST into a pool of curl's.
+start_post <- function(handle, url, body, pool, done, fail) {
+  set_curl(handle, url = url, postfieldsize = length(body), postfields = body)
+  curl::multi_add(handle, done = done, fail = fail, pool = pool)
+}
+
+take_handle <- function(several) {
+  kind <- several$request$kind
+  idle <- several$line$idle[[kind]]
   if (length(idle)) {
-    handle <- idle[[1L]]
-    line$idle[[crew$sends]] <- idle[-1L]
-  } else {
-    accepts <- if (crew$sends == json_type) json_type else accepted_tensors
-    handle <- new_handle(crew$client, crew$sends, accepts)
-    # Whether the server still works is asked after `timeout`, see check_silent().
-    set_curl(handle, post = TRUE, timeout_ms = 0, tcp_keepalive = TRUE)
-    limit_answer_size(handle, line$limits)
+    several$line$idle[[kind]] <- idle[-1L]
+    return(idle[[1L]])
   }
+  handle <- new_handle(several$client, kind)
+  # Whether the server still works is asked after `timeout`, see check_silent().
+  set_curl(handle, timeout_ms = 0, tcp_keepalive = TRUE)
   handle
 }
 
-free_handle <- function(crew, one) {
-  crew$line$idle[[crew$sends]] <- c(crew$line$idle[[crew$sends]], list(one$handle))
+free_handle <- function(one, several) {
+  kind <- several$request$kind
+  several$line$idle[[kind]] <- c(several$line$idle[[kind]], list(one$handle))
   one$handle <- NULL
 }
 
-drop_request <- function(one, crew) {
+drop_one <- function(one, several) {
   if (!is.null(one$handle)) {
     curl::multi_cancel(one$handle)
-    free_handle(crew, one)
+    free_handle(one, several)
   }
 }
 
 # Lets curl do what it can do at once, and then waits until there is more. curl would wait for whole
 # seconds, and use up a core that the server needs.
-await_answers <- function(crew) {
-  pool <- crew$line$pool
-  let_curl_work(pool, crew$line$limits)
-  if (!any(vapply(crew$under_way, has_outcome, NA))) {
-    wait_for_pool(pool)
-    check_silent(crew)
-  }
-}
-
-# Newer versions of curl signal an interrupt when an answer was stopped for its size, which R takes
-# some moments later.
-let_curl_work <- function(pool, limits) {
+await_outcomes <- function(several) {
+  pool <- several$line$pool
+  state <- several$client$state
+  state$too_large <- FALSE
+  # Newer versions of curl signal an interrupt when an answer was stopped for its size, which R
+  # takes some moments later.
   tryCatch(
     {
       suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
-      if (limits$too_large) Sys.sleep(0.05)
+      if (state$too_large) Sys.sleep(0.05)
     },
-    interrupt = function(cnd) if (!limits$too_large) rlang::interrupt()
+    interrupt = function(cnd) if (!state$too_large) rlang::interrupt()
   )
+  if (state$too_large) {
+    abort_too_large(base = several$client$remote_base, call = several$call)
+  }
+  if (!any(vapply(several$under_way, has_outcome, NA))) {
+    wait_for_pool(pool)
+    check_silent(several)
+  }
 }
 
 # At most a tenth of a second.
@@ -161,10 +152,10 @@ wait_for_pool <- function(pool) {
 }
 
 # However long a request takes, a server that works answers another one.
-check_silent <- function(crew) {
-  for (one in crew$under_way) {
-    if (is.null(one$outcome) && now() - one$heard > timeout_of(crew$client)) {
-      get_answer(crew$client, "/v1/health/", call = crew$call)
+check_silent <- function(several) {
+  for (one in several$under_way) {
+    if (is.null(one$outcome) && now() - one$heard > timeout_of(several$client)) {
+      get_answer(several$client, "/v1/health/", call = several$call)
       one$heard <- now()
     }
   }
@@ -173,36 +164,23 @@ check_silent <- function(crew) {
 #' Decide what becomes of a request that has ended
 #' @return The response, with its `answer` parsed; `NULL` where the request is to be sent again.
 #' @noRd
-settle <- function(crew, one) {
-  outcome <- one$outcome
+settle <- function(one, several) {
+  outcome <- whole_response(one$outcome)
   one$outcome <- NULL
-  free_handle(crew, one)
-  if (crew$line$limits$too_large) {
-    abort_too_large(base = crew$client$remote_base, call = crew$call)
+  free_handle(one, several)
+  broke <- inherits(outcome, "error")
+  pause <- if (broke) 0.1 * one$attempt else seconds_to_wait(outcome)
+  if (broke) {
+    reason <- conditionMessage(outcome)
+    if (!connection_broke(reason) || one$attempt >= max_attempts) {
+      abort_connection(several$client$remote_base, reason, several$call)
+    }
+    one$attempt <- one$attempt + 1L
   }
-  if (!inherits(outcome, "error") && ends_in_header(outcome)) {
-    outcome <- simpleError("Connection died within the header of the answer")
+  if (is.null(pause)) {
+    return(with_answer(outcome))
   }
-  if (inherits(outcome, "error")) {
-    return(send_again(crew, one, conditionMessage(outcome)))
-  }
-  seconds <- seconds_to_wait(outcome)
-  if (!is.null(seconds)) {
-    one$not_before <- now() + seconds
-    return(NULL)
-  }
-  outcome$answer <- tryCatch(
-    parsed_body(outcome), gym_error = rlang::cnd_signal, error = function(cnd) NULL
-  )
-  outcome
-}
-
-send_again <- function(crew, one, reason) {
-  if (!connection_broke(reason) || one$attempt >= max_attempts) {
-    abort_connection(crew$client$remote_base, reason, crew$call)
-  }
-  one$not_before <- now() + 0.1 * one$attempt
-  one$attempt <- one$attempt + 1L
+  one$not_before <- now() + pause
   NULL
 }
 
@@ -213,26 +191,4 @@ seconds_to_wait <- function(response) {
     seconds <- suppressWarnings(as.numeric(header %||% NA))
     if (is_number(seconds) && seconds >= 0) min(seconds, 60)
   }
-}
-
-#' Make a POST that changes nothing, and read its answer
-#' @param fields JSON texts of the body's fields, named.
-#' @noRd
-post_repeatable <- function(client, route, fields, call = rlang::caller_env()) {
-  request <- list(body = charToRaw(json_object(fields)))
-  answer <- NULL
-  send_several(
-    client, route,
-    next_request = function() {
-      sent <- request
-      request <<- NULL
-      sent
-    },
-    received = function(request, response, seconds) {
-      answer <<- read_answer(response, "POST", call)
-      TRUE
-    },
-    sends = json_type, call = call
-  )
-  answer
 }

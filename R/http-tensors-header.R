@@ -11,32 +11,6 @@ header_size <- function(bytes) {
   size[[1L]]
 }
 
-known_layout <- function(header, layouts) {
-  if (is.null(layouts)) {
-    return(read_layout(header))
-  }
-  text <- rawToChar(header)
-  at <- regexpr(metadata_key, text, fixed = TRUE, useBytes = TRUE)
-  start <- if (at > 0L) rawToChar(header[seq_len(at - 1L)]) else text
-  known <- match(start, names(layouts$seen))
-  if (!is.na(known)) {
-    return(layouts$seen[[known]])
-  }
-  layout <- read_layout(header)
-  if (nchar(start, "bytes") <= max_seen_bytes) {
-    seen <- c(stats::setNames(list(layout), start), layouts$seen)
-    layouts$seen <- utils::head(seen, max_layouts)
-  }
-  layout
-}
-
-# Enough for the kinds of answer of a few environments. With autoreset mode "SameStep" an answer has
-# the last observations of as many sub-environments as have ended.
-max_layouts <- 256L
-
-# A longer table of tensors is not remembered, so that no server can fill the memory with them.
-max_seen_bytes <- 2^16
-
 # A table may have so many bytes, as in a request to our server: that is room for some ten thousand
 # tensors, which take some seconds to read.
 max_table_bytes <- 2^20
@@ -44,12 +18,22 @@ max_table_bytes <- 2^20
 # Marks where the metadata begin: elsewhere, in names and texts, quotes are escaped.
 metadata_key <- ",\"__metadata__\":"
 
-#' Parse a header
-#' @return A list of `entries`, one for each tensor; `metadata`, where they stand before them;
-#'   `end`, where the last tensor ends; `start`, with which all headers of this layout begin: the
-#'   whole header, or all up to the metadata where they come last; `metadata_last`, whether they do.
+#' Read the header of a file
+#'
+#' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
+#'   are in R's order.
+#' @return What all files of one layout have in common, a list: `start`, the bytes with which they
+#'   begin, up to the metadata where these come last, as our server puts them; `entries`, the
+#'   tensors in the order in which they lie; `data`, how many bytes come before these; `total`, how
+#'   many there are in all; `metadata_last`; and `metadata`, where they do not come last.
 #' @noRd
-read_layout <- function(header) {
+read_layout <- function(bytes, by_column = FALSE) {
+  data <- 8L + header_size(bytes)
+  header <- bytes[9L:data]
+  check_json_size(header)
+  if (any(header == as.raw(0L))) {
+    abort_tensors("the header is no JSON")
+  }
   table <- rawToChar(header)
   at <- regexpr(metadata_key, table, fixed = TRUE, useBytes = TRUE)
   metadata_last <- at > 0L
@@ -68,13 +52,17 @@ read_layout <- function(header) {
     abort_tensors("the header is no JSON object")
   }
   check_entry_names(names(entries))
-  tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry)
+  tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry, by_column)
+  begins <- vapply(tensors, function(entry) entry$begin, 0)
+  sizes <- vapply(tensors, function(entry) as.double(entry$size), 0)
+  tensors <- tensors[check_filled(begins, begins + sizes)]
+  if (sum(sizes) != length(bytes) - data) {
+    abort_tensors(paste("the tensors have", count_of(sum(sizes), "byte"), "and the file",
+                        length(bytes) - data))
+  }
   list(
-    entries = tensors,
-    metadata = entries[["__metadata__"]],
-    end = end_of_tensors(tensors),
-    start = header,
-    metadata_last = metadata_last
+    start = c(bytes[1:8], header), entries = tensors, data = data, total = length(bytes),
+    metadata_last = metadata_last, metadata = entries[["__metadata__"]]
   )
 }
 
@@ -88,31 +76,19 @@ check_entry_names <- function(names) {
   }
 }
 
-# Where the last tensor ends. Tensors that lie over one another would take more memory than the
-# file, so they must fill the data, one after the other.
-end_of_tensors <- function(tensors) {
-  begins <- vapply(tensors, function(entry) as.double(entry$begin), 0)
-  ends <- begins + vapply(tensors, function(entry) as.double(entry$size), 0)
+# Returns the order in which tensors lie. Those that lie over one another would take more memory
+# than the file, so they must fill the data, one after the other.
+check_filled <- function(begins, ends) {
   in_order <- order(begins, ends)
-  wrong <- match(FALSE, begins[in_order] == c(0, ends[in_order])[seq_along(tensors)])
+  wrong <- match(FALSE, begins[in_order] == c(0, ends[in_order])[seq_along(begins)])
   if (!is.na(wrong)) {
-    name <- names(tensors)[[in_order[[wrong]]]]
+    name <- names(begins)[[in_order[[wrong]]]]
     abort_tensors(paste("there is a gap or an overlap before the tensor", to_json(name)))
   }
-  max(0, ends)
+  in_order
 }
 
-last_metadata <- function(header, layout) {
-  if (layout$metadata_last) {
-    metadata <- rawToChar(header[-seq_along(layout$start)])
-    tryCatch(
-      from_json(paste0("{\"last\":", metadata))$last,
-      error = function(cnd) abort_tensors("the metadata are no JSON")
-    )
-  }
-}
-
-read_entry <- function(entry) {
+read_entry <- function(entry, by_column) {
   if (!is.list(entry) || !all(c("dtype", "shape", "data_offsets") %in% names(entry))) {
     abort_tensors("the header lacks the place of a tensor")
   }
@@ -132,10 +108,30 @@ read_entry <- function(entry) {
   }
   # R takes a part of a vector by integers in less time than by doubles.
   whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
-  list(
-    read = type$read, n = n, shape = as.integer(shape),
-    begin = whole(offsets[[1L]]), size = whole(size)
-  )
+  place_entry(list(
+    read = type$read, n = n, shape = as.integer(shape), by_column = by_column,
+    begin = offsets[[1L]], size = whole(size)
+  ))
+}
+
+#' Decide how the numbers of a tensor are put into their places
+#' @param labels The names of the numbers in a row, `NULL` for none.
+#' @return The entry with `attributes`, where these are enough, or with `place`, a function of the
+#'   numbers.
+#' @noRd
+place_entry <- function(entry, labels = NULL) {
+  shape <- entry$shape
+  if (length(shape) == 2L && !is.null(labels)) {
+    labels <- list(NULL, labels)
+  }
+  if (length(shape) <= 1L) {
+    entry$attributes <- if (!is.null(labels)) list(names = labels)
+  } else if (entry$by_column) {
+    entry$attributes <- c(list(dim = rev(shape)), if (!is.null(labels)) list(dimnames = labels))
+  } else {
+    entry$place <- function(values) place_by_row(values, shape, labels)
+  }
+  entry
 }
 
 # Returns the elements of a JSON array of whole numbers from 0 on, NULL for anything else.

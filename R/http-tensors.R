@@ -7,93 +7,78 @@
 #' Read a safetensors file
 #'
 #' @param bytes A raw vector.
-#' @param layouts An environment that remembers the headers read last, `NULL` for
-#'   none: a header seen before is not parsed again. Metadata at its end, where
-#'   our server puts them, differ from answer to answer and are not compared.
-#' @param expected JSON text of the metadata of an answer that says nothing more than its
-#'   tensors: metadata that are equal to it are not parsed. `NULL` for none.
-#' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
-#'   are in R's order.
-#' @return A list of `tensors`, a named list of vectors and arrays, and
-#'   `metadata`, a named list of strings, `NULL` for the `expected` ones.
+#' @param layout That of the file, from [read_layout()].
+#' @return A list of `tensors`, a named list of vectors and arrays, and `metadata`, a named list of
+#'   strings.
 #' @noRd
-read_tensors <- function(bytes, layouts = NULL, expected = NULL, by_column = FALSE) {
-  size <- header_size(bytes)
-  data <- 8L + size
-  header <- bytes[9L:data]
-  check_json_size(header)
-  if (any(header == as.raw(0L))) {
-    abort_tensors("the header is no JSON")
+read_tensors <- function(bytes, layout = read_layout(bytes)) {
+  metadata <- layout$metadata
+  if (layout$metadata_last) {
+    text <- rawToChar(metadata_bytes(bytes, layout))
+    metadata <- tryCatch(
+      from_json(paste0("{\"last\":", text))$last,
+      error = function(cnd) abort_tensors("the metadata are no JSON")
+    )
   }
-  layout <- known_layout(header, layouts)
-  if (layout$end != length(bytes) - data) {
-    abort_tensors(paste("the tensors have", count_of(layout$end, "byte"), "and the file",
-                        length(bytes) - data))
-  }
-  place <- if (by_column) place_by_column else place_by_row
-  tensors <- read_entries(layout$entries, bytes, data, place)
-  if (layout$metadata_last && ends_as(header, length(layout$start), expected)) {
-    return(list(tensors = tensors))
-  }
-  list(tensors = tensors, metadata = last_metadata(header, layout) %||% layout$metadata)
+  list(tensors = read_entries(bytes, layout), metadata = metadata)
+}
+
+# What follows the start of a header, to its end.
+metadata_bytes <- function(bytes, layout) bytes[(length(layout$start) + 1L):layout$data]
+
+# Whether a file is like the one from which a layout was read, up to its metadata and its numbers.
+# `layout` may be `NULL`.
+has_layout <- function(bytes, layout) {
+  !is.null(layout) && length(bytes) == layout$total &&
+    identical(bytes[seq_along(layout$start)], layout$start)
 }
 
 # Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
 # which copies the file once, in much less time for each byte.
 index_up_to <- 8192L
 
-read_entries <- function(entries, bytes, data, place) {
+read_entries <- function(bytes, layout) {
   large <- length(bytes) > index_up_to
   if (large) {
     file <- rawConnection(bytes)
     on.exit(close(file))
+    readBin(file, "raw", layout$data)
   }
+  before <- layout$data
+  entries <- layout$entries
   for (i in seq_along(entries)) {
     entry <- entries[[i]]
     part <- if (large) {
-      seek(file, data + entry$begin)
       readBin(file, "raw", entry$size)
     } else if (entry$size) {
-      first <- data + entry$begin + 1L
-      bytes[first:(first + entry$size - 1L)]
+      bytes[(before + 1L):(before + entry$size)]
     } else {
       raw()
     }
-    entries[[i]] <- place(entry$read(part, entry$n), entry$shape)
+    values <- entry$read(part, entry$n)
+    if (!is.null(entry$place)) {
+      values <- entry$place(values)
+    } else {
+      if (is.raw(values)) values <- as.integer(values)
+      if (!is.null(entry$attributes)) {
+        attributes(values) <- c(entry$attributes, if (is.object(values)) list(class = "integer64"))
+      }
+    }
+    entries[[i]] <- values
+    if (!large) before <- before + entry$size
   }
   entries
 }
 
 # Bytes become integers once they are in their places.
-place_by_row <- function(values, shape) {
-  if (!is.raw(values)) {
-    shape_values(values, shape)
-  } else if (length(shape) > 1L) {
-    array(as.integer(shape_values(values, shape)), shape)
-  } else {
-    as.integer(values)
-  }
-}
-
-place_by_column <- function(values, shape) {
+place_by_row <- function(values, shape, labels = NULL) {
   if (is.raw(values)) {
-    values <- as.integer(values)
+    array(as.integer(shape_values(values, shape)), shape, labels)
+  } else if (is.object(values) || length(shape) > 2L) {
+    shape_values(values, shape)
+  } else {
+    matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE, dimnames = labels)
   }
-  if (length(shape) > 1L) {
-    dim(values) <- rev(shape)
-  }
-  values
-}
-
-# Whether a header continues with a text from a place on, and has only blanks after it.
-ends_as <- function(header, after, text) {
-  if (is.null(text)) {
-    return(FALSE)
-  }
-  text <- charToRaw(text)
-  rest <- header[-seq_len(after)]
-  n <- length(text)
-  length(rest) >= n && identical(rest[seq_len(n)], text) && all(rest[-seq_len(n)] == as.raw(0x20))
 }
 
 # The types -----------------------------------------------------------------------

@@ -11,9 +11,13 @@ play_requests <- function(play) {
   vector_env <- play$vector_env
   known <- vector_env$known
   play$size <- first_size(play)
-  send_several(
-    vector_env$client, rollouts_route,
-    next_request = function() {
+  request <- prepare_request(
+    vector_env$client, rollouts_route, body = function(content, key) content,
+    sends_tensors = TRUE, repeatable = TRUE
+  )
+  perform_several(
+    request,
+    next_content = function() {
       piece <- take_piece(play)
       if (!is.null(piece)) c(piece, list(body = episodes_body(play, piece)))
     },

@@ -15,7 +15,7 @@ probe_server <- function(base, timeout, token = NULL) {
   client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE), token)
   problem <- NULL
   response <- tryCatch(
-    send(client, "/v1/envs/"),
+    any_response(client, "/v1/envs/", "GET"),
     gym_error_connection = function(cnd) {
       problem <<- conditionMessage(cnd)
       NULL

@@ -359,27 +359,6 @@ test_that("interrupts at any moment leave a client that works", {
   expect_identical(output, "TRUE 4 1")
 })
 
-test_that("an answer to another call is an error, in a body and in a header", {
-  sent <- list(key = "k", number = 4)
-  answer <- function(status, body, headers = "") {
-    list(status_code = status, content = charToRaw(body), headers = charToRaw(headers),
-         url = "http://127.0.0.1:1/v1/envs/", key = sent)
-  }
-  echo <- function(number) sprintf('{"request":{"key":"k","number":%d}}', number)
-  header <- function(number) {
-    sprintf("HTTP/1.1 204 No Content\r\nGym-Request: k %d\r\n\r\n", number)
-  }
-  read <- function(response) {
-    response["answer"] <- list(parsed_body(response))
-    read_answer(response, "POST")
-  }
-  expect_equal(read(answer(200, echo(4)))$request$number, 4)
-  expect_null(read(answer(204, "", header(4))))
-  for (wrong in list(answer(200, echo(3)), answer(400, echo(5)), answer(204, "", header(3)))) {
-    expect_error(read(wrong), "another call", class = "gym_error_connection")
-  }
-})
-
 test_that("what is no answer of a Gym server is an error with a class", {
   read <- function(status, body) {
     parse_server_error_or_raise_for_status(structure(

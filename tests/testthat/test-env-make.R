@@ -40,13 +40,6 @@ test_that("an environment that was thrown away is closed by the next that is mad
   expect_length(env_list_all(client), before + 1)
 })
 
-test_that("an environment of which nothing could be learnt is closed again", {
-  server <- local_server()
-  client <- local_cut_client(server, "answered", "GET /v1/envs/", times = 100)
-  expect_error(gym_make("CartPole-v1", client = client), class = "gym_error_connection")
-  expect_length(env_list_all(server), 0)
-})
-
 test_that("set.seed() fixes an environment that is given no seed, by the one number it draws", {
   first <- function(...) {
     env <- local_env("CartPole-v1", ...)

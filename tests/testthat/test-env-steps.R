@@ -1,22 +1,23 @@
 test_that("without infos an environment is reset and stepped as with them", {
   bare <- local_env(num_envs = 3, vectorization_mode = "sync", seed = 1)
   beside <- local_env(num_envs = 3, vectorization_mode = "sync", seed = 1)
-  expect_identical(reset_bare(bare, 1:3), beside$reset(seed = 1:3))
-  out <- step_bare(bare, c(1, 0), which = c(1, 3))
+  expect_identical(bare$reset(seed = 1:3, infos = FALSE), beside$reset(seed = 1:3))
+  out <- bare$step(c(1, 0), which = c(1, 3), infos = FALSE)
   expect_identical(out, beside$step(c(1, 0), which = c(1, 3)))
-  again <- beside$reset(seed = c(NA, 7, NA), mask = c(FALSE, TRUE, FALSE))
-  expect_identical(reset_bare(bare, 7, which = 2), again[2, , drop = FALSE])
+  second <- c(FALSE, TRUE, FALSE)
+  again <- beside$reset(seed = c(NA, 7, NA), mask = second)
+  expect_identical(bare$reset(seed = c(NA, 7, NA), mask = second, infos = FALSE), again)
 })
 
 test_that("a sub-environment begins its next episodes by itself, from the seeds in its list", {
   poles <- local_env(num_envs = 2, vectorization_mode = "sync", autoreset_mode = "SameStep")
   alone <- local_env()
-  first <- reset_bare(poles, list(c(1, 5), 2))
+  first <- first_observation(poles, list(c(1, 5), 2))
   expect_identical(first[1, ], alone$reset(seed = 1))
   ended <- FALSE
   out <- list(done = c(FALSE, FALSE))
   while (!ended) {
-    out <- step_bare(poles, c(1, 1), which = if (isTRUE(out$done[2])) 1 else NULL)
+    out <- poles$step(c(1, 1), which = if (isTRUE(out$done[2])) 1 else NULL)
     ended <- out$done[[1]]
   }
   expect_identical(out$observation[1, ], alone$reset(seed = 5))
@@ -35,14 +36,11 @@ test_that("an action in another form than the last one is checked and sent", {
 })
 
 test_that("a header is prepared for numbers of any length", {
-  prepared <- new.env()
-  prepared$has_texts <- FALSE
-  prepared$fields <- c(render = "false")
   for (n in c(3L, join_as_integers)) {
-    prepared$integers_table <- integers_table(n)
+    body <- new_tensors_body(c(render = "false"), n)
     integers <- rep_len(0:2, n)
     for (number in c(1, 9, 10, 99999, 1e15)) {
-      file <- read_tensors(prepared_tensors(prepared, integers, "key", number))
+      file <- read_tensors(body(integers, list(key = "key", number = number)))
       expect_identical(file$tensors$action, integers)
       expect_identical(file$metadata$request, sprintf('{"key":"key","number":%.0f}', number))
     }
@@ -57,7 +55,8 @@ test_that("tensors by column are what tensors by row are", {
       write_tensors(list(x = list(dtype = dtype, shape = shape, bytes = write(flat))), c(a = ""))
     }
     by_row <- read_tensors(file(2:4, row_major(values)))
-    by_column <- read_tensors(file(4:2, as.vector(values)), by_column = TRUE)
+    bytes <- file(4:2, as.vector(values))
+    by_column <- read_tensors(bytes, read_layout(bytes, by_column = TRUE))
     expect_identical(by_column, by_row)
     expect_equal(by_row$tensors$x, values)
   }
@@ -73,7 +72,7 @@ test_that("a Tuple or Dict of a single part stays one, step after step", {
     expect_type(out$observation, "list")
     expect_length(out$observation, 1L)
     expect_length(out$observation[[1L]], 3L)
-    bare <- step_bare(env, c(0L, 1L, 1L), finals = FALSE)
+    bare <- env$step(c(0L, 1L, 1L), infos = FALSE, finals = FALSE)
     expect_type(bare$observation, "list")
   }
 })

@@ -204,7 +204,7 @@ test_that("values of nested spaces have their form", {
   for (kind in names(wrong)) {
     for (json in wrong[[kind]]) {
       answer <- list(observation = from_json(json))
-      expect_wrong(decode_observation(spaces[[kind]], answer), "")
+      expect_wrong(observation_reader(list(), spaces[[kind]], FALSE)(answer), "")
     }
   }
 })
@@ -292,15 +292,6 @@ test_that("a watch page's key cannot change its address", {
     names(route) <- at("watch/key/")
     do.call(say, c(list(server), route))
     expect_wrong(env_watch(server, "0a1b2c3d"), "key")
-  }
-})
-
-test_that("an echo that is none is another call's", {
-  response <- list(
-    key = list(key = "k", number = 4), status_code = 200L, url = "http://127.0.0.1:1/"
-  )
-  for (echo in list(3, "k", list("k", 4), list(key = "k", number = c(4, 5)), list(key = "k"))) {
-    expect_wrong(check_echo(response, list(request = echo), NULL), "another call")
   }
 })
 

@@ -30,11 +30,11 @@ test_that("the classic calls work with a server that has no others", {
 
 test_that("an episode there ends as Gym reports it", {
   client <- local_classic_client()
-  env <- gym_make("CartPole-v1", client = client)
-  env$reset()
+  id <- env_create(client, "CartPole-v1")
+  env_reset(client, id)
   steps <- 0
   repeat {
-    out <- env$step(1)
+    out <- env_step(client, id, 1)
     steps <- steps + 1
     if (out$done) break
     expect_false(out$terminated || out$truncated)
@@ -43,36 +43,42 @@ test_that("an episode there ends as Gym reports it", {
   expect_lt(steps, 20)
   expect_true(out$terminated)
   expect_false(out$truncated)
-  expect_output(print(env), "CartPole-v1")
-  env$close()
-  pendulum <- gym_make("Pendulum-v1", client = client)
-  expect_identical(pendulum$reset(return_info = TRUE)$info, empty_object)
-  for (step in 1:200) out <- pendulum$step(0.5)
+  id <- env_create(client, "Pendulum-v1")
+  expect_identical(env_reset(client, id, return_info = TRUE)$info, empty_object)
+  for (step in 1:200) out <- env_step(client, id, 0.5)
   expect_identical(out[c("done", "terminated", "truncated")],
                    list(done = TRUE, terminated = FALSE, truncated = TRUE))
-  pendulum$close()
 })
 
 test_that("a space of which that server sends only the name passes values as they are", {
-  env <- gym_make("Blackjack-v1", client = local_classic_client())
-  expect_length(env$reset(), 3)
-  expect_output(print(env), "Tuple (not described)", fixed = TRUE)
-  expect_error(space_sample(env$observation_space), "no more .* than its name",
-               class = "gym_error_argument")
-  expect_type(env$step(0)$reward, "double")
+  client <- local_classic_client()
+  id <- env_create(client, "Blackjack-v1")
+  expect_length(env_reset(client, id), 3)
+  observed <- env_observation_space_info(client, id)
+  expect_output(print(observed), "Tuple (not described)", fixed = TRUE)
+  expect_error(space_sample(observed), "no more .* than its name", class = "gym_error_argument")
+  expect_type(env_step(client, id, 0)$reward, "double")
 })
 
 test_that("what that server would ignore is refused", {
   client <- local_classic_client()
-  cnd <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = client),
+  cnd <- expect_error(env_create(client, "CartPole-v1", num_envs = 2),
                       "which has no `num_envs`", class = "gym_error_http")
   expect_identical(cnd$code, "not_supported")
   expect_length(env_list_all(client), 0)
-  env <- gym_make("CartPole-v1", seed = 1, client = client)
-  expect_error(env$reset(seed = 1), "which has no `seed` here", class = "gym_error_http")
-  expect_error(rollout("CartPole-v1", policy_random(), client = client),
-               "which has no `seed` here", class = "gym_error_http")
-  expect_identical(names(env_list_all(client)), env$instance_id)
+  id <- env_create(client, "CartPole-v1", seed = 1)
+  expect_error(env_reset(client, id, seed = 1), "which has no `seed` here",
+               class = "gym_error_http")
+})
+
+test_that("environment objects are refused there, and nothing is left", {
+  client <- local_classic_client()
+  cnd <- expect_error(gym_make("CartPole-v1", client = client), "classic calls",
+                      class = "gym_error_http")
+  expect_identical(cnd$code, "not_supported")
+  expect_error(rollout("CartPole-v1", policy_random(), client = client), "classic calls",
+               class = "gym_error_http")
+  expect_length(env_list_all(client), 0)
 })
 
 test_that("the post's script plays on that server", {
@@ -92,8 +98,8 @@ test_that("the post's script plays on that server", {
 
 test_that("a step that was cut is not repeated there, where it would be done twice", {
   client <- local_cut_client(local_classic_client(), "answered", "/step")
-  env <- gym_make("CartPole-v1", client = client)
-  env$reset()
-  expect_error(env$step(1), class = "gym_error_connection")
-  expect_equal(env$step(1)$reward, 1)
+  id <- env_create(client, "CartPole-v1")
+  env_reset(client, id)
+  expect_error(env_step(client, id, 1), class = "gym_error_connection")
+  expect_equal(env_step(client, id, 1)$reward, 1)
 })

@@ -1,7 +1,30 @@
-# Requests of which several are under way at once.
+# A request of which several are under way at once.
 
+description_request <- function(client) {
+  prepare_request(
+    client, rollouts_route, body = function(content, key) content, repeatable = TRUE
+  )
+}
+
+describe_body <- function(id) charToRaw(json_object(c(env_id = json_string(id))))
+
+# One of them alone.
 description <- function(client, id = "Acrobot-v1") {
-  post_repeatable(client, rollouts_route, c(env_id = json_string(id)))
+  contents <- list(list(body = describe_body(id)))
+  answer <- NULL
+  perform_several(
+    description_request(client),
+    next_content = function() {
+      content <- if (length(contents)) contents[[1]]
+      contents <<- list()
+      content
+    },
+    received = function(content, response, seconds) {
+      answer <<- read_answer(response, "POST")
+      TRUE
+    }
+  )
+  answer
 }
 
 test_that("answers come to their requests, and no more are under way than allowed", {
@@ -9,9 +32,9 @@ test_that("answers come to their requests, and no more are under way than allowe
   ids <- c("Acrobot-v1", "CartPole-v1", "Pendulum-v1", "MountainCar-v0", "FrozenLake-v1")
   given <- got <- character()
   open <- 0L
-  send_several(
-    client, rollouts_route,
-    next_request = function() {
+  perform_several(
+    description_request(client),
+    next_content = function() {
       i <- length(given) + 1L
       if (i > length(ids)) {
         return(NULL)
@@ -19,16 +42,15 @@ test_that("answers come to their requests, and no more are under way than allowe
       given[[i]] <<- ids[[i]]
       open <<- open + 1L
       expect_lte(open, 2L)
-      list(id = ids[[i]], body = charToRaw(json_object(c(env_id = json_string(ids[[i]])))))
+      list(id = ids[[i]], body = describe_body(ids[[i]]))
     },
-    received = function(request, response, seconds) {
+    received = function(content, response, seconds) {
       open <<- open - 1L
-      expect_identical(response$answer$env_id, request$id)
+      expect_identical(response$answer$env_id, content$id)
       expect_gte(seconds, 0)
-      got <<- c(got, request$id)
+      got <<- c(got, content$id)
       FALSE
-    },
-    sends = json_type
+    }
   )
   expect_setequal(got, ids)
 })

@@ -39,26 +39,6 @@ tensor <- function(dtype, shape, x) {
   list(dtype = dtype, shape = shape, bytes = tensor_types[[dtype]]$write(x))
 }
 
-test_that("a header seen before is not parsed again, whatever its metadata", {
-  layouts <- new.env()
-  # As our server writes it: metadata last, of a length of its own.
-  file <- function(info) {
-    header <- paste0(
-      '{"x":{"dtype":"U8","shape":[2],"data_offsets":[0,2]},"__metadata__":{"info":"', info, '"}}'
-    )
-    c(writeBin(c(nchar(header), 0L), raw(), endian = "little"), charToRaw(header), as.raw(3:4))
-  }
-  first <- read_tensors(file("one"), layouts)
-  expect_identical(first, list(tensors = list(x = 3:4), metadata = list(info = "one")))
-  expect_length(layouts$seen, 1)
-  expect_identical(read_tensors(file("another"), layouts)$metadata$info, "another")
-  expect_length(layouts$seen, 1)
-  for (i in seq_len(max_layouts + 5)) {
-    read_tensors(write_tensors(list(x = tensor("U8", i, rep(1, i))), c(a = "")), layouts)
-  }
-  expect_length(layouts$seen, max_layouts)
-})
-
 test_that("halves round to the nearest, ties to the even, as NumPy's do", {
   x <- c(1, 1 + 2^-11, 1 + 3 * 2^-11, 65519, 65520, 2^-24, 2^-25, 2^-14 - 2^-26, -2^-24, NaN)
   back <- double_from_half(half_from_double(x))
@@ -109,14 +89,6 @@ test_that("large observations and all frames travel as tensors, small ones do no
   expect_identical(dim(observation), c(96L, 96L, 3L))
 })
 
-test_that("a file that is cut short is an error also when its header was seen before", {
-  tensors <- list(x = list(dtype = "I32", shape = 4L, bytes = tensor_types$I32$write(1:4)))
-  bytes <- write_tensors(tensors, c(info = "{}"))
-  layouts <- new.env()
-  expect_identical(read_tensors(bytes, layouts)$tensors$x, 1:4)
-  expect_error(read_tensors(utils::head(bytes, -8), layouts), class = "gym_error_connection")
-})
-
 test_that("a header that makes no sense is an error", {
   file_of <- function(header) {
     c(writeBin(c(nchar(header), 0L), raw(), endian = "little"), charToRaw(header), raw(16))
@@ -137,47 +109,4 @@ test_that("the error for a number that a dtype cannot hold names the whole path"
   error <- expect_error(to_tensors(space, list(a = c(0, 1e300)), "action", NULL),
                         class = "gym_error_space")
   expect_match(error$path, "a[1]", fixed = TRUE)
-})
-
-test_that("metadata are left unread only where they are what was expected", {
-  # As the server writes a file: metadata last, blanks at the end of the header.
-  file_with <- function(metadata) {
-    table <- '{"x":{"dtype":"U8","shape":[2],"data_offsets":[0,2]}'
-    header <- charToRaw(paste0(table, ',"__metadata__":', metadata, "}"))
-    header <- c(header, rep(charToRaw(" "), -length(header) %% 8L))
-    size <- writeBin(c(length(header), 0L), raw(), endian = "little")
-    c(size, header, as.raw(c(3, 4)))
-  }
-  sent <- list(key = "k", number = 7)
-  echo <- '"request":"{\\"key\\":\\"k\\",\\"number\\":%d}"}'
-  bare <- file_with(paste0('{"info":"{}",', sprintf(echo, 7)))
-  expect_null(read_tensors(bare, expected = bare_metadata(sent))$metadata)
-  expect_identical(
-    tensors_answer(bare, NULL, sent),
-    list(tensors = list(x = 3:4), info = empty_object, request = sent)
-  )
-  others <- c(
-    paste0('{"info":"{}",', sprintf(echo, 8)),
-    paste0('{"info":"{\\"a\\":1}",', sprintf(echo, 7)),
-    paste0('{"info":"{}","final_sub_envs":"[0]",', sprintf(echo, 7))
-  )
-  for (metadata in others) {
-    expect_type(read_tensors(file_with(metadata), expected = bare_metadata(sent))$metadata, "list")
-  }
-  expect_equal(tensors_answer(file_with(others[[1]]), NULL, sent)$request$number, 8)
-  expect_equal(tensors_answer(file_with(others[[2]]), NULL, sent)$info, list(a = 1))
-  expect_equal(tensors_answer(file_with(others[[3]]), NULL, sent)$final_sub_envs, list(0))
-})
-
-test_that("the server's answer to a step of sub-environments is what is expected", {
-  env <- local_env(num_envs = 2)
-  env$reset()
-  connection <- free_connection(env$client)
-  fetch <- connection$fetch
-  withr::defer(connection$fetch <- fetch)
-  answer <- NULL
-  connection$fetch <- function(url, handle) answer <<- fetch(url, handle)
-  env$step(c(0, 1))
-  sent <- list(key = connection$keys$key, number = connection$keys$number)
-  expect_null(read_tensors(answer$content, expected = bare_metadata(sent))$metadata)
 })

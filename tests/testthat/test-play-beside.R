@@ -221,11 +221,11 @@ test_that("no instance is made for what is played beside the environment", {
 test_that("the server is asked for a description once", {
   client <- local_server()
   asked <- 0L
-  local_functions(post_repeatable = local({
-    post <- gym:::post_repeatable
+  local_functions(ask_description = local({
+    ask <- gym:::ask_description
     function(...) {
       asked <<- asked + 1L
-      post(...)
+      ask(...)
     }
   }))
   for (i in 1:3) rollout("Acrobot-v1", policy_random(), max_steps = 5, client = client)
@@ -252,8 +252,8 @@ test_that("results are the same however many episodes a request has, and how man
     local_pieces(size)
     expect_identical(play(), whole, label = paste("pieces of", size))
   }
-  local_functions(send_several = local({
-    send <- gym:::send_several
+  local_functions(perform_several = local({
+    send <- gym:::perform_several
     function(..., at_once = 2L) send(..., at_once = 5L)
   }))
   expect_identical(play(), whole)

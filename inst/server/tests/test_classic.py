@@ -23,7 +23,8 @@ def post(request, client):
 
 def test_a_whole_session(client, path, post):
     made = post(path("/v1/envs/"), {"env_id": ENV_ID})
-    assert list(made.json) == ["instance_id"]
+    # What is said beside it is new, and classic clients leave it alone.
+    assert next(iter(made.json)) == "instance_id"
     instance_id = made.json["instance_id"]
     url = f"/v1/envs/{instance_id}"
     listed = client.get(path("/v1/envs/")).json

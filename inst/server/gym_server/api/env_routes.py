@@ -56,15 +56,17 @@ ROOM = Room("envs")
         "NextStep.",
     ),
     Field("name", env_fields.NAME, "What its owner calls it; shown wherever it is listed."),
-    answer="instance_id",
+    answer="instance_id, and all about the environment",
     once=True,
     grows=True,
-    schema=schemas.json_object({"instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}),
+    schema=schemas.json_object(
+        {**schemas.ABOUT_INSTANCE, "instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}
+    ),
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    return {"instance_id": call.services.instances.create(EnvConfig(**fields))}
+    return call.services.instances.create(EnvConfig(**fields)).about()
 
 
 @ROOM.declare(

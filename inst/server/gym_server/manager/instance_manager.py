@@ -119,8 +119,8 @@ class InstanceManager:
         self._tombstones = Tombstones()
         self._stopping = False
 
-    def create(self, config: EnvConfig) -> str:
-        """Create an environment and return its instance_id, 8 hex digits.
+    def create(self, config: EnvConfig) -> Instance:
+        """Create an environment, whose instance_id has 8 hex digits.
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``invalid_kwargs``, ``shutting_down``,
@@ -140,7 +140,7 @@ class InstanceManager:
         except TooLargeHereError:
             return self._create(config, isolated=True)
 
-    def _create(self, config: EnvConfig, isolated: bool) -> str:
+    def _create(self, config: EnvConfig, isolated: bool) -> Instance:
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
@@ -152,7 +152,7 @@ class InstanceManager:
             undo.pop_all()
         instance.report_end(lambda why: self._remove(instance.instance_id, why))
         log.info("Created instance %s of %s", instance.instance_id, instance.env_id)
-        return instance.instance_id
+        return instance
 
     def _enlist(self, instance: Instance, creation: _Creation) -> bool:
         """Put an instance on the list, unless its creation was abandoned meanwhile."""

@@ -143,10 +143,9 @@ def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
 
     monkeypatch.setattr(InstanceManager, "_enlist", end_it_and_enlist)
     client = app.test_client()
-    instance_id = client.post("/v1/envs/", json={"env_id": "CartPole-v1"}).json["instance_id"]
-    assert client.get("/v1/envs/").json["all_envs"] == {}
-    answer = client.post(f"/v1/envs/{instance_id}/reset/")
+    answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1"})
     assert (answer.status_code, answer.json["code"]) == (500, "environment_died")
+    assert client.get("/v1/envs/").json["all_envs"] == {}
     app.close()
 
 

@@ -1,5 +1,6 @@
-# Readers and writers of values, made once for a space and called in every step. They take values as
-# they nearly always are; anything else goes the general way, which tells what is wrong with it.
+# Functions that read and write a space's values, prepared once and called in every step. They take
+# values as they nearly always are; anything else goes the general way, which tells what is wrong
+# with it.
 
 #' Make the function that reads a space's values from JSON
 #' @return A function as [decode_value()], without the space.
@@ -12,7 +13,7 @@ json_reader.default <- function(space) function(json) decode_value(space, json)
 #' @exportS3Method
 json_reader.gym_space_array <- function(space) {
   n <- prod(space$shape)
-  if (length(space$shape) > 1L || !startsWith(space$dtype, "float")) {
+  if (length(space$shape) > 1L || !is_float(space)) {
     return(json_reader.default(space))
   }
   function(json) {
@@ -24,6 +25,8 @@ json_reader.gym_space_array <- function(space) {
     }
   }
 }
+
+is_float <- function(space) startsWith(space$dtype %||% "", "float")
 
 #' @exportS3Method
 json_reader.gym_space_discrete <- function(space) {
@@ -47,6 +50,9 @@ json_reader.gym_space_tuple <- function(space) {
 
 #' @exportS3Method
 json_reader.gym_space_dict <- json_reader.gym_space_tuple
+
+#' @exportS3Method
+json_reader.gym_space_texts <- function(space) json_reader.default(space)
 
 # Writers ----------------------------------------------------------------------------------
 
@@ -73,7 +79,7 @@ is_plain_whole <- function(x) {
 #' @exportS3Method
 json_writer.gym_space_box <- function(space) {
   n <- prod(space$shape)
-  if (length(space$shape) != 1L || !startsWith(space$dtype, "float")) {
+  if (length(space$shape) != 1L || !is_float(space)) {
     return(json_writer.default(space))
   }
   function(value) {

@@ -1,0 +1,112 @@
+# What becomes of a request whose connection broke: it is made again, or it is an error.
+
+max_attempts <- 4L
+
+#' Make further attempts at a request
+#' @param failure The connection's error that ended the first attempt.
+#' @return What [attempt_request()] returns, but never a connection's error: that is raised.
+#' @noRd
+repeat_request <- function(request, connection, handle, key, failure, call) {
+  client <- request$client
+  timeout <- timeout_of(client)
+  begun <- now() - curl::handle_data(handle$curl)$times[["total"]]
+  attempt <- 1L
+  reached <- FALSE
+  repeat {
+    reason <- conditionMessage(failure)
+    raise_own_stop(client, reason, call)
+    reached <- reached | curl::handle_data(handle$curl)$times[["pretransfer"]] > 0
+    refused <- curl_refused(reason)
+    if (refused) {
+      handle <- replace_handle(client, connection, handle)
+    }
+    pause <- 0.1 * attempt
+    left <- timeout - (now() - begun) - pause
+    if (attempt < max_attempts && left > 0 && may_repeat(request, connection, reason)) {
+      if (!refused) Sys.sleep(pause)
+      attempt <- attempt + 1L
+    } else if (prompted_server_starts(client, reached, call)) {
+      begun <- now()
+      left <- timeout
+      attempt <- 1L
+    } else {
+      abort_connection(client$remote_base, reason, call, reached)
+    }
+    # All attempts together may take as long as one request.
+    set_curl(handle$curl, timeout_ms = left * 1000)
+    on.exit(set_curl(handle$curl, timeout_ms = timeout * 1000))
+    result <- attempt_request(request, connection, handle, key)
+    failure <- attr(result, "unread")
+    if (!inherits(failure, "error")) {
+      return(result)
+    }
+  }
+}
+
+now <- function() proc.time()[["elapsed"]]
+
+# httr's timeout() takes precedence over the client's own.
+timeout_of <- function(client) {
+  configured <- client_config(client)$options$timeout_ms
+  if (is.null(configured)) client$timeout else configured / 1000
+}
+
+# Raises what ended an attempt from this side: the answer was too large, or the user interrupted.
+raise_own_stop <- function(client, reason, call) {
+  if (client$state$too_large) {
+    abort_too_large(base = client$remote_base, call = call)
+  }
+  if (grepl("aborted by (an application )?callback|Callback aborted", reason)) {
+    rlang::interrupt()
+  }
+}
+
+# Whether the user was asked and had a server started, at the first request of a client that found
+# nothing listening at its address. Only clients of create_GymClient() ask. The function that asks
+# belongs to an upper floor and is registered by .onLoad().
+prompted_server_starts <- function(client, reached, call) {
+  state <- client$state
+  prompts <- !reached && isTRUE(state$may_prompt)
+  state$may_prompt <- FALSE
+  prompts && the_session$prompt_for_server(client, call)
+}
+
+# What curl refuses may be repeated in any case as long as it has not asked for the body. A server
+# with the classic protocol knows no idempotency keys and would do the repeat, too.
+may_repeat <- function(request, connection, reason) {
+  repeatable <- request$repeatable && !(request$once && isTRUE(request$client$state$classic))
+  if (curl_refused(reason)) {
+    repeatable || connection$sent == 0L
+  } else {
+    repeatable && connection_broke(reason)
+  }
+}
+
+# What libcurl says when an open connection was lost, as opposed to one that could not be made or
+# an answer that took too long.
+connection_broke <- function(reason) {
+  grepl(
+    paste(
+      "Recv failure|Send failure|Empty reply|Server returned nothing|data rewind",
+      "Connection (reset|died)|Broken pipe|transfer closed",
+      "Failed (sending|receiving) data|Failure when receiving data",
+      sep = "|"
+    ),
+    reason
+  )
+}
+
+# What curl_fetch_memory() says when its pool refuses the handle, see replace_handle(). Nothing was
+# sent then. It says the same, though, when waiting in the pool fails, and that may be later.
+curl_refused <- function(reason) {
+  grepl("Failed initialization", reason, fixed = TRUE)
+}
+
+# A response as it is; a connection's error where the connection ended within the header: libcurl
+# takes that for the end of an answer without content.
+whole_response <- function(response) {
+  end <- as.raw(c(0x0d, 0x0a, 0x0d, 0x0a))
+  cut <- !inherits(response, "error") && !length(response$content) &&
+    !identical(utils::tail(response$headers, 4L), end)
+  if (cut) simpleError("Connection died within the header of the answer") else response
+}

@@ -1,0 +1,39 @@
+# The routes of the requests that are made in the meantime.
+local_requests <- function(frame = parent.frame()) {
+  asked <- new.env()
+  asked$routes <- character()
+  local_functions(perform_request = local({
+    perform <- gym:::perform_request
+    function(request, ...) {
+      asked$routes <- c(asked$routes, paste(request$method, basename(request$url)))
+      perform(request, ...)
+    }
+  }), frame = frame)
+  asked
+}
+
+test_that("making an environment is one request, whose answer describes it", {
+  client <- test_client()
+  env_list_all(client)
+  asked <- local_requests()
+  env <- local_env(num_envs = 2, seed = 1)
+  expect_identical(env$spec$max_episode_steps, 500L)
+  id <- env_create(client, "CartPole-v1")
+  expect_identical(asked$routes, c("POST envs", "POST envs"))
+  env_reset(client, id)
+  env_step(client, id, 1)
+  env_close(client, id)
+  expect_identical(asked$routes[-(1:2)], c("POST reset", "POST step", "POST close"))
+})
+
+test_that("an environment that cannot be described is closed again", {
+  server <- local_canned_server(list(
+    "/v1/envs/" = list(text = paste0(
+      '{"instance_id":"0a1b2c3d","request":{},"env_id":"Bad-v0","action_space":3,',
+      '"observation_space":{"name":"Discrete","n":2}}'
+    )),
+    "/v1/envs/0a1b2c3d/close/" = list(status = 200, text = "{}")
+  ))
+  expect_error(env_create(server, "Bad-v0"), "action_space", class = "gym_error_connection")
+  expect_false(instance_place(server, "0a1b2c3d") %in% ls(the_session$instances))
+})
