@@ -11,9 +11,10 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance, Seed
-from gym_server.isolation.worker import WorkerSettings, serve_instance
+from gym_server.isolation import worker
+from gym_server.isolation.worker import WorkerSettings
 from gym_server.processes.messages import Result
-from gym_server.processes.worker_process import WorkerProcess
+from gym_server.processes.pool import pool
 from gym_server.protocol.answers import AnswerForm, Ready
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rendering.render_thread import RenderThread
@@ -44,7 +45,7 @@ class IsolatedInstance(Instance):
     can_be_killed = True
 
     def __init__(self, config: EnvConfig, settings: WorkerSettings, renderer: RenderThread) -> None:
-        """Start the process; ``create()`` waits for the environment.
+        """Take a process; ``create()`` creates the environment there.
 
         Args:
             config: what the client wants.
@@ -54,23 +55,17 @@ class IsolatedInstance(Instance):
         super().__init__(config, renderer)
         self.env_id = str(config.env_id)
         self._last_about: dict = {}
-        self._on_end: Callable[[GymServerError], None] = lambda why: None
-        hint = (
-            f"the server's option --max-worker-mb lets it have {settings.max_mb} MiB"
-            if settings.max_mb
-            else ""
-        )
-        self._worker = WorkerProcess(
-            serve_instance,
-            config,
-            settings,
-            on_end=lambda why: self._on_end(why),
-            hint=hint,
-            first_result=True,
+        self._create_args = config, settings
+        hint = f"the server's option --max-worker-mb lets it have {settings.max_mb} MiB"
+        self._process = pool.take(
+            worker.__name__,
+            trusted=False,
+            most_mb=settings.most_mb,
+            hint=hint if settings.max_mb else None,
         )
 
     def create(self, reservation: MemoryReservation) -> None:
-        """Wait until the environment is created.
+        """Create the environment.
 
         Args:
             reservation: what its memory is charged to, as far as its process reports it.
@@ -78,15 +73,14 @@ class IsolatedInstance(Instance):
         Raises:
             GymServerError: see ``factory.make_instance()``; ``environment_died``.
         """
-        created = _dict(self._worker.first_result())
+        created = _dict(self._process.call("create", *self._create_args))
         self._last_about = created["about"]
         reservation.take(max(0.0, float(created["memory"])), self.env_id)
         self.env_id = str(self._last_about["env_id"])
         self.viewer.fps = usable_fps(created["fps"])
 
     def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        self._on_end = on_end
-        self._worker.report_end()
+        self._process.report_end(on_end)
 
     # Resets and steps -----------------------------------------------------------------------
 
@@ -105,10 +99,10 @@ class IsolatedInstance(Instance):
     # The form goes as a plain tuple: to pickle and to read a class takes 8 us longer.
     def _begin(self, method: str, *args: object) -> Ready:
         self.begin_reset_or_step()
-        return cast(Ready, self._worker.call(method, *args))
+        return cast(Ready, self._process.call(method, *args))
 
     def _ask(self, method: str, *args: object) -> Result:
-        return cast(Result, self._worker.call(method, *args))
+        return cast(Result, self._process.call(method, *args))
 
     def _sample_action(self) -> object:
         return self._ask("sample_action").value
@@ -124,21 +118,21 @@ class IsolatedInstance(Instance):
         return dict(_dict(result)), result.frame
 
     def _transition_model(self) -> Ready:
-        return cast(Ready, self._worker.call("transition_model"))
+        return cast(Ready, self._process.call("transition_model"))
 
     # At any time ----------------------------------------------------------------------------
 
     def space_info(self, name: str) -> dict:
         """Return the description of a space."""
-        return _dict(self._worker.query("space_info", name))
+        return _dict(self._process.query("space_info", name))
 
     def contains(self, name: str, claim: dict) -> bool:
         """Answer a client's "contains"."""
-        return bool(self._worker.query("contains", name, claim).value)
+        return bool(self._process.query("contains", name, claim).value)
 
     def _about(self) -> dict:
         try:
-            self._last_about = _dict(self._worker.query("about", timeout=_ABOUT_SECONDS))
+            self._last_about = _dict(self._process.query("about", timeout=_ABOUT_SECONDS))
         except TimeoutError:
             log.info("The process of %s does not answer at the moment", self.env_id)
         return {**self._last_about, "isolated": True}
@@ -146,12 +140,12 @@ class IsolatedInstance(Instance):
     @property
     def pids(self) -> list[int]:
         """Its process."""
-        return [self._worker.pid]
+        return [self._process.pid]
 
     @property
     def query_since(self) -> float | None:
         """Since when a query has waited for the process, in the clock's seconds, or None."""
-        return self._worker.query_since
+        return self._process.query_since
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -168,15 +162,15 @@ class IsolatedInstance(Instance):
     # The end --------------------------------------------------------------------------------
 
     def _close(self, why: GymServerError) -> None:
-        self._worker.begin_close()
+        self._process.release()
         try:
             self._ask("close")
         finally:
-            self._worker.close(why)
+            self._process.end(why)
 
     def kill(self, why: GymServerError) -> None:
         """Kill the process; every call on it raises the reason, so none is stuck."""
-        self._worker.kill(why)
+        self._process.kill(why)
 
     def _close_abandoned(self) -> None:
         """Do nothing: the process was killed."""

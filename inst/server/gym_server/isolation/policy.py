@@ -41,9 +41,10 @@ from typing import cast
 from gymnasium import error
 
 from gym_server.envs import registry
-from gym_server.errors import GymServerError, call_too_long, shutting_down
-from gym_server.isolation.worker import WorkerSettings, list_registry
-from gym_server.processes.worker_process import WorkerProcess
+from gym_server.errors import GymServerError, call_too_long
+from gym_server.isolation import worker
+from gym_server.isolation.worker import WorkerSettings
+from gym_server.processes.pool import pool
 
 log = logging.getLogger(__name__)
 
@@ -117,9 +118,7 @@ class Isolation:
             isinstance(env_id, str) and ":" not in env_id and _home(env_id, allowed) is _UNKNOWN
         )
         imported = allowed if is_unknown else frozenset()
-        return WorkerSettings(
-            allowed, imported, max_num_envs, memory, self._max_mb, logging.getLogger().level
-        )
+        return WorkerSettings(allowed, imported, max_num_envs, memory, self._max_mb)
 
     def search(
         self, text: str | None, allowed_modules: Collection[str], seconds: float
@@ -146,24 +145,18 @@ class Isolation:
     def _search(
         self, text: str | None, allowed_modules: Collection[str], seconds: float
     ) -> list[dict]:
-        worker = WorkerProcess(
-            list_registry,
-            text,
-            self.settings(None, allowed_modules, 0),
-            on_end=lambda why: None,
-            hint="",
-            first_result=True,
-        )
-        overdue = threading.Timer(seconds, worker.kill, (_search_too_long(seconds),))
+        settings = self.settings(None, allowed_modules, 0)
+        process = pool.take(worker.__name__, trusted=False, most_mb=settings.most_mb)
+        overdue = threading.Timer(seconds, process.kill, (_search_too_long(seconds),))
         overdue.daemon = True
         if seconds:
             overdue.start()
         try:
-            return cast(list[dict], worker.first_result().value)
+            return cast(list[dict], process.call("list_registry", text, settings).value)
         finally:
             overdue.cancel()
             # It has answered, and a thread that a module has started could keep it from ending.
-            worker.kill(shutting_down())
+            process.kill()
 
 
 def _search_too_long(seconds: float) -> GymServerError:

@@ -21,7 +21,7 @@ from typing import Any
 from gym_server.errors import GymServerError, call_too_long, environment_error, shutting_down
 from gym_server.manager.rollout_request import Request
 from gym_server.processes.pool import pool
-from gym_server.processes.pool_process import PoolProcess
+from gym_server.processes.worker_process import WorkerProcess
 from gym_server.protocol import safetensors
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.task import Task, Unit
@@ -87,7 +87,7 @@ class _Player:
     """
 
     key: str | None
-    process: PoolProcess | None = None
+    process: WorkerProcess | None = None
     request: Request | None = None
     units: range = range(0)
     steps: int = -1
@@ -308,7 +308,7 @@ class Rollouts:
         player.process = process
         if request.function == "describe":
             process.begin("describe", request.task)
-            return 1, process.finish(), None
+            return 1, process.finish().value, None
         task = None if request.number in player.known else request.task
         process.begin("play", request.number, task, [request.units[unit] for unit in units])
         body = process.finish().body

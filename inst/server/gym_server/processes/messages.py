@@ -41,7 +41,7 @@ class Result(NamedTuple):
     """What a method returned: a JSON value, and a frame or None."""
 
     value: Any
-    frame: np.ndarray | None
+    frame: np.ndarray | None = None
 
 
 # The process's side -------------------------------------------------------------------------
@@ -87,26 +87,20 @@ class CallPipe:
             while there is none.
     """
 
-    def __init__(
-        self, connection: Connection, trusted: bool = False, first_result: bool = False
-    ) -> None:
+    def __init__(self, connection: Connection, trusted: bool = False) -> None:
         """Take over the server's end of a pipe.
 
         Args:
             connection: the end.
             trusted: whether the process may return any object of Python's.
-            first_result: whether the process sends a result without a call, which
-                ``first_result()`` is going to read.
         """
         self._pipe = Pipe(connection)
         self._trusted = trusted
-        self._first_result_is_due = first_result
-        self._is_closed = False
         self._lock = threading.Lock()
         self._number = 0
         self.busy_since: float | None = None
 
-    def call(self, method: str, *args: object, timeout: float | None = None) -> Ready | Result:
+    def call(self, method: str, *args: object, timeout: float | None = None) -> Any:
         """Call a method in the process.
 
         Args:
@@ -115,7 +109,7 @@ class CallPipe:
             timeout: how many seconds to wait; None for as long as it takes.
 
         Returns:
-            ``Ready`` for a method that returns one, else ``Result``.
+            ``Ready``, ``Result``, or from a process that is trusted any other object.
 
         Raises:
             GymServerError: what the process refused with; ``malformed_json``.
@@ -147,7 +141,7 @@ class CallPipe:
             self._end()
             raise
 
-    def finish(self, timeout: float | None = None) -> Ready | Result:
+    def finish(self, timeout: float | None = None) -> Any:
         """Wait for the result of the call that has begun; see ``call()``."""
         try:
             return self._receive(timeout)
@@ -158,23 +152,7 @@ class CallPipe:
         self.busy_since = None
         self._lock.release()
 
-    def first_result(self) -> Ready | Result:
-        """Wait for the result that the process sends without a call; see ``call()``."""
-        with self._lock:
-            try:
-                return self._receive(None)
-            finally:
-                self._first_result_is_due = False
-                if self._is_closed:
-                    self._pipe.close()
-
-    def drop_first_result(self) -> None:
-        """Let ``close()`` close the pipe although nobody has read the first result."""
-        self._first_result_is_due = False
-        if self._is_closed:
-            self._pipe.close()
-
-    def _receive(self, timeout: float | None) -> Ready | Result:
+    def _receive(self, timeout: float | None) -> Any:
         while True:
             if timeout is not None and not self._pipe.poll(timeout):
                 raise TimeoutError
@@ -191,15 +169,9 @@ class CallPipe:
         self._pipe.wake()
 
     def close(self) -> None:
-        """Close the pipe as soon as no call waits any more; ``wake()`` ends one that does.
-
-        A process may have ended before anybody has asked for its first result, which can still be
-        read: then ``first_result()`` closes the pipe.
-        """
+        """Close the pipe as soon as no call waits any more; ``wake()`` ends one that does."""
         with self._lock:
-            self._is_closed = True
-            if not self._first_result_is_due:
-                self._pipe.close()
+            self._pipe.close()
 
 
 def _pickled(number: int, method: str, args: tuple) -> bytes:
@@ -213,10 +185,10 @@ def _pickled(number: int, method: str, args: tuple) -> bytes:
         ) from None
 
 
-def _read_result(raw: bytes, trusted: bool) -> Ready | Result:
+def _read_result(raw: bytes, trusted: bool) -> Any:
     _, kind, length = _HEAD.unpack_from(raw)
     if kind == _OBJECT and trusted:
-        return Result(pickle.loads(memoryview(raw)[_HEAD.size :]), None)
+        return pickle.loads(memoryview(raw)[_HEAD.size :])
     if kind in _CONTENT_TYPES:
         return Ready(raw[_HEAD.size :], _CONTENT_TYPES[kind], length)
     end = _HEAD.size + length

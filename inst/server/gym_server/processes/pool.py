@@ -1,7 +1,8 @@
-"""The pool of processes that run sub-environments and whole episodes, and wait for the next ones.
+"""The pool of all processes that run environments, sub-environments and whole episodes.
 
-To start a process takes 20 ms, and a second on Windows. One that has run environments of foreign
-packages is not kept: who knows what they have left in it. Nor is one that has become large.
+To start a process takes 20 ms, and a second on Windows, so they wait here for the next ones. One
+that has run environments of foreign packages is not kept: who knows what they have left in it. Nor
+is one that has become large.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import time
 
 from gym_server.processes.cores import usable_cores
 from gym_server.processes.memory import bytes_of
-from gym_server.processes.pool_process import PoolProcess
+from gym_server.processes.worker_process import WorkerProcess
 
 # What has drawn with MuJoCo keeps 110 MiB.
 _MOST_BYTES = 128 * 2**20
@@ -39,27 +40,36 @@ class Pool:
         self._idle_seconds = idle_seconds
         self._lock = threading.Lock()
         # With the time at which each was put here, the last one last.
-        self._idle: list[tuple[float, PoolProcess]] = []
+        self._idle: list[tuple[float, WorkerProcess]] = []
         self._timer: threading.Timer | None = None
 
-    def take(self, module: str, polite: bool = False, trusted: bool = True) -> PoolProcess:
+    def take(
+        self,
+        module: str,
+        polite: bool = False,
+        trusted: bool = True,
+        most_mb: int = 0,
+        hint: str | None = None,
+    ) -> WorkerProcess:
         """Return a process that nobody uses, started if need be.
 
         Args:
             module: the name of the module whose functions it is to run.
             polite: whether it gives way to other processes from now on, also those that use it
                 later; ordinary ones are given to those who did not ask for that.
-            trusted: see ``PoolProcess``; one that is not is always a new one, and must not be put
+            trusted: see ``WorkerProcess``; one that is not is always a new one, and must not be put
                 here.
+            most_mb: how much memory the system lets a new one have, in MiB; 0 for the pool's limit.
+            hint: what to do about an end by itself of a new one.
         """
         idle = self._take_idle(polite) if trusted else None
-        process = idle or PoolProcess(self.most_mb, trusted)
+        process = idle or WorkerProcess(most_mb or self.most_mb, trusted, hint)
         process.module = module
         if polite:
             process.give_way()
         return process
 
-    def _take_idle(self, polite: bool) -> PoolProcess | None:
+    def _take_idle(self, polite: bool) -> WorkerProcess | None:
         with self._lock:
             for place in reversed(range(len(self._idle))):
                 process = self._idle[place][1]
@@ -68,7 +78,7 @@ class Pool:
                     return process
         return None
 
-    def put(self, process: PoolProcess) -> None:
+    def put(self, process: WorkerProcess) -> None:
         """Keep a process whose work is done, or end it if there are enough."""
         process.release()
         is_small = bytes_of(process.pid, exactly=True) <= _MOST_BYTES

@@ -1,4 +1,9 @@
-"""A process that the server has started: calls to it, and how it ended."""
+"""A process that the server has started: calls to it, and how it ended.
+
+What it runs would otherwise run in the server's own process, so the server trusts it as it trusts
+itself, and both send Python's objects; unless it was started for an environment that is not
+trusted.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +17,11 @@ from multiprocessing import process as multiprocessing_process
 from multiprocessing.connection import wait
 from typing import Any, cast
 
-from gym_server.errors import GymServerError, environment_died
+from gym_server.errors import GymServerError, environment_died, shutting_down
 from gym_server.processes import start
-from gym_server.processes.messages import CallPipe, Result
+from gym_server.processes.messages import CallPipe
 from gym_server.processes.pipe import MalformedMessageError
+from gym_server.processes.serve import serve
 
 log = logging.getLogger(__name__)
 
@@ -25,40 +31,39 @@ _EXIT_SECONDS = 2.0
 # The exit status comes a little after the pipe is closed, and on a busy machine later.
 _EXIT_STATUS_SECONDS = 10.0
 
+# As ``nice`` has it; no process may take that back.
+_LOWER_PRIORITY = 5
+
 # What a call raises when the process is gone, or was taken over.
 _FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
 
 
 class WorkerProcess:
-    """A process with one pipe for calls in turn, and one for queries that it answers meanwhile.
+    """A process that runs the functions of a module; when it is taken again, of another one.
+
+    It has one pipe for calls in turn, and one for queries that it answers meanwhile.
 
     Attributes:
+        module: the name of the module.
         pid: its number.
         why: the reason that every caller gets once it has ended, else None.
+        progress: two integers that its function may set while it runs.
+        gives_way: whether it gives way to other processes.
     """
 
-    def __init__(
-        self,
-        target: Callable,
-        *args: object,
-        on_end: Callable[[GymServerError], None],
-        hint: str,
-        trusted: bool = False,
-        first_result: bool = False,
-    ) -> None:
+    def __init__(self, most_mb: int = 0, trusted: bool = True, hint: str | None = None) -> None:
         """Start it.
 
         Args:
-            target: what runs there; gets its ends of the two pipes, then the arguments.
-            *args: the arguments.
-            on_end: called with the reason, in a thread of its own, once the process has ended
-                without having been asked to; see ``report_end()``.
-            hint: what to do about such an end, or "".
-            trusted: whether its results may be any objects of Python's; see ``messages``.
-            first_result: whether it sends a result without a call; see ``first_result()``.
+            most_mb: how much memory the system lets it have, in MiB; 0 for no limit.
+            trusted: whether it may return any objects of Python's; see ``messages``.
+            hint: what to do about an end by itself.
         """
-        self._on_end = on_end
-        self._hint = hint or None
+        self.module = ""
+        self.gives_way = False
+        self.why: GymServerError | None = None
+        self._hint = hint
+        self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._lock = threading.Lock()
         # Why we ended it, if we did.
         self._our_reason: GymServerError | None = None
@@ -68,14 +73,20 @@ class WorkerProcess:
         # Until report_end(): the creation that waits for it gets the error itself.
         self._end_expected = True
         self._ended = threading.Event()
-        self.why: GymServerError | None = None
         context = start.context()
+        self.progress = context.RawArray("q", 2)
         pipes = [context.Pipe() for _ in range(2)]
-        self._calls = CallPipe(pipes[0][0], trusted, first_result)
-        self._queries = CallPipe(pipes[1][0], trusted)
+        self._calls, self._queries = (CallPipe(ours, trusted) for ours, _ in pipes)
         # Not a daemon: a daemon may start no processes, and sub-environments can be processes.
         self._process = context.Process(
-            target=target, args=(*(theirs for _, theirs in pipes), *args), daemon=False
+            target=serve,
+            args=(
+                *(theirs for _, theirs in pipes),
+                logging.getLogger().level,
+                most_mb,
+                self.progress,
+            ),
+            daemon=False,
         )
         try:
             self._process.start()
@@ -94,52 +105,33 @@ class WorkerProcess:
         # The type ignored: the list is private.
         multiprocessing_process._children.discard(self._process)  # type: ignore[attr-defined]
 
-    def first_result(self) -> Result:
-        """Wait for the result that it sends without a call.
+    @property
+    def is_alive(self) -> bool:
+        """Whether it has not ended."""
+        return self.why is None
 
-        Raises:
-            GymServerError: as for ``call()``.
-        """
-        try:
-            return cast(Result, self._calls.first_result())
-        except _FAULTS as fault:
-            raise self._end_after(fault) from None
+    # Calls ----------------------------------------------------------------------------------
 
-    def report_end(self) -> None:
-        """From now on call ``on_end`` when it ends without being asked to, or if it has already.
-
-        It may end while this is called. The lock leaves two orders, and ``on_end`` is called once:
-
-        1. ``_await_end()`` sets ``why`` first and sees an expected end, of which it tells no one;
-           then this finds ``why`` and calls ``on_end``.
-        2. This clears ``_end_expected`` first and finds no ``why``; then ``_await_end()`` calls
-           ``on_end``.
-        """
-        with self._lock:
-            self._phase = "by itself"
-            self._end_expected = False
-            why = self.why
-        if why is not None:
-            self._on_end(why)
-
-    def call(self, method: str, *args: object) -> Any:
-        """Call a method there; the caller sees to it that only one call runs at a time.
+    def call(self, function: str, *args: object) -> Any:
+        """Call one of its module's functions; the caller sees to it that only one call runs.
 
         Returns:
-            ``Ready`` for a method that returns an ``Answer``, else ``Result``.
+            What the function returned: ``Ready``, ``Result``, or from a process that is trusted any
+            other object.
 
         Raises:
-            GymServerError: what it refused with, or why it has ended.
+            GymServerError: what the function refused with; ``environment_died``, or why the process
+                was killed.
         """
-        self.begin(method, *args)
+        self.begin(function, *args)
         return self.finish()
 
-    def begin(self, method: str, *args: object) -> None:
+    def begin(self, function: str, *args: object) -> None:
         """Begin a ``call()``; unless this raises an error, ``finish()`` must follow."""
         if self.why is not None:
             raise self.why.again()
         try:
-            self._calls.begin(method, *args)
+            self._calls.begin(f"{self.module}:{function}", *args)
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
@@ -150,8 +142,8 @@ class WorkerProcess:
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
-    def query(self, method: str, *args: object, timeout: float | None = None) -> Result:
-        """Call a method that it answers even while a ``call()`` runs.
+    def query(self, function: str, *args: object, timeout: float | None = None) -> Any:
+        """Call a function that it answers even while a ``call()`` runs.
 
         Raises:
             GymServerError: as for ``call()``.
@@ -160,7 +152,7 @@ class WorkerProcess:
         if self.why is not None:
             raise self.why.again()
         try:
-            return cast(Result, self._queries.call(method, *args, timeout=timeout))
+            return self._queries.call(f"{self.module}:{function}", *args, timeout=timeout)
         except TimeoutError:
             raise
         except _FAULTS as fault:
@@ -183,22 +175,49 @@ class WorkerProcess:
         # There is no exit status of a process that even the system cannot end.
         return self.why.again() if self.why else self._died(None)
 
-    def kill(self, why: GymServerError) -> None:
-        """End it at once; every call that waits for it raises the reason."""
-        with self._lock:
-            self._our_reason = self._our_reason or why
-        self._calls.drop_first_result()
-        self._send_kill()
+    def give_way(self) -> None:
+        """Give way to other processes from now on, the server's own among them, for good."""
+        if not self.gives_way and hasattr(os, "setpriority"):
+            with contextlib.suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, self.pid, _LOWER_PRIORITY)
+        self.gives_way = True
 
-    def begin_close(self) -> None:
-        """Take its end from now on for one that was asked for."""
+    # The end --------------------------------------------------------------------------------
+
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """From now on report when it ends without being asked to, or at once if it has already.
+
+        The reason is reported in a thread of its own. It may end while this is called. The lock
+        leaves two orders, and ``on_end`` is called once:
+
+        1. ``_await_end()`` sets ``why`` first and sees an expected end, of which it tells no one;
+           then this finds ``why`` and calls ``on_end``.
+        2. This clears ``_end_expected`` first and finds no ``why``; then ``_await_end()`` calls
+           ``on_end``.
+        """
+        with self._lock:
+            self._on_end = on_end
+            self._phase = "by itself"
+            self._end_expected = False
+            why = self.why
+        if why is not None:
+            on_end(why)
+
+    def release(self) -> None:
+        """Take its end from now on for one that nobody needs to know of."""
         self._end_expected = True
 
-    def close(self, why: GymServerError) -> None:
-        """Wait until it has exited as it was asked to, and kill it when it does not."""
+    def kill(self, why: GymServerError | None = None) -> None:
+        """End it at once; every call that waits for it raises the reason."""
+        with self._lock:
+            self._our_reason = self._our_reason or why or shutting_down()
+        self._send_kill()
+
+    def end(self, why: GymServerError) -> None:
+        """Let it exit, and kill it when it does not; no call may be running."""
         with self._lock:
             self._our_reason = self._our_reason or why
-            self._end_expected = True
+        self._calls.close()
         if not self._ended.wait(_EXIT_SECONDS):
             self._send_kill()
 

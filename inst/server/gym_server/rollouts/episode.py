@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from gym_server.envs.outcomes import reward_number
-from gym_server.processes import pool_process
+from gym_server.processes import serve
 from gym_server.rollouts.recording import Recorder
 
 
@@ -37,7 +37,7 @@ def play_episode(
         max_steps: after how many steps it is cut short.
         recorder: is told of each step; None where nothing is kept of them.
     """
-    progress = pool_process.progress
+    progress = serve.progress
     actor.begin(seed)
     observation, _ = env.reset(seed=seed)
     act, step = actor.act, env.step

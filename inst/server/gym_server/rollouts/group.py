@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Space
 
-from gym_server.processes import pool_process
+from gym_server.processes import serve
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.recording import Moments, moment_tensors, step_tensors
 from gym_server.rollouts.task import Keep, Unit
@@ -45,7 +45,7 @@ def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Ke
         max_steps: after how many steps an episode is cut short.
         keep: what is kept of the steps.
     """
-    progress = pool_process.progress
+    progress = serve.progress
     rows = np.array(unit.rows)
     played = PlayedGroup(env.num_envs)
     running = np.zeros(env.num_envs, dtype=bool)

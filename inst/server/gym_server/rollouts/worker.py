@@ -12,7 +12,7 @@ import numpy as np
 from gym_server.envs.make import ask
 from gym_server.errors import GymServerError, answer_to, environment_error
 from gym_server.policies import read_policy
-from gym_server.processes import pool_process, start
+from gym_server.processes import serve, start
 from gym_server.processes.messages import Result
 from gym_server.protocol.answers import Ready, dumps
 from gym_server.protocol.safetensors import TENSORS, Tensor, write
@@ -182,7 +182,7 @@ def _play_until(
 ) -> GymServerError | None:
     """Play one unit after the other, until the time is over; return why one of them failed."""
     for place, unit in enumerate(units):
-        pool_process.progress[1] = place
+        serve.progress[1] = place
         try:
             play(unit)
         except BaseException as failure:

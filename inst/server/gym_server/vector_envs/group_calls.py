@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gym_server.processes.pool_process import PoolProcess
+from gym_server.processes.worker_process import WorkerProcess
 from gym_server.vector_envs.local_group import LocalGroup
 
-AnyGroup = LocalGroup | PoolProcess
+AnyGroup = LocalGroup | WorkerProcess
 
 
 def call_all(calls: Iterable[tuple[AnyGroup, str, tuple]]) -> list:

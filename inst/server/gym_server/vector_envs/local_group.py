@@ -10,7 +10,7 @@ from gym_server.vector_envs.group import Group
 
 
 class LocalGroup:
-    """Has the methods of ``PoolProcess`` by which a group is called."""
+    """Has the methods of ``WorkerProcess`` by which a group is called."""
 
     def __init__(self, group: Group, drawing: Drawing) -> None:
         """Take over a group, and how it is drawn."""

@@ -24,7 +24,7 @@ from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, shutting_down
 from gym_server.processes.cores import spread
 from gym_server.processes.pool import pool
-from gym_server.processes.pool_process import PoolProcess
+from gym_server.processes.worker_process import WorkerProcess
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.threads.interrupt import interrupted_by
@@ -316,7 +316,7 @@ class SubEnvs:
         """From now on report when one of its processes ends by itself, or at once if it has."""
         self._on_end = on_end
         for group in self._groups:
-            if isinstance(group, PoolProcess):
+            if isinstance(group, WorkerProcess):
                 group.report_end(self._end)
 
     def _end(self, why: GymServerError) -> None:
@@ -328,7 +328,7 @@ class SubEnvs:
     @property
     def pids(self) -> list[int]:
         """The numbers of its processes."""
-        return [group.pid for group in self._groups if isinstance(group, PoolProcess)]
+        return [group.pid for group in self._groups if isinstance(group, WorkerProcess)]
 
     def close(self) -> None:
         """Close all sub-environments, and let their processes run others or end."""
@@ -362,7 +362,7 @@ class SubEnvs:
         finally:
             timer.cancel()
         for group in self._groups:
-            if isinstance(group, PoolProcess) and self._keeps_processes:
+            if isinstance(group, WorkerProcess) and self._keeps_processes:
                 pool.put(group)
         if not self._keeps_processes:
             self._kill_processes()
@@ -374,7 +374,7 @@ class SubEnvs:
 
     def _kill_processes(self, why: GymServerError | None = None) -> None:
         for group in self._groups:
-            if isinstance(group, PoolProcess):
+            if isinstance(group, WorkerProcess):
                 group.kill(why)
 
 

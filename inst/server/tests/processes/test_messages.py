@@ -12,6 +12,7 @@ from gym_server.processes.messages import (
     _HEAD,
     CallPipe,
     answer_message,
+    object_message,
     refusal_message,
     value_message,
 )
@@ -96,27 +97,31 @@ FORGED = [
 ]
 
 
-def test_a_first_result_is_read_after_the_pipe_was_closed():
+def test_a_result_is_read_after_the_process_has_ended():
     ours, theirs = multiprocessing.Pipe()
-    pipe, other = CallPipe(ours, first_result=True), Pipe(theirs)
-    other.send(value_message(0, "made"))
+    pipe, other = CallPipe(ours), Pipe(theirs)
+    pipe.begin("step")
+    other.send(value_message(1, "made"))
     other.close()
     pipe.wake()
+    assert pipe.finish().value == "made"
     pipe.close()
-    assert pipe.first_result().value == "made"
     with pytest.raises(OSError):
         pipe.call("step")
 
 
-@pytest.mark.parametrize("closed_first", [True, False])
-def test_a_first_result_that_nobody_wants_leaves_no_pipe_open(closed_first):
-    ours, theirs = multiprocessing.Pipe()
-    pipe = CallPipe(ours, first_result=True)
-    for end in [pipe.close, pipe.drop_first_result][:: 1 if closed_first else -1]:
-        end()
-    theirs.close()
-    with pytest.raises(OSError):
-        pipe.first_result()
+def test_objects_are_read_from_processes_that_are_trusted_only():
+    for trusted in (True, False):
+        ours, theirs = multiprocessing.Pipe()
+        pipe, other = CallPipe(ours, trusted), Pipe(theirs)
+        other.send(object_message(1, {1, 2}))
+        if trusted:
+            assert pipe.call("step") == {1, 2}
+        else:
+            with pytest.raises(MalformedMessageError):
+                pipe.call("step")
+        pipe.close()
+        other.close()
 
 
 @pytest.mark.parametrize("forged", FORGED)

@@ -9,7 +9,7 @@ import pytest
 from conftest import ServerProcess
 from running import descendants, is_running
 
-from gym_server.isolation.worker import WorkerSettings, list_registry
+from gym_server.isolation.worker import WorkerSettings
 from gym_server.processes.worker_process import WorkerProcess
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
@@ -97,14 +97,15 @@ def is_running_safely(pid):
 
 
 def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
-    settings = WorkerSettings(frozenset())
-    worker = WorkerProcess(
-        list_registry, "CartPole", settings, on_end=print, hint="", first_result=True
-    )
-    eventually(lambda: worker.why is not None)
+    process = WorkerProcess(trusted=False)
+    process.module = "gym_server.isolation.worker"
+    process.begin("list_registry", "CartPole", WorkerSettings(frozenset()))
+    eventually(lambda: process._calls._pipe.poll(0))
+    os.kill(process.pid, signal.SIGKILL)
+    eventually(lambda: not process.is_alive)
     # The thread that waited for the end closes its pipes now.
     time.sleep(0.2)
-    assert worker.first_result().value[0]["id"].startswith("CartPole-v")
+    assert process.finish().value[0]["id"].startswith("CartPole-v")
 
 
 @pytest.mark.parametrize("at", ["constructor", "close", "render"])
