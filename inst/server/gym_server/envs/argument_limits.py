@@ -16,7 +16,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import VectorEnv
 
 from gym_server.envs.config import Wrapper
-from gym_server.envs.registry import KNOWN_PACKAGES, module_of
+from gym_server.envs.registry import is_known, module_of
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief, parse_nonfinite
 
@@ -83,7 +83,9 @@ def check_environment(
     Raises:
         GymServerError: ``invalid_kwargs``.
     """
-    if _is_known(spec):
+    # What the arguments of other environments mean is not known. By default those run in a process
+    # of their own.
+    if is_known(module_of(spec)):
         _check_length(kwargs)
         # A step of Atari's own vector environment waits for so many sub-environments.
         _check_sizes(kwargs, {**_ENVIRONMENT_LIMITS, "batch_size": (num_envs, num_envs)})
@@ -141,7 +143,7 @@ def _check_sizes(kwargs: dict, limits: Mapping[str, tuple[float, int]], prefix: 
 
 
 def _check_steps(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: int) -> None:
-    arguments = [(kwargs, _REPEATING_ARGUMENTS)] if _is_known(spec) else []
+    arguments = [(kwargs, _REPEATING_ARGUMENTS)] if is_known(module_of(spec)) else []
     arguments += [(one.kwargs, _REPEATING.get(one.name, ())) for one in wrappers]
     given = [(name, owner[name]) for owner, names in arguments for name in names if name in owner]
     repeats = math.prod(
@@ -156,12 +158,6 @@ def _check_steps(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_e
             f"it may take {MOST_REPEATS:,} of one environment, {MOST_STEPS:,} of all its "
             "sub-environments; repeat less and step more often",
         )
-
-
-def _is_known(spec: EnvSpec) -> bool:
-    # What the arguments of other environments mean is not known. By default those run in a process
-    # of their own.
-    return module_of(spec).partition(".")[0] in KNOWN_PACKAGES
 
 
 def _numbers(value: object) -> Iterator[float]:

@@ -20,10 +20,11 @@ class EnvConfig:
     """What a client chose at creation.
 
     Attributes:
-        env_id: what to create.
+        env_id: ``Name-v0``, or ``module:Name-v0`` for a module that registers it.
         seed: for the first reset, unless that has one; for a vector environment also a tuple with
             one for each sub-environment.
-        render_mode: see ``make.make_env()``.
+        render_mode: "rgb_array", "human" (made as "rgb_array": the server opens no window), or None
+            for "rgb_array" where the environment can.
         kwargs: handed to the environment.
         wrappers: the first one is innermost.
         num_envs: how many sub-environments; None for a single environment.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, TypeVar, cast
 
 import gymnasium
@@ -13,7 +13,7 @@ from gymnasium.envs import registration
 
 from gym_server.envs import argument_limits, mujoco
 from gym_server.envs.atari import classic_game
-from gym_server.envs.config import Wrapper
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.extras import extra_of, is_available, missing_extra, unmet_module
 from gym_server.envs.memory_estimate import environment_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
@@ -26,22 +26,13 @@ ResultT = TypeVar("ResultT")
 
 
 def make_env(
-    env_id: object,
-    render_mode: str | None,
-    kwargs: dict,
-    allowed_modules: Collection[str],
-    wrappers: Sequence[Wrapper],
-    memory: MemoryReservation,
+    config: EnvConfig, allowed_modules: Collection[str], memory: MemoryReservation
 ) -> gymnasium.Env:
-    """Make an environment.
+    """Make an environment, without its wrappers.
 
     Args:
-        env_id: ``Name-v0``, or ``module:Name-v0`` for a module that registers it.
-        render_mode: "rgb_array", "human" (made as "rgb_array": the server opens no window), or
-            None for "rgb_array" where the environment can.
-        kwargs: handed to the environment.
+        config: what the client chose.
         allowed_modules: names of the modules that an id may import.
-        wrappers: what will be put around it.
         memory: what reserves its memory.
 
     Raises:
@@ -49,12 +40,13 @@ def make_env(
             ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
             ``invalid_kwargs``, ``too_much_memory``, ``environment_error``.
     """
+    kwargs = config.kwargs or {}
     check_kwargs(kwargs)
-    spec = find_spec(env_id, allowed_modules)
-    argument_limits.check_environment(spec, kwargs, wrappers)
+    spec = find_spec(config.env_id, allowed_modules)
+    argument_limits.check_environment(spec, kwargs, config.wrappers)
     memory.reserve(environment_bytes(spec, kwargs), spec.id)
     with naming_extra(spec):
-        chosen = choose_render_mode(load_creator(spec), spec, render_mode)
+        chosen = choose_render_mode(load_creator(spec), spec, config.render_mode)
         return make_from_spec(spec, chosen, parse_nonfinite(kwargs))
 
 
@@ -107,7 +99,7 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
     try:
         with importing:
             if module:
-                ask(importlib.import_module, module)
+                call_env(importlib.import_module, module)
             return look_up(name)
     except error.Error as failure:
         raise _explain(failure, env_id, name) from failure
@@ -167,7 +159,7 @@ def load_creator(spec: registration.EnvSpec) -> Callable:
     Raises:
         GymServerError: ``missing_dependency``, ``environment_error``.
     """
-    return ask(_load_creator, spec)
+    return call_env(_load_creator, spec)
 
 
 def _load_creator(spec: registration.EnvSpec) -> Callable:
@@ -194,7 +186,7 @@ def choose_render_mode(
     Args:
         creator: what makes it; its metadata lists its render modes.
         spec: its spec, for its name.
-        wanted: the client's render_mode; see ``make_env()``.
+        wanted: the client's render_mode; see ``EnvConfig``.
 
     Raises:
         GymServerError: ``invalid_parameter``.
@@ -224,7 +216,7 @@ def make_from_spec(
     if render_mode is not None:
         ours["render_mode"] = render_mode
     given = with_tuples(load_creator(spec), kwargs)
-    return ask(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
+    return call_env(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
 
 
 def make_vector_entry_point(
@@ -248,7 +240,7 @@ def make_vector_entry_point(
             **kwargs,
         )
 
-    return ask(_refusing_kwargs, make, kwargs)
+    return call_env(_refusing_kwargs, make, kwargs)
 
 
 def _refusing_kwargs(make: Callable[[], ResultT], kwargs: dict) -> ResultT:
@@ -263,7 +255,7 @@ def _refusing_kwargs(make: Callable[[], ResultT], kwargs: dict) -> ResultT:
 _ABOUT_ARGUMENTS = ("unexpected keyword argument", "multiple values for", "required positional")
 
 
-def ask(function: Callable[..., ResultT], *args: object) -> ResultT:
+def call_env(function: Callable[..., ResultT], *args: object) -> ResultT:
     """Call a function of Gymnasium or of an environment; translate what it raises.
 
     Raises:

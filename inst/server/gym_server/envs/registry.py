@@ -21,7 +21,7 @@ from gym_server.errors import GymServerError, invalid_parameter
 log = logging.getLogger(__name__)
 
 # The packages whose environments and arguments the server knows.
-KNOWN_PACKAGES = ("gymnasium", "ale_py")
+_KNOWN_PACKAGES = ("gymnasium", "ale_py")
 
 # Held during imports. Python releases its own import locks where modules import each other in a
 # circle, as Gymnasium's do, and a second thread could use a module that is not complete.
@@ -157,3 +157,8 @@ def module_of(spec: EnvSpec) -> str:
     if isinstance(entry_point, str):
         return entry_point.partition(":")[0]
     return getattr(entry_point, "__module__", None) or ""
+
+
+def is_known(module: str) -> bool:
+    """Tell whether a module belongs to a package whose environments the server knows."""
+    return module.partition(".")[0] in _KNOWN_PACKAGES

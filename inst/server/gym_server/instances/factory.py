@@ -15,7 +15,7 @@ from gym_server.instances.local import LocalInstance
 from gym_server.instances.single import SingleInstance
 from gym_server.instances.vector import VectorInstance
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.vector_envs.make import make_vector_env
+from gym_server.vector_envs.make_vec import make_vector_env
 
 
 def make_instance(
@@ -41,17 +41,10 @@ def make_instance(
             and ``LocalInstance``.
     """
     if config.num_envs is None:
-        env = make.make_env(
-            config.env_id,
-            config.render_mode,
-            config.kwargs or {},
-            allowed_modules,
-            config.wrappers,
-            reservation,
-        )
+        env = make.make_env(config, allowed_modules, reservation)
         undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
-        reservation.reserve(make.ask(model_bytes, env), "Its transition model")
-        wrapped = make.ask(wrappers.wrap, env, config.wrappers, renderer, reservation)
+        reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
+        wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
         return SingleInstance(wrapped, config, renderer)
     sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer, reservation)
     undo.push(_closing_quietly(sub_envs.close))

@@ -12,7 +12,7 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
-from gym_server.envs.make import ask
+from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info
 from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import time_limit
@@ -100,7 +100,7 @@ class LocalInstance(Instance):
         self._check_reset(seed, options, mask)
         seed_to_use = self._seed_for_reset if seed is None else seed
         self._was_reset = False
-        observation, info = ask(self._begin, self._reset_env, seed_to_use, options, mask, form)
+        observation, info = call_env(self._begin, self._reset_env, seed_to_use, options, mask, form)
         if form.infos:
             checked_info(info)
         self._seed_for_reset = None
@@ -111,8 +111,8 @@ class LocalInstance(Instance):
         self.statistics.begin(mask)
         self._observation = observation
         return {
-            "observation": ask(self._encode, observation, form),
-            "info": ask(plain, info) if form.infos else {},
+            "observation": call_env(self._encode, observation, form),
+            "info": call_env(plain, info) if form.infos else {},
         }
 
     def _check_reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> None:
@@ -159,7 +159,7 @@ class LocalInstance(Instance):
             )
         if not self._was_reset:
             raise reset_needed("render()")
-        frame = ask(self.draw, sub_env)
+        frame = call_env(self.draw, sub_env)
         try:
             return picture(frame)
         except ValueError as error:
@@ -195,7 +195,7 @@ class LocalInstance(Instance):
         raise NotImplementedError
 
     def _transition_model(self) -> dict:
-        return {"model": ask(transition_model, self.gym_env, self.env_id)}
+        return {"model": call_env(transition_model, self.gym_env, self.env_id)}
 
     # At any time ----------------------------------------------------------------------------
 
@@ -259,7 +259,7 @@ class LocalInstance(Instance):
         try:
             self._close_monitor()
         finally:
-            ask(self._close_env)
+            call_env(self._close_env)
 
     def _close_env(self) -> None:
         raise NotImplementedError

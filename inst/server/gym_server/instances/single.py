@@ -13,7 +13,7 @@ from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
-from gym_server.envs.make import ask
+from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info, reward_number
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, reset_needed
@@ -61,7 +61,7 @@ class SingleInstance(LocalInstance):
             raise reset_needed("step()")
         decoded = self._actions.read(action)
         try:
-            return ask(self._step_env, decoded, form)
+            return call_env(self._step_env, decoded, form)
         except GymServerError as failure:
             self._actions.explain(failure, action)
             raise

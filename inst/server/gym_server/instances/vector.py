@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gym_server import spaces
 from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.make import ask
+from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed, wrong_length
 from gym_server.instances.episode_statistics import VectorEpisodeStatistics
@@ -136,7 +136,7 @@ class VectorInstance(LocalInstance):
         decoded = self._actions.read(action, rows)
         self._check_running(which)
         try:
-            return ask(self._step_env, which, decoded, form)
+            return call_env(self._step_env, which, decoded, form)
         except GymServerError as failure:
             # Some sub-environments may have taken the step, and others not.
             self._was_reset = False

@@ -96,7 +96,7 @@ class Isolation:
         home = module or _home(name, allowed_modules)
         # Making Atari's own vector environment holds the interpreter, for 88 ms a sub-environment.
         holds = vectorization_mode == "vector_entry_point" and home.startswith("ale_py")
-        return self.mode == "all" or holds or _is_foreign(home)
+        return self.mode == "all" or holds or (home != "" and not registry.is_known(home))
 
     @property
     def most_bytes_here(self) -> float:
@@ -178,7 +178,3 @@ def _home(name: str, allowed_modules: Collection[str]) -> str:
     except (error.Error, GymServerError):
         return ""
     return registry.module_of(spec) or _UNKNOWN
-
-
-def _is_foreign(module: str) -> bool:
-    return module != "" and module.partition(".")[0] not in registry.KNOWN_PACKAGES

@@ -38,7 +38,7 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.rollouts.task import Task
 from gym_server.threads.in_progress import InProgress
 from gym_server.threads.interrupt import interrupt, interrupted_by
-from gym_server.vector_envs import make as vector_make
+from gym_server.vector_envs import make_vec
 from gym_server.vector_envs.num_workers import most_workers
 
 log = logging.getLogger(__name__)
@@ -131,7 +131,7 @@ class InstanceManager:
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
         if config.num_envs is None:
-            vector_make.check_single(config)
+            make_vec.check_single(config)
         isolated = self._isolation.wants(
             config.env_id, self._allowed_modules, config.vectorization_mode
         )

@@ -16,7 +16,7 @@ from gym_server.errors import invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.draws import Draws
-from gym_server.policies.fields import check_fields
+from gym_server.policies.reading import check_fields
 from gym_server.spaces import brief_space
 
 

@@ -12,9 +12,9 @@ from gymnasium.spaces import Space
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.acting import Actor, Policy
-from gym_server.policies.fields import check_fields, count_of
 from gym_server.policies.random import read_random
 from gym_server.policies.read_network import read_network
+from gym_server.policies.reading import check_fields, count_of
 from gym_server.policies.table import read_table
 
 _MOST_NUMBERS = 1_000_000

@@ -11,9 +11,9 @@ from gymnasium.spaces import Box, Discrete, Space
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.activation import NAMES
-from gym_server.policies.fields import check_fields, count_of, epsilon_of, field, finite_numbers
 from gym_server.policies.network import NetworkPolicy
 from gym_server.policies.network_plan import NetworkPlan
+from gym_server.policies.reading import check_fields, count_of, epsilon_of, field, finite_numbers
 from gym_server.spaces import brief_space
 
 

@@ -13,7 +13,7 @@ from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.discrete import DiscreteChoice
-from gym_server.policies.fields import (
+from gym_server.policies.reading import (
     check_fields,
     count_of,
     epsilon_of,

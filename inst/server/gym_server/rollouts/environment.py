@@ -20,8 +20,7 @@ from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.instances.local import env_id_of
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
-from gym_server.vector_envs.make import make_own_implementation
-from gym_server.vector_envs.num_workers import may_share_processes
+from gym_server.vector_envs.make_vec import make_own_implementation
 from gym_server.vector_envs.sub_env import ThisThread
 
 # How many episodes an environment's own vector implementation plays in lockstep: always as many,
@@ -76,15 +75,8 @@ class RolloutEnv:
     def _make(self) -> gymnasium.Env:
         task, config = self._task, self._task.config
         reservation = MemoryReservation(Budget(task.memory))
-        env = make.make_env(
-            config.env_id,
-            None,
-            config.kwargs or {},
-            task.allowed_modules,
-            config.wrappers,
-            reservation,
-        )
-        env = make.ask(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
+        env = make.make_env(config, task.allowed_modules, reservation)
+        env = make.call_env(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
         # Some work for drawing in each step.
         save_drawing(env)
         return env
@@ -93,7 +85,7 @@ class RolloutEnv:
     def is_made_anew(self) -> bool:
         """Whether each episode needs a new one."""
         module = registry.module_of(self._spec)
-        return not may_share_processes(self._spec) or module.startswith(_MADE_ANEW)
+        return not registry.is_known(module) or module.startswith(_MADE_ANEW)
 
     def for_an_episode(self) -> Any:
         """Return an environment that plays as a new one does."""

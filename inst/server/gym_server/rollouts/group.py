@@ -14,28 +14,13 @@ from gymnasium.spaces import Space
 
 from gym_server.processes import serve
 from gym_server.protocol.safetensors import Tensor
-from gym_server.rollouts.recording import Moments, moment_tensors, step_tensors
+from gym_server.rollouts.recording import Moments, moment_tensors, result_tensors, step_tensors
 from gym_server.rollouts.task import Keep, Unit
 
 
-class PlayedGroup:
-    """What came of a group.
-
-    Attributes:
-        earned, length, terminated, truncated: arrays, as for ``Played``.
-        tensors: what was kept of the steps, episode after episode.
-    """
-
-    def __init__(self, num_envs: int) -> None:
-        """Begin with nothing."""
-        self.earned = np.zeros(num_envs)
-        self.length = np.zeros(num_envs, dtype=np.int64)
-        self.terminated = np.zeros(num_envs, dtype=bool)
-        self.truncated = np.zeros(num_envs, dtype=bool)
-        self.tensors: dict[str, Tensor] = {}
-
-
-def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Keep) -> PlayedGroup:
+def play_group(
+    env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Keep
+) -> dict[str, Tensor]:
     """Play the first episode of some sub-environments to its end.
 
     Args:
@@ -44,10 +29,16 @@ def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Ke
         unit: the seed, and which rows are wanted.
         max_steps: after how many steps an episode is cut short.
         keep: what is kept of the steps.
+
+    Returns:
+        What came of the rows that are wanted, and what was kept of their steps, one row's after the
+        other's.
     """
     progress = serve.progress
     rows = np.array(unit.rows)
-    played = PlayedGroup(env.num_envs)
+    earned = np.zeros(env.num_envs)
+    lengths = np.zeros(env.num_envs, dtype=np.int64)
+    flags = np.zeros((2, env.num_envs), dtype=bool)
     running = np.zeros(env.num_envs, dtype=bool)
     running[rows] = True
     steps: list[tuple] = []
@@ -63,7 +54,7 @@ def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Ke
         observation, reward, terminated, truncated, _ = step(action)
         taken += 1
         progress[0] += 1
-        np.add(played.earned, reward, out=played.earned, where=running)
+        np.add(earned, reward, out=earned, where=running)
         if keeps:
             after = np.array(observation) if keep.next_observation else None
             kept = [np.array(value) for value in (before, action, reward, terminated, truncated)]
@@ -72,14 +63,14 @@ def play_group(env: Any, actor: Any, unit: Unit, max_steps: int | None, keep: Ke
         if taken == max_steps:
             ended = running
         if ended.any():
-            played.length[ended] = taken
-            played.terminated[ended] = terminated[ended]
-            played.truncated[ended] = truncated[ended] | ~terminated[ended]
+            lengths[ended] = taken
+            flags[:, ended] = terminated[ended], truncated[ended] | ~terminated[ended]
             running = running & ~ended
             left = int(running.sum())
+    tensors = result_tensors(earned[rows], lengths[rows], *flags[:, rows])
     if keeps:
-        played.tensors = _kept(env, steps, rows, played.length[rows], keep)
-    return played
+        tensors.update(_kept(env, steps, rows, lengths[rows], keep))
+    return tensors
 
 
 def _kept(

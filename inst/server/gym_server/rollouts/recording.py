@@ -165,6 +165,16 @@ class Recorder:
         return tensors
 
 
+def result_tensors(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, Tensor]:
+    """Return what came of episodes as tensors; see ``Played``."""
+    return {
+        "return": Tensor.of(np.array(earned, dtype=np.float64)),
+        "length": Tensor.of(np.array(length, dtype=np.int32)),
+        "terminated": Tensor.of(np.array(terminated, dtype=bool)),
+        "truncated": Tensor.of(np.array(truncated, dtype=bool)),
+    }
+
+
 def moment_tensors(moments: list[tuple[int, np.ndarray, np.ndarray]]) -> dict[str, Tensor]:
     """Return the moments of episodes as tensors."""
     counts, means, squares = zip(*moments, strict=True) if moments else ((), (), ())

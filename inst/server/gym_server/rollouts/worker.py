@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gym_server.envs.make import ask
+from gym_server.envs.make import call_env
 from gym_server.errors import GymServerError, answer_to, environment_error
 from gym_server.policies import read_policy
 from gym_server.processes import serve, start
@@ -19,7 +19,7 @@ from gym_server.protocol.safetensors import TENSORS, Tensor, write
 from gym_server.rollouts.environment import RolloutEnv
 from gym_server.rollouts.episode import Played, play_episode
 from gym_server.rollouts.group import play_group
-from gym_server.rollouts.recording import Recorder, check_keep
+from gym_server.rollouts.recording import Recorder, check_keep, result_tensors
 from gym_server.rollouts.task import Task, Unit
 from gym_server.rollouts.tensors import concatenated
 
@@ -71,7 +71,7 @@ def play(number: int, task: Task | None, units: Sequence[Unit]) -> Ready:
 def _environment(task: Task) -> RolloutEnv:
     env = _environments.get(task.env_key)
     if env is None:
-        env = _environments[task.env_key] = ask(RolloutEnv, task)
+        env = _environments[task.env_key] = call_env(RolloutEnv, task)
         while len(_environments) > _MOST_ENVIRONMENTS:
             _environments.popitem(last=False)[1].close()
     _environments.move_to_end(task.env_key)
@@ -148,8 +148,8 @@ class _Playing:
 
         error = _play_until(due, units, play)
         tensors = recorder.tensors() if recorder is not None else {}
-        columns = _columns(*(zip(*played, strict=True) if played else ((), (), (), ())))
-        return len(played), {**tensors, **columns}, error
+        columns = zip(*played, strict=True) if played else ((), (), (), ())
+        return len(played), {**tensors, **result_tensors(*columns)}, error
 
     def _play_groups(self, units: Sequence[Unit], due: float) -> tuple:
         env = self._env
@@ -159,14 +159,11 @@ class _Playing:
 
     def _play_group(self, env: RolloutEnv, unit: Unit) -> dict[str, Tensor]:
         group = env.for_a_group
-        rows = np.array(unit.rows)
         # Rows that nobody asked for are played by the last candidate.
         candidates = np.full(group.num_envs, unit.candidates[-1])
-        candidates[rows] = unit.candidates
+        candidates[list(unit.rows or ())] = unit.candidates
         actor = self._policy.actor(candidates)
-        played = play_group(group, actor, unit, self._task.max_steps, self._task.keep)
-        columns = (played.earned, played.length, played.terminated, played.truncated)
-        return {**_columns(*(column[rows] for column in columns)), **played.tensors}
+        return play_group(group, actor, unit, self._task.max_steps, self._task.keep)
 
     def _actor(self, candidate: int) -> Any:
         actor = self._actors.get(candidate)
@@ -190,15 +187,6 @@ def _play_until(
         if time.monotonic() >= due:
             break
     return None
-
-
-def _columns(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, Tensor]:
-    return {
-        "return": Tensor.of(np.array(earned, dtype=np.float64)),
-        "length": Tensor.of(np.array(length, dtype=np.int32)),
-        "terminated": Tensor.of(np.array(terminated, dtype=bool)),
-        "truncated": Tensor.of(np.array(truncated, dtype=bool)),
-    }
 
 
 def _named(failure: BaseException, seed: int) -> GymServerError:

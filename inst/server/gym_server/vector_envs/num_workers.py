@@ -79,11 +79,6 @@ def choose_num_workers(
     return chosen if chosen > 1 else 0
 
 
-def may_share_processes(spec: EnvSpec) -> bool:
-    """Tell whether the processes of an environment may run other environments afterwards."""
-    return registry.module_of(spec).partition(".")[0] in registry.KNOWN_PACKAGES
-
-
 def _step_seconds(
     spec: EnvSpec, config: EnvConfig, sub_env: SubEnv, renderer: RenderThread
 ) -> float:

@@ -7,6 +7,7 @@ import pytest
 
 from gym_server.envs import make, registry
 from gym_server.envs.atari import _GAMES, classic_game
+from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import find_spec
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
@@ -15,7 +16,8 @@ MALFORMED = "Attempted to look up malformed environment ID"
 
 
 def make_simple(env_id, render_mode, kwargs, allowed):
-    return make.make_env(env_id, render_mode, kwargs, allowed, (), MemoryReservation())
+    config = EnvConfig(env_id, render_mode=render_mode, kwargs=kwargs)
+    return make.make_env(config, allowed, MemoryReservation())
 
 
 def refusal(env_id, render_mode=None, kwargs=None, allowed=()):

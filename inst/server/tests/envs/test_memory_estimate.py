@@ -12,7 +12,7 @@ from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
 from gym_server.api.app import Config, create_app
 from gym_server.budget import Budget
 from gym_server.envs import make
-from gym_server.envs.config import Wrapper
+from gym_server.envs.config import EnvConfig, Wrapper
 from gym_server.envs.memory_estimate import model_bytes, observation_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.transition_model import transition_model
@@ -208,7 +208,7 @@ def test_what_people_do_is_within_the_default(env_id, num_envs, wrappers):
     memory = MemoryReservation(Budget(Limits.max_memory_mb * MB), num_envs)
     chosen = [Wrapper(one["name"], one.get("kwargs", {})) for one in wrappers]
     renderer = RenderThread()
-    env = make.make_env(env_id, None, {}, (), chosen, memory)
+    env = make.make_env(EnvConfig(env_id, wrappers=tuple(chosen)), (), memory)
     wrap(env, chosen, renderer, memory)
     renderer.stop()
     assert memory.taken < Limits.max_memory_mb * MB
@@ -293,7 +293,7 @@ def test_every_space_can_be_estimated(kind):
 def test_a_vector_environment_that_is_refused_is_closed(limited, monkeypatch):
     closed = []
     monkeypatch.setattr(CartPoleVectorEnv, "close", lambda env, **_: closed.append(env))
-    monkeypatch.setattr("gym_server.vector_envs.make.answer_bytes", lambda space: np.inf)
+    monkeypatch.setattr("gym_server.vector_envs.make_vec.answer_bytes", lambda space: np.inf)
     answer = create(limited(), num_envs=2)
     assert (answer.status_code, answer.json["code"]) == (429, "too_much_memory")
     assert len(closed) == 1

@@ -15,13 +15,13 @@ from gym_server.envs import argument_limits, make
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.envs.registry import module_of
+from gym_server.envs.registry import is_known, module_of
 from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.entry_point import EntryPointEnv
-from gym_server.vector_envs.num_workers import choose_num_workers, may_share_processes
+from gym_server.vector_envs.num_workers import choose_num_workers
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
@@ -268,16 +268,16 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
         request.renderer,
         request.memory,
     )
-    num_workers = make.ask(
+    num_workers = make.call_env(
         choose_num_workers, request.config, request.spec, sub_env, request.renderer
     )
     try:
-        env = make.ask(_make_with, request, sub_env, num_workers)
+        env = make.call_env(_make_with, request, sub_env, num_workers)
     except GymServerError as refusal:
         if request.config.wants_workers or num_workers == 0 or refusal.code != "not_supported":
             raise
         log.info("%s runs in the server's process: %s", request.spec.id, refusal.message)
-        env = make.ask(_make_with, request, sub_env, 0)
+        env = make.call_env(_make_with, request, sub_env, 0)
     env.spec = _with_time_limit(request)
     return env, "async" if env.num_workers else "sync"
 
@@ -289,5 +289,6 @@ def _make_with(request: _Request, sub_env: SubEnv, num_workers: int) -> SubEnvs:
         request.autoreset_mode,
         num_workers,
         request.renderer,
-        keeps_processes=may_share_processes(request.spec),
+        # Who knows what others leave in theirs.
+        keeps_processes=is_known(module_of(request.spec)),
     )
