@@ -42,7 +42,7 @@ class Outcome(NamedTuple):
         truncated: booleans.
         final: the last observations, by row, of episodes after which another one began in the same
             step.
-        infos: one for each row; None where none were wanted.
+        infos: one for each row; empty where none were wanted.
     """
 
     observation: Any
@@ -50,7 +50,7 @@ class Outcome(NamedTuple):
     terminated: np.ndarray
     truncated: np.ndarray
     final: dict[int, object]
-    infos: list[Info] | None
+    infos: list[Info]
 
 
 class Group:
@@ -200,7 +200,7 @@ class Group:
             terminated,
             truncated,
             final,
-            infos if with_infos else None,
+            infos,
         )
 
     def _has_used_its_seeds(self, index: int) -> bool:

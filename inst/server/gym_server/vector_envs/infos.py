@@ -22,7 +22,7 @@ def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: 
     """Return the infos of sub-environments as one.
 
     Args:
-        infos: of each sub-environment; None for one that has none.
+        infos: of each sub-environment, None for one that has none; empty where none are wanted.
         final: the last observations of episodes that ended, by sub-environment.
         num_envs: how many sub-environments there are.
     """
@@ -34,11 +34,6 @@ def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: 
             for key, value in info.info.items():
                 by_key.setdefault(key, {})[row] = value
     return {**_objects("final_obs", final, num_envs), **_arrays(by_key, num_envs)}
-
-
-def final_only(final: Mapping[int, object], num_envs: int) -> dict:
-    """Return an info that holds the last observations and nothing else."""
-    return _objects("final_obs", final, num_envs)
 
 
 def _arrays(by_key: Mapping[str, Values], num_envs: int) -> dict:

@@ -31,7 +31,7 @@ from gym_server.threads.interrupt import interrupted_by
 from gym_server.vector_envs import group_worker
 from gym_server.vector_envs.group import Group, Outcome
 from gym_server.vector_envs.group_calls import AnyGroup, call_all
-from gym_server.vector_envs.infos import final_only, gather
+from gym_server.vector_envs.infos import gather
 from gym_server.vector_envs.local_group import LocalGroup
 from gym_server.vector_envs.sub_env import SubEnv
 
@@ -227,10 +227,7 @@ class SubEnvs:
         outcome = outcomes[0] if len(outcomes) == 1 else self._joined(outcomes)
         self._note_ends(which, outcome)
         count = len(outcome.reward)
-        if outcome.infos is None:
-            info = final_only(outcome.final, count)
-        else:
-            info = gather(outcome.infos, outcome.final, count)
+        info = gather(outcome.infos, outcome.final, count)
         return outcome.observation, outcome.reward, outcome.terminated, outcome.truncated, info
 
     def _joined(self, outcomes: list[Outcome]) -> Outcome:
@@ -239,16 +236,13 @@ class SubEnvs:
         for one in outcomes:
             final.update((before + row, observation) for row, observation in one.final.items())
             before += len(one.reward)
-        infos = None
-        if outcomes[0].infos is not None:
-            infos = [info for one in outcomes for info in one.infos or ()]
         return Outcome(
             join(self.single_observation_space, [one.observation for one in outcomes]),
             np.concatenate([one.reward for one in outcomes]),
             np.concatenate([one.terminated for one in outcomes]),
             np.concatenate([one.truncated for one in outcomes]),
             final,
-            infos,
+            [info for one in outcomes for info in one.infos],
         )
 
     def _note_ends(self, which: np.ndarray | None, outcome: Outcome) -> None:
