@@ -217,15 +217,21 @@ class Rollouts:
                 self._play(player)
         except Exception:
             log.exception("A fault of the server's own")
+        try:
+            self._let_process_go(player)
         finally:
+            # Only now, so that a player that takes its place finds the process in the pool.
             with self._changed:
                 self._players.remove(player)
-                process, player.process = player.process, None
                 self._start_players()
-            if process is not None and player.key is None:
-                pool.put(process)
-            elif process is not None:
-                process.kill()
+
+    def _let_process_go(self, player: _Player) -> None:
+        with self._changed:
+            process, player.process = player.process, None
+        if process is not None and player.key is None:
+            pool.put(process)
+        elif process is not None:
+            process.kill()
 
     def _take_turn(self, player: _Player) -> bool:
         """Find the player something to play; return whether there is any."""

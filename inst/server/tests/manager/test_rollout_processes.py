@@ -10,6 +10,7 @@ import pytest
 from rollout_requests import RANDOM, read_answer, refused, request_body, roll_out
 from running import descendants, is_running
 
+from gym_server.processes.pool import pool
 from gym_server.protocol.safetensors import TENSORS
 
 LAKE = {"env_id": "FrozenLake-v1"}
@@ -166,6 +167,9 @@ def test_a_foreign_process_cannot_send_objects(quick):
 
 def test_processes_are_used_again_by_the_next_rollout(quick, monkeypatch, eventually):
     monkeypatch.setattr("gym_server.manager.rollouts._IDLE_SECONDS", 0.05)
+    put = pool.put
+    # The memory of a process is measured before it is kept, which takes a while.
+    monkeypatch.setattr(pool, "put", lambda process: (time.sleep(0.3), put(process)))
     app = quick(max_rollout_processes=1)
     roll_out(app.test_client(), [1], **LAKE)
     pids = app._rollouts.pids()
