@@ -36,7 +36,7 @@ def act(given):
     actor = policy.actor(0)
     actor.begin(0)
     single = np.array([actor.act(observation) for observation in observations])
-    group = policy.group_actor(np.zeros(GROUP, int), GROUP)
+    group = policy.actor(np.zeros(GROUP, int))
     group.begin(0)
     blocks = np.split(observations, range(GROUP, len(observations), GROUP))
     together = np.concatenate([group.act(block) for block in blocks])
