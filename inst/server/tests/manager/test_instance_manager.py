@@ -137,8 +137,8 @@ def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
     enlist = InstanceManager._enlist
 
     def end_it_and_enlist(self, instance, creation):
-        os.kill(instance._worker.pid, signal.SIGKILL)
-        eventually(lambda: instance._worker.why is not None)
+        os.kill(instance._process.pid, signal.SIGKILL)
+        eventually(lambda: instance._process.why is not None)
         return enlist(self, instance, creation)
 
     monkeypatch.setattr(InstanceManager, "_enlist", end_it_and_enlist)

@@ -415,7 +415,7 @@ def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
             while time.monotonic() < end:
                 pass
             super().__init__(*args)
-            started.append(self._worker.pid)
+            started.append(self._process.pid)
 
     monkeypatch.setattr("gym_server.manager.instance_manager.IsolatedInstance", StartsSlowly)
     limits = Limits(max_call_seconds=0.3)
