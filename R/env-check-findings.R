@@ -1,6 +1,6 @@
 # What check_env() looks at. Each look notes what it finds in `check`, an environment with `env`,
-# `found` (a list of findings), `lengths` (of the episodes played) and `limit` (the steps that an
-# episode may take).
+# `found` (a list of findings), `misfits` (how many observations did not fit their space), `lengths`
+# (of the episodes played) and `limit` (the steps that an episode may take).
 
 look_at_environment <- function(check, seed) {
   if (!look_at_members(check)) {

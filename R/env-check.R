@@ -61,7 +61,7 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     check_environment(env)
   }
   check <- rlang::env(
-    env = env, found = list(), lengths = integer(), limit = max_steps,
+    env = env, found = list(), misfits = 0L, lengths = integer(), limit = max_steps,
     in_r = inherits(env, "gym_r_env")
   )
   if (check$in_r) {
