@@ -23,13 +23,16 @@ log_lines <- function(state, iterations) {
     round(rows$steps / pmax(rows$elapsed, 1e-3)), rows$mean_return, rows$min_return,
     rows$median_return, rows$max_return, rows$mean_length, evaluated$mean_return, length
   )
-  # Numbers with as many digits as they need and without an exponent, and nothing for what was not
-  # evaluated.
+  csv_lines(rlang::set_names(table, log_columns))
+}
+
+# Numbers with as many digits as they need and without an exponent, and nothing for `NA`.
+csv_lines <- function(table) {
   old <- options(scipen = 15)
   on.exit(options(old))
-  utils::capture.output(with_decimal_point(utils::write.table(
-    rlang::set_names(table, log_columns), sep = ",", na = "", row.names = FALSE, quote = FALSE
-  )))
+  utils::capture.output(with_decimal_point(
+    utils::write.table(table, sep = ",", na = "", row.names = FALSE, quote = FALSE)
+  ))
 }
 
 #' Prepare to log a training

@@ -50,14 +50,6 @@ not_loaded_from <- function(library) {
   union(astray, setdiff(c("gym", "httr", "curl", "testthat"), held))
 }
 
-# The files that took longest, with their seconds: where to look when the proof grows.
-slowest_files <- function(results, n = 12) {
-  seconds <- vapply(results, function(test) test$real, 0)
-  files <- vapply(results, function(test) gsub("^test-|[.]R$", "", test$file), "")
-  by_file <- utils::head(sort(tapply(seconds, files, sum), decreasing = TRUE), n)
-  toString(sprintf("%s %.0f", names(by_file), by_file))
-}
-
 run_tests <- function(pattern, library = Sys.getenv("GYM_R_LIBRARY")) {
   load_packages(library)
   results <- test_dir(
@@ -68,7 +60,6 @@ run_tests <- function(pattern, library = Sys.getenv("GYM_R_LIBRARY")) {
   count <- function(state) sum(states == state)
 
   cat("\n", R.version.string, "; ", versions_of(loadedNamespaces()), "\n", sep = "")
-  cat("Seconds of the slowest files: ", slowest_files(results), "\n", sep = "")
   astray <- if (nzchar(library)) not_loaded_from(library)
   if (length(astray) > 0) cat("Not loaded from ", library, ": ", toString(astray), "\n", sep = "")
   cat(sprintf(

@@ -11,7 +11,10 @@ local_bad_environment <- function(..., frame = parent.frame()) {
   given <- list(...)
   about[names(given)] <- given
   local_canned_server(list(
-    "/v1/envs/" = list(text = '{"instance_id":"0a1b2c3d"}'),
+    "/v1/envs/" = list(text = jsonlite::toJSON(
+      c(list(instance_id = "0a1b2c3d", request = list(key = "a", number = 1)), about),
+      auto_unbox = TRUE
+    )),
     "/v1/envs/0a1b2c3d/" = list(text = jsonlite::toJSON(about, auto_unbox = TRUE)),
     "/v1/envs/0a1b2c3d/reset/" = list(text = '{"observation":[0,1],"info":{}}'),
     "/v1/envs/0a1b2c3d/step/" = list(text = good_step()),

@@ -53,7 +53,7 @@ test_that("a setting that is an integer64 is refused with what to do", {
   )), discount = five))
   expect_refused(search_random("x", target = five))
   expect_refused(train_agent(agent_hill_climb(), "x", iterations = five))
-  expect_refused(learn_q(learning_rate = five))
+  expect_refused(learn_q("FrozenLake-v1", learning_rate = five))
   expect_refused(tile_coding(bins = five))
 })
 
