@@ -85,7 +85,6 @@ rollouts_route <- "/v1/rollouts/"
 
 described_env <- function(client, answer, fields, wrappers, arguments) {
   check_description(answer)
-  spec <- answer$spec
   observed <- read_space(answer, "observation_space", new_space)
   observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
   num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
@@ -93,19 +92,14 @@ described_env <- function(client, answer, fields, wrappers, arguments) {
     list(
       observation_space = observed, action_space = read_space(answer, "action_space", new_space),
       num_envs = num_envs, one_seed = !is.null(answer$group), client = client,
-      spec = list(
-        id = shown_line(answer$env_id),
-        reward_threshold = if (!is.null(spec$reward_threshold)) {
-          number_from(spec$reward_threshold, "reward_threshold")
-        },
-        max_episode_steps = spec$max_episode_steps,
-        render_fps = if (is_number(spec$render_fps)) spec$render_fps,
-        wrappers = wrapper_names(wrappers), kwargs = arguments
+      spec = c(
+        read_spec(answer$env_id, answer$spec),
+        list(wrappers = wrapper_names(wrappers), kwargs = arguments)
       ),
       remembers = character(),
       description = list(
         fields = fields, group = answer$group, processes = answer$processes %||% 1L,
-        needs_max_steps = answer$needs_max_steps %||% is.null(spec$max_episode_steps),
+        needs_max_steps = answer$needs_max_steps %||% is.null(answer$spec$max_episode_steps),
         versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
       )
     ),

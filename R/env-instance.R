@@ -120,21 +120,26 @@ new_instance <- function(client, instance_id, about) {
   as_tensors <- function(space) !instance$classic && travels_as_tensors(space, about$num_envs)
   instance$takes_tensors <- as_tensors(observed)
   instance$sends_tensors <- as_tensors(instance$single_action_space)
-  instance$spec <- list(
-    id = shown_line(about$env_id),
-    reward_threshold = if (!is.null(about$reward_threshold)) {
-      number_from(about$reward_threshold, "reward_threshold")
-    },
-    max_episode_steps = about$max_episode_steps,
-    # The environment's own metadata may be anything.
-    render_fps = if (is_number(about$render_fps)) about$render_fps
-  )
+  instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
   instance$done <- FALSE
   # One for each combination of a call's flags, prepared when it is first called so.
   instance$resets <- vector("list", 4L)
   instance$steps <- vector("list", 16L)
   instance
+}
+
+# What a server says of an environment's spec, whether it has made one or only describes it.
+read_spec <- function(env_id, spec) {
+  list(
+    id = shown_line(env_id),
+    reward_threshold = if (!is.null(spec$reward_threshold)) {
+      number_from(spec$reward_threshold, "reward_threshold")
+    },
+    max_episode_steps = spec$max_episode_steps,
+    # The environment's own metadata may be anything.
+    render_fps = if (is_number(spec$render_fps)) spec$render_fps
+  )
 }
 
 # The names of the wrappers around an instance, which classic servers do not send.

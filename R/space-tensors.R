@@ -37,10 +37,6 @@ has_tensors.gym_space_tuple <- function(space) all(vapply(space$spaces, has_tens
 #' @exportS3Method
 has_tensors.gym_space_dict <- has_tensors.gym_space_tuple
 
-has_texts <- function(space) {
-  inherits(space, "gym_space_text") || has_parts(space) && any(vapply(space$spaces, has_texts, NA))
-}
-
 tensors_pay <- function(space) has_tensors(space) && count_numbers(space) >= tensors_pay_from
 
 count_numbers <- function(space) {

@@ -48,7 +48,6 @@ class LocalInstance(Instance):
         num_workers: how many processes run them; None for a single environment, and for an
             implementation of the environment's own.
         autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
-        has_ended: whether an episode ended that only a reset of the client's follows.
     """
 
     # Threads cannot be killed.
@@ -224,7 +223,7 @@ class LocalInstance(Instance):
 
     @property
     def has_ended(self) -> bool:
-        """See above."""
+        """Tell whether an episode ended that only a reset of the client's follows."""
         raise NotImplementedError
 
     def _about(self) -> dict:
