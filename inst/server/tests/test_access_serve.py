@@ -10,6 +10,8 @@ from conftest import ON_A_FREE_PORT, TOKEN, ServerProcess
 
 from gym_server.cli import main
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def token_file(tmp_path):
@@ -155,7 +157,6 @@ def test_shutdown_can_be_switched_off(serve):
     assert server.stop()[0] == 0
 
 
-@pytest.mark.slow
 def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve, shared, locked):
     body = {"env_id": "Ant-v5", "kwargs": {"xml_file": "/no/such.xml"}}
 

@@ -16,6 +16,8 @@ from gym_server.budget import Budget
 from gym_server.http_server import connection as connection_module
 from gym_server.http_server.connection import Connection
 
+pytestmark = pytest.mark.slow
+
 # Heads ---------------------------------------------------------------------------------------
 
 

@@ -14,6 +14,8 @@ from gym_server.envs.extras import is_available
 from gym_server.envs.registry import look_up
 from gym_server.protocol.safetensors import TENSORS, read
 
+pytestmark = pytest.mark.slow
+
 FAMILIES = [
     "CartPole-v1",
     "FrozenLake-v1",
@@ -37,7 +39,6 @@ def installed():
     return installed
 
 
-@pytest.mark.slow
 def test_all_families_draw_from_any_thread_while_others_close(app, installed):
     failures = []
     # Some observe pictures, and in JSON these take long.
@@ -69,9 +70,7 @@ def test_all_families_draw_from_any_thread_while_others_close(app, installed):
     assert not failures
 
 
-@pytest.mark.parametrize(
-    "env_id", [FAMILIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in FAMILIES[1:])]
-)
+@pytest.mark.parametrize("env_id", [FAMILIES[0], *(one for one in FAMILIES[1:])])
 def test_it_is_recorded(client, create, installed, monitor_dir, env_id):
     pytest.importorskip("moviepy")
     if not installed(env_id):

@@ -8,6 +8,8 @@ import pytest
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import MonitorRoot, take_directory
 
+pytestmark = pytest.mark.slow
+
 ONE, TWO, THREE = "11111111", "22222222", "33333333"
 
 
@@ -157,7 +159,7 @@ def record(server, url, directory="agents", **fields):
     return server.get(f"{url}/")[1]["monitor"]["directory"]
 
 
-@pytest.mark.parametrize("mode", ["none", pytest.param("all", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("mode", ["none", "all"])
 def test_six_agents_that_name_one_directory_all_record(serve, tmp_path, mode):
     options = ("--isolate", mode, "--monitor-dir", str(tmp_path))
     server = serve(*options)

@@ -5,6 +5,8 @@ import signal
 import pytest
 from conftest import ServerProcess
 
+pytestmark = pytest.mark.slow
+
 KINDS = {"interrupts": "KeyboardInterrupt", "leaves": "SystemExit", "ends_a_generator": "Generator"}
 
 

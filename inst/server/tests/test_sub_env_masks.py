@@ -18,6 +18,8 @@ from gym_server import spaces
 from gym_server.json_values import plain
 from gym_server.protocol.safetensors import TENSORS
 
+pytestmark = pytest.mark.slow
+
 
 def row(info, index):
     """Return what a vector info says of one sub-environment."""

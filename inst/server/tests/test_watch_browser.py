@@ -28,6 +28,8 @@ from watch_page import (  # noqa: E402
     text,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def chromium():
@@ -123,7 +125,6 @@ def search(server):
     process.stdout.close()
 
 
-@pytest.mark.slow
 def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, eventually):
     assert search.endswith("/watch/")
     url = search.removeprefix(f"http://127.0.0.1:{server.port}").removesuffix("/watch/")
@@ -200,7 +201,6 @@ def in_slow_motion(browser, server, play, look, eventually):
     return in_slow_motion
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("speed", ["2", "4"])
 def test_slow_motion_is_slower_than_what_is_played(browser, in_slow_motion, eventually, speed):
     shown, played = in_slow_motion(speed)
@@ -208,7 +208,6 @@ def test_slow_motion_is_slower_than_what_is_played(browser, in_slow_motion, even
     assert moves(browser)
 
 
-@pytest.mark.slow
 def test_slow_motion_goes_on_from_the_present(in_slow_motion, eventually):
     shown, played = in_slow_motion("2")
     eventually(lambda: shown() < played() - 1)
@@ -216,7 +215,6 @@ def test_slow_motion_goes_on_from_the_present(in_slow_motion, eventually):
     eventually(lambda: shown() >= played(), seconds=30)
 
 
-@pytest.mark.slow
 def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, eventually):
     url = server.create("faulty_envs:Counting-v0")
     play(url, pause=0.02)
@@ -230,7 +228,6 @@ def test_what_is_not_drawn_shows_its_observations(browser, server, play, look, e
     assert complaints(browser) == []
 
 
-@pytest.mark.slow
 def test_a_sub_env_is_chosen_on_the_page(browser, server, look, eventually):
     url = server.create("CartPole-v1", num_envs=3, vectorization_mode="sync")
     server.post(f"{url}/reset/", {"seed": 1})
@@ -247,7 +244,6 @@ def test_a_sub_env_is_chosen_on_the_page(browser, server, look, eventually):
     assert "of all 3" in text(browser, "caption")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("num_envs", "together", "each"), [(None, "", ""), (4, ", all 4 together", " each")]
 )
@@ -263,7 +259,6 @@ def test_the_pace_is_that_of_all_and_real_time_that_of_each(
     assert real == f"real time (at most 50{each})"
 
 
-@pytest.mark.slow
 def test_what_is_not_there_is_said_in_words(browser, server, look, eventually):
     url = server.create("CartPole-v1")
     look(url)
@@ -281,7 +276,6 @@ def test_what_is_not_there_is_said_in_words(browser, server, look, eventually):
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
-@pytest.mark.slow
 def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, eventually):
     server = serve()
     url = server.create("CartPole-v1")
@@ -295,7 +289,6 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, eventua
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
-@pytest.mark.slow
 def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, eventually):
     strict = serve("--max-call-seconds", "1", "--isolate", "none")
     where = {"where": "reset"}
@@ -324,7 +317,6 @@ def locked(serve):
     return server, ask
 
 
-@pytest.mark.slow
 def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
     browser, locked, eventually
 ):
@@ -355,7 +347,6 @@ def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
         assert text(browser, "state") == "no key"
 
 
-@pytest.mark.slow
 def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eventually):
     """A page of another server's on this machine, with a real browser's headers."""
     url = server.create("CartPole-v1")
@@ -407,7 +398,6 @@ def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eve
     assert browser.find_element(By.ID, "picture")
 
 
-@pytest.mark.slow
 def test_every_control_has_a_name(browser, server, look):
     look(server.create("CartPole-v1", num_envs=2))
     for control in browser.find_elements(By.CSS_SELECTOR, "button, input, canvas"):

@@ -9,6 +9,8 @@ from contextlib import suppress
 import pytest
 from raw_http import answered, read_answer, request
 
+pytestmark = pytest.mark.slow
+
 # The longest that a client is waited for at the stop that has sent half a request, or does not
 # read what a watcher gets.
 SOON_DROPPED = {"gym_server.http_server.server._HALF_SENT_SECONDS": 0.5}
@@ -80,13 +82,11 @@ def deaf(server, pole):
         thread.join()
 
 
-@pytest.mark.slow
 def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, deaf):
     # Less than a request under way may take.
     assert server.stop(timeout=8)[0] == 0
 
 
-@pytest.mark.slow
 def test_what_is_asked_after_watching_is_answered_at_the_stop(server, gate, eventually):
     url = server.create("faulty_envs:Gated-v0", kwargs=gate.kwargs)
     server.post(f"{url}/reset/")

@@ -117,6 +117,7 @@ def test_errors_are_stored_and_echoed_too(client, faulty):
     assert answers[0].json["request"] == {"key": "a", "number": 1}
 
 
+@pytest.mark.slow
 def test_no_flood_of_keys_makes_a_step_be_taken_twice(app, client, faulty):
     url = faulty("Counting")
     client.post(f"{url}/reset/", json=once("victim", 1))

@@ -9,6 +9,8 @@ from conftest import SHORT_GRACE
 
 from gym_server.cli import main
 
+pytestmark = pytest.mark.slow
+
 needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
 
@@ -21,9 +23,7 @@ def test_one_line_says_where_the_server_is(serve):
 
 
 @needs_signals
-@pytest.mark.parametrize(
-    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM]
-)
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_stops_it_with_status_0(serve, how):
     server = serve()
     server.create("CartPole-v1")
@@ -52,7 +52,6 @@ def test_the_log_is_removed_when_standard_input_closes_without_a_line(serve, tmp
     assert log.exists() == bool(line)
 
 
-@pytest.mark.slow
 @needs_signals
 @pytest.mark.parametrize("isolate", ["all", "none"])
 def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
@@ -72,7 +71,6 @@ def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path
     assert not list(tmp_path.glob("pymp-*"))
 
 
-@pytest.mark.slow
 def test_the_end_of_standard_input_means_nothing_otherwise(serve):
     server = serve()
     server.process.stdin.close()
@@ -86,7 +84,6 @@ def test_shutdown_is_answered_and_stops_it(serve):
     assert server.stop(how=None)[0] == 0
 
 
-@pytest.mark.slow
 @needs_signals
 def test_a_port_is_free_again_at_once(serve):
     server = serve()
@@ -143,7 +140,6 @@ def test_the_monitor_directory_is_the_one_that_was_named(serve, tmp_path):
     assert (tmp_path / "runs" / "a" / "episodes.csv").read_text().startswith("episode,return")
 
 
-@pytest.mark.slow
 @needs_signals
 def test_its_own_monitor_directory_is_there_only_for_what_was_written(serve, tmp_path):
     for directory in ("..", "a"):
@@ -181,7 +177,6 @@ def test_a_video_under_way_is_finished_at_the_stop(serve, tmp_path):
     assert (tmp_path / "a" / "rl-video-episode-0.mp4").stat().st_size > 1000
 
 
-@pytest.mark.slow
 @needs_signals
 def test_what_never_returns_does_not_keep_it_alive(serve, tmp_path, gate, eventually):
     pytest.importorskip("moviepy")

@@ -11,6 +11,8 @@ from conftest import SERVER, TOKEN
 from gym_server.cli import port_holder as module
 from gym_server.cli.port_holder import port_holder
 
+pytestmark = pytest.mark.slow
+
 
 def refused(port):
     """Start a server on a taken port; return the one line that it says."""
@@ -61,7 +63,6 @@ def listening(serve):
         yield listener.getsockname()[1]
 
 
-@pytest.mark.slow
 def test_another_program_is_called_so():
     with http.server.HTTPServer(("127.0.0.1", 0), Stranger) as stranger:
         threading.Thread(target=stranger.serve_forever, daemon=True).start()

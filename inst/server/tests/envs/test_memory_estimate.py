@@ -22,6 +22,8 @@ from gym_server.manager.limits import Limits
 from gym_server.protocol.answers import dumps
 from gym_server.rendering.render_thread import RenderThread
 
+pytestmark = pytest.mark.slow
+
 MB = 2**20
 
 

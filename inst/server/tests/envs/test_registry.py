@@ -123,13 +123,12 @@ print(json.dumps([answer.status_code, answer.json, found]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("env_id", "extra", "module", "requirement"),
     [
         ("LunarLander-v3", "box2d", "Box2D", "gymnasium[box2d]"),
-        pytest.param(
-            *("CarRacing-v3", "box2d", "Box2D", "gymnasium[box2d]"), marks=pytest.mark.slow
-        ),
+        ("CarRacing-v3", "box2d", "Box2D", "gymnasium[box2d]"),
         ("Ant-v5", "mujoco", "mujoco", "gymnasium[mujoco]"),
         ("ALE/Pong-v5", "atari", "ale_py", '"gymnasium[atari]" "opencv-python-headless"'),
     ],
@@ -144,6 +143,7 @@ def test_an_environment_whose_extra_is_missing_names_it(env_id, extra, module, r
     assert all(entry["available"] is False for entry in entries if entry["id"] == env_id)
 
 
+@pytest.mark.slow
 def test_packages_are_imported_when_an_id_needs_them_and_not_before():
     pytest.importorskip("ale_py")
     code = """

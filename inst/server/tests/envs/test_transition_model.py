@@ -11,6 +11,8 @@ from gymnasium.envs.toy_text.taxi import TaxiEnv
 
 from gym_server.envs import transition_model, wrappers
 
+pytestmark = pytest.mark.slow
+
 COLUMNS = ("state", "action", "next_state", "probability", "reward", "terminated")
 
 CASES = [

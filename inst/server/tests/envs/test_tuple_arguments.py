@@ -4,6 +4,8 @@ import pytest
 
 from gym_server.envs.tuple_arguments import with_tuples
 
+pytestmark = pytest.mark.slow
+
 
 class Takes:
     def __init__(

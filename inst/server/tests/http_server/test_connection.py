@@ -14,6 +14,8 @@ from gym_server.http_server import connection as connection_module
 from gym_server.http_server.connection import Connection
 from gym_server.response import Response
 
+pytestmark = pytest.mark.slow
+
 GET = b"GET /%s HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 POST = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n"
 LARGE = 2**24
@@ -109,7 +111,6 @@ def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
     assert received < 2**21
 
 
-@pytest.mark.slow
 def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
     client, _ = converse()
     client.sendall(GET % b"%d" % 2**21)

@@ -6,6 +6,8 @@ from gym_server.budget import Budget
 from gym_server.http_server.request_parser import RequestParser
 from gym_server.response import Response
 
+pytestmark = pytest.mark.slow
+
 CHUNKED = b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
 
 

@@ -14,6 +14,8 @@ from raw_http import answered, read_answer, request
 
 from gym_server.http_server.server import bind
 
+pytestmark = pytest.mark.slow
+
 
 def step(url, number, key="k"):
     body = json.dumps({"action": 0, "request": {"key": key, "number": number}}).encode()
@@ -281,9 +283,7 @@ def test_idle_and_silent_clients_hold_nobody_up(serve):
         connection.close()
 
 
-@pytest.mark.parametrize(
-    "how", ["signal", pytest.param("shutdown", marks=pytest.mark.slow), "end of input"]
-)
+@pytest.mark.parametrize("how", ["signal", "shutdown", "end of input"])
 def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, gate, eventually, how):
     # One that did not wait for its requests would be gone soon.
     limits = {"gym_server.cli.main._LAST_SECONDS": 0.1}
@@ -306,7 +306,6 @@ def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, gate, eventu
     assert server.process.wait(10) == 0
 
 
-@pytest.mark.slow
 def test_a_large_answer_under_way_arrives_in_full(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Counting-v0")

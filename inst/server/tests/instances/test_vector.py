@@ -38,6 +38,7 @@ def test_sub_envs_in_json_are_those_of_gymnasium(client, sub_envs, kind, mode):
     check_play(client, sub_envs(kind, autoreset_mode=mode, vectorization_mode="sync"), kind, mode)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", ["Box", "Dict", "Sequence"])
 def test_sub_envs_in_processes_are_those_of_gymnasium(client, sub_envs, kind, mode):

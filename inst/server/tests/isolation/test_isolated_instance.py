@@ -11,6 +11,8 @@ import pytest
 from conftest import ON_A_FREE_PORT, ServerProcess
 from running import descendants
 
+pytestmark = pytest.mark.slow
+
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
 
 
@@ -308,7 +310,7 @@ def test_modules_are_imported_in_other_processes_only(serve, tmp_path):
     assert str(server.process.pid) not in pids
 
 
-@pytest.mark.parametrize("hangs", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.parametrize("hangs", [True, False])
 def test_a_module_that_hangs_or_stays_leaves_no_process_of_the_list(
     serve, tmp_path, eventually, hangs
 ):

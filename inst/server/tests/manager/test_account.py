@@ -8,7 +8,10 @@ from conftest import created
 
 from gym_server.manager import account
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux"),
+]
 
 # In one draw such an environment takes 64 MiB.
 HOARDER = {"frame": "hoards"}

@@ -12,6 +12,8 @@ from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager.limits import Limits, Room, Watchers
 from gym_server.vector_envs.sub_envs import SubEnvs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def limited():

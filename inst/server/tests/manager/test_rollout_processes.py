@@ -13,6 +13,8 @@ from running import descendants, is_running
 from gym_server.processes.pool import pool
 from gym_server.protocol.safetensors import TENSORS
 
+pytestmark = pytest.mark.slow
+
 LAKE = {"env_id": "FrozenLake-v1"}
 
 

@@ -20,6 +20,8 @@ from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager import watchdog
 from gym_server.manager.limits import Limits
 
+pytestmark = pytest.mark.slow
+
 # Ample for whatever does not hang.
 SOON = 20
 
@@ -125,7 +127,7 @@ def test_an_environment_may_hang_while_it_is_made(strict, call):
     assert strict.get("/v1/health/")[1]["instances"] == before + 1
 
 
-@pytest.mark.parametrize("num_envs", [None, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("num_envs", [None, 2])
 def test_drawing_may_hang_and_others_are_drawn_all_the_same(
     strict, call, gate, eventually, num_envs
 ):
@@ -146,7 +148,6 @@ def test_drawing_may_hang_and_others_are_drawn_all_the_same(
     assert strict.post(f"{other}/close/")[0] == 204
 
 
-@pytest.mark.slow
 def test_a_watcher_may_be_the_one_for_whom_it_hangs(strict, call):
     url = hanging(strict, "render")
     strict.post(f"{url}/reset/")
@@ -157,7 +158,6 @@ def test_a_watcher_may_be_the_one_for_whom_it_hangs(strict, call):
     assert call(f"{other}/watch/state/", method="GET").answer()[0] == 200
 
 
-@pytest.mark.slow
 def test_closing_may_hang(strict, call):
     url, other = hanging(strict, "close"), strict.create("faulty_envs:Drawing-v0")
     stuck = call(f"{url}/close/")
@@ -166,7 +166,6 @@ def test_closing_may_hang(strict, call):
     assert strict.post(f"{other}/close/")[0] == 204
 
 
-@pytest.mark.slow
 def test_a_server_with_calls_that_hang_stops_all_the_same(serve):
     server = serve(*STRICT)
     in_reset, in_render = hanging(server, "reset"), hanging(server, "render")
@@ -257,7 +256,6 @@ def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
     assert ask("POST", f"{other}/step/", action=0)[0] == 200
 
 
-@pytest.mark.slow
 def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
     url = hanging(strict, "reset")
     connection = strict.connect()
@@ -300,7 +298,6 @@ def test_what_is_slow_but_not_too_slow_delays_nobody(shared, gate, tmp_path, eve
 # Without HTTP --------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, eventually):
     client = quick(max_call_seconds=0.5).test_client()
     before = HangsWhere.closed
@@ -316,7 +313,6 @@ def test_an_environment_whose_call_comes_back_after_all_is_closed_then(quick, ev
     assert client.get("/v1/envs/").json["all_envs"] == {}
 
 
-@pytest.mark.slow
 def test_one_that_was_evicted_may_hang_once_more_and_others_are_drawn(quick, monkeypatch):
     app = quick(max_call_seconds=0.3)
     closing, released, drawn = threading.Event(), threading.Event(), []
@@ -360,12 +356,12 @@ def impatient():
     [
         ("init", {}),
         # Processes may be chosen, or have been.
-        pytest.param("init", {"num_envs": 64}, marks=pytest.mark.slow),
-        pytest.param("init", {"num_envs": 4, "num_workers": 2}, marks=pytest.mark.slow),
-        pytest.param("init elsewhere", {"num_envs": 4, "num_workers": 2}, marks=pytest.mark.slow),
+        ("init", {"num_envs": 64}),
+        ("init", {"num_envs": 4, "num_workers": 2}),
+        ("init elsewhere", {"num_envs": 4, "num_workers": 2}),
         ("step", {}),
-        pytest.param("render", {}, marks=pytest.mark.slow),
-        pytest.param("close", {}, marks=pytest.mark.slow),
+        ("render", {}),
+        ("close", {}),
     ],
 )
 def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, fields):
@@ -441,7 +437,6 @@ def _busy_threads(pid):
     return len(busy)
 
 
-@pytest.mark.slow
 def test_0_seconds_are_for_ever(quick):
     client = quick(max_call_seconds=0, idle_minutes=0.01).test_client()
     url = created(client, kwargs={"seconds": 1.0})
@@ -449,7 +444,6 @@ def test_0_seconds_are_for_ever(quick):
     assert client.post(f"{url}/step/", json={"action": 0}).status_code == 200
 
 
-@pytest.mark.slow
 def test_an_answer_for_another_never_reaches_the_next_request(strict):
     # The thread comes back while the watchdog answers for it, again and again.
     connection = http.client.HTTPConnection("127.0.0.1", strict.port, timeout=SOON)

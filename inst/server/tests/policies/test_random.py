@@ -21,6 +21,8 @@ from random_spaces import same
 from gym_server.policies import read_policy
 from gym_server.policies.random import _with_parts
 
+pytestmark = pytest.mark.slow
+
 RANDOM = {"kind": "random"}
 OBSERVED = Box(-1, 1, (2,))
 

@@ -12,7 +12,10 @@ from running import descendants, is_running
 from gym_server.isolation.worker import WorkerSettings
 from gym_server.processes.worker_process import WorkerProcess
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name != "posix", reason="signals, and processes by fork"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +185,6 @@ def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
         server.post(f"{url}/close/")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_no_process_outlives_the_server(serve, how, eventually):
     server = serve()
@@ -219,7 +221,6 @@ def test_a_process_gets_no_more_memory_than_it_may_have(serve, limit):
     assert server.get("/v1/health/")[0] == 200
 
 
-@pytest.mark.slow
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
     def left():
         files = len(os.listdir(f"/proc/{server.process.pid}/fd"))

@@ -5,6 +5,8 @@ from gym_server.errors import GymServerError
 from gym_server.protocol.answers import dumps
 from gym_server.protocol.bodies import loads, parse_path_value
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("raw", [b"", b"  ", b"null", b'""', b"[]", b" {} "])
 def test_nothing_is_an_empty_object(raw):

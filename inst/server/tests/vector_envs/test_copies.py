@@ -13,6 +13,8 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
 from gym_server.vector_envs.sub_env import SubEnv
 
+pytestmark = pytest.mark.slow
+
 # Besides none, by name without version.
 KWARGS = {
     "Blackjack": [{"natural": True, "sab": False}],

@@ -22,6 +22,8 @@ from gym_server.spaces.stacking import stack
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def make():
@@ -281,7 +283,6 @@ def test_a_server_that_stops_ends_its_sub_envs(serve, eventually):
     eventually(lambda: not any(map(is_running, children)))
 
 
-@pytest.mark.slow
 def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, gate, eventually):
     server = serve(limits=SHORT_GRACE)
     how = {"num_envs": 2, "vectorization_mode": "async"}
