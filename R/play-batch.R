@@ -48,8 +48,8 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     # Whose observations count must not depend on when others end.
     target = if (!keep_moments) target, each = each,
     steps = list(), frames = list(), report = report,
-    vector_env = vector_env, policy = policy, max_steps = max_steps, keep_steps = keep_steps,
-    keep_next = keep_next, learner = learner, at_once = at_once,
+    vector_env = vector_env, policy = with_memory(policy, at_once), max_steps = max_steps,
+    keep_steps = keep_steps, keep_next = keep_next, learner = learner, at_once = at_once,
     moments = if (keep_moments) no_moments(), noted = list()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
@@ -99,8 +99,10 @@ play_episodes <- function(batch, first, last) {
     last = last, taken = 0L, observation = observation,
     rows = list(episode = episode, sub_env = batch$sub_env[episode],
                 return = numeric(length(episode)), began = integer(length(episode))),
-    candidate = candidate, acting = policy_rows(batch$policy, candidate)
+    candidate = candidate, acting = policy_rows(batch$policy, candidate, batch$sub_env[episode])
   )
+  begin_memory(batch$policy, playing$rows$sub_env)
+  changed <- if (is.function(batch$policy) && first == 1L) watch_variables(batch$policy)
   whole <- batch$keep_next || !is.null(batch$learner)
   step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
@@ -110,6 +112,9 @@ play_episodes <- function(batch, first, last) {
       )
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
+    }
+    if (!is.null(changed) && playing$taken == 1L) {
+      if (length(changed())) warn_of_memory(changed(), vector_env$call)
     }
     out <- step(action, playing$rows$sub_env)
     if (!is.null(batch$learner)) {
@@ -184,11 +189,12 @@ begin_next_episodes <- function(batch, playing, ended, waiting) {
     playing$observation <- begin_waiting(batch, playing, which(waiting))
   }
   begun <- which(rows$began == playing$taken)
+  begin_memory(batch$policy, rows$sub_env[begun])
   ask_beforehand(batch, rows$episode, playing$observation, begun)
   candidate <- batch$candidate[rows$episode]
   if (!identical(candidate, playing$candidate)) {
     playing$candidate <- candidate
-    playing$acting <- policy_rows(batch$policy, candidate)
+    playing$acting <- policy_rows(batch$policy, candidate, rows$sub_env)
   }
 }
 

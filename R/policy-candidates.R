@@ -92,12 +92,13 @@ policy_subset.gym_policy_list <- function(policy, candidates) {
 #' Give the policy that acts for rows of observations
 #'
 #' @param candidate Which candidate acts for each row.
+#' @param sub_env Which sub-environment each row is.
 #' @return A policy for [act_batch()].
 #' @noRd
-policy_rows <- function(policy, candidate) UseMethod("policy_rows")
+policy_rows <- function(policy, candidate, sub_env) UseMethod("policy_rows")
 
 #' @exportS3Method
-policy_rows.default <- function(policy, candidate) policy
+policy_rows.default <- function(policy, candidate, sub_env) policy
 
 # How many candidates there are, `NULL` for a policy that is none of several.
 count_candidates <- function(policy) {
@@ -133,7 +134,7 @@ policy_bind.gym_policy_candidates <- function(policy, env, call = rlang::caller_
 }
 
 #' @exportS3Method
-policy_rows.gym_policy_candidates <- function(policy, candidate) {
+policy_rows.gym_policy_candidates <- function(policy, candidate, sub_env) {
   network <- policy$policy
   ends <- cumsum(lengths(network$weights))
   layers <- Map(
@@ -195,10 +196,14 @@ format.gym_policy_list <- function(x, ...) {
 }
 
 #' @exportS3Method
-policy_rows.gym_policy_list <- function(policy, candidate) {
+policy_rows.gym_policy_list <- function(policy, candidate, sub_env) {
+  rows <- split(seq_along(candidate), candidate)
+  policies <- Map(
+    function(own, rows) policy_rows(own, candidate[rows], sub_env[rows]),
+    unclass(policy)[as.integer(names(rows))], rows
+  )
   structure(
-    list(policies = unclass(policy), rows = split(seq_along(candidate), candidate)),
-    class = c("gym_policy_list_rows", "gym_policy")
+    list(policies = policies, rows = rows), class = c("gym_policy_list_rows", "gym_policy")
   )
 }
 
@@ -206,11 +211,11 @@ policy_rows.gym_policy_list <- function(policy, candidate) {
 act_batch.gym_policy_list_rows <- function(policy, observation, n, vector_env) {
   observed <- vector_env$observation_space
   actions <- Map(
-    function(candidate, rows) {
+    function(policy, rows) {
       own <- batch_rows(observed, observation, rows)
-      act_batch(policy$policies[[candidate]], own, length(rows), vector_env)
+      act_batch(policy, own, length(rows), vector_env)
     },
-    as.integer(names(policy$rows)), policy$rows
+    policy$policies, policy$rows
   )
   together <- bind_batches(vector_env$action_space, actions)
   batch_rows(vector_env$action_space, together, order(unlist(policy$rows)))

@@ -162,7 +162,7 @@ act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
 # The numbers of an observation with several dimensions are taken in the order in which R has them,
 # column after column, and the weights of the inputs are put into this order once.
 #' @exportS3Method
-policy_rows.gym_policy_network <- function(policy, candidate) {
+policy_rows.gym_policy_network <- function(policy, candidate, sub_env) {
   shape <- policy$observation_space$shape
   if (length(shape) > 1L && prod(shape) == policy$sizes[[1L]]) {
     by_row <- aperm(array(seq_len(prod(shape)), rev(shape)))

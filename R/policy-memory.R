@@ -1,0 +1,229 @@
+# Policies with a memory: what they saw or did before goes into what they do next.
+#
+# The package keeps the memory, a row for each sub-environment, so that episodes which are played
+# side by side do not see each other's, and each episode begins with the same one.
+
+#' Make a policy with a memory
+#'
+#' A policy that needs what it saw before: a PID controller, a moving average, a small recurrent
+#' network. The package keeps one memory for each episode and begins every episode with `initial`,
+#' so episodes never see each other's memory, however many are played side by side.
+#'
+#' Such a policy plays step by step from R, wherever [rollout()] and [evaluate_policy()] play:
+#' environments on a server, [environments in R][gym_env()], workers, and in a list with other
+#' policies. [saveRDS()] keeps it as it keeps a function.
+#'
+#' A plain function that remembers something by `<<-` is not enough: [rollout()] asks it about
+#' several episodes in one call, and one episode would begin with what the last one left.
+#' `rollout()` warns when it notices this.
+#'
+#' @param act A function of `observation` and `memory`. `observation` has many observations, as in
+#'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows: a
+#'   matrix when `initial` is a vector, a data frame when it is a list or a data frame. It returns
+#'   `list(action = , memory = )`: an action for each observation, and the new memory, with the
+#'   rows and columns that it was given.
+#' @param initial The memory at the beginning of an episode: a numeric vector (its names become
+#'   the names of columns), or a list or data frame of one row.
+#' @return A policy, of class `gym_policy_memory`. `act(policy, observation, memory)` returns the
+#'   list that the function returns; without `memory` it begins with `initial`.
+#' @section Errors: `gym_error_argument` when `act` is no such function or `initial` is no such
+#'   memory; from whatever plays the policy, when `act` does not return the list described above.
+#' @export
+#' @examples
+#' # A PID controller that holds the pole of CartPole upright.
+#' pid <- policy_memory(
+#'   function(observation, memory) {
+#'     error <- observation[, 3]
+#'     sum <- memory[, "sum"] + error
+#'     push <- 1 * error + 0.01 * sum + 10 * (error - memory[, "error"])
+#'     list(action = as.integer(push > 0), memory = cbind(error = error, sum = sum))
+#'   },
+#'   initial = c(error = 0, sum = 0)
+#' )
+#'
+#' # By hand: the memory goes from one call to the next.
+#' first <- act(pid, c(0, 0, 0.02, 0))
+#' act(pid, c(0, 0, 0.01, 0), first$memory)
+#' @examplesIf gym:::can_start_server()
+#'
+#' evaluate_policy("CartPole-v1", pid, episodes = 20, seed = 1)
+policy_memory <- function(act, initial) {
+  takes <- if (is.function(act)) names(formals(args(act)))
+  if (!is.function(act) || !"..." %in% takes && length(takes) < 2L) {
+    abort_argument(act, "a function of `observation` and `memory`", "act", rlang::current_env())
+  }
+  structure(
+    list(act = act, initial = initial_memory(initial, rlang::current_env())),
+    class = c("gym_policy_memory", "gym_policy")
+  )
+}
+
+# A matrix or a data frame of one row.
+initial_memory <- function(initial, call) {
+  memory <- if (is.list(initial)) {
+    tryCatch(
+      as.data.frame(initial, stringsAsFactors = FALSE, optional = TRUE),
+      error = function(cnd) NULL
+    )
+  } else if (is.vector(initial)) {
+    matrix(initial, nrow = 1L, dimnames = if (!is.null(names(initial))) list(NULL, names(initial)))
+  } else {
+    initial
+  }
+  if (!length(memory) || !identical(nrow(memory), 1L)) {
+    abort_argument(
+      initial, "the memory of one episode: a vector, or a list or data frame of one row", "initial",
+      call
+    )
+  }
+  memory
+}
+
+#' @export
+format.gym_policy_memory <- function(x, ...) {
+  kept <- colnames(x$initial) %||% count_of(ncol(x$initial), "value")
+  paste("with a memory of", paste(kept, collapse = ", "))
+}
+
+#' @rdname act
+#' @param memory For a [policy with a memory][policy_memory()]: what it returned as `memory` in the
+#'   step before.
+#' @export
+act.gym_policy_memory <- function(policy, observation, memory = NULL, ...) {
+  if (is.data.frame(observation)) {
+    observation <- as.matrix(observation)
+  } else if (is.atomic(observation) && is.null(dim(observation))) {
+    observation <- matrix(observation, 1L, dimnames = list(NULL, names(observation)))
+  }
+  n <- if (is.array(observation)) nrow(observation)
+  memory <- memory %||% fresh_memory(policy, n %||% 1L)
+  asked_with_memory(policy, observation, memory, rlang::current_env())
+}
+
+fresh_memory <- function(policy, n) policy$initial[rep(1L, n), , drop = FALSE]
+
+# What the function says, checked.
+asked_with_memory <- function(policy, observation, memory, call) {
+  said <- policy$act(observation, memory)
+  new <- if (is.list(said)) said[["memory"]]
+  if (is.null(new) || is.null(said[["action"]])) {
+    abort_memory(said, "a list of `action` and `memory`", call)
+  }
+  same <- identical(dim(new), dim(memory)) && is.data.frame(new) == is.data.frame(memory) &&
+    identical(colnames(new), colnames(memory))
+  if (!same) {
+    must <- paste0(
+      "a `memory` of ", size_text(memory), ", as it was given",
+      if (!is.null(colnames(memory))) paste0(" (", toString(colnames(memory)), ")")
+    )
+    abort_memory(new, must, call)
+  }
+  said[c("action", "memory")]
+}
+
+size_text <- function(memory) {
+  paste(count_of(nrow(memory), "row"), "and", count_of(ncol(memory), "column"))
+}
+
+abort_memory <- function(value, must, call) {
+  gym_abort(
+    c(paste0("`act` of a policy with a memory must return ", must, ", not ",
+             if (length(dim(value)) == 2L) size_text(value) else describe_argument(value), "."),
+      i = "An example: `list(action = as.integer(push > 0), memory = cbind(error, sum))`."),
+    class = "gym_error_argument", argument = "policy", value = value, call = call
+  )
+}
+
+# While it plays ---------------------------------------------------------------------------
+
+#' Give each sub-environment of a batch a memory
+#' @return The policy. One with a memory has `kept`, an environment with the `memory` of all
+#'   sub-environments.
+#' @noRd
+with_memory <- function(policy, num_envs) {
+  if (inherits(policy, "gym_policy_list")) {
+    policy_list(lapply(unclass(policy), with_memory, num_envs))
+  } else if (inherits(policy, "gym_policy_memory")) {
+    policy$kept <- rlang::env(memory = fresh_memory(policy, num_envs))
+    policy
+  } else {
+    policy
+  }
+}
+
+# Episodes begin in these sub-environments.
+begin_memory <- function(policy, sub_env) {
+  if (inherits(policy, "gym_policy_list")) {
+    lapply(unclass(policy), begin_memory, sub_env)
+  } else if (inherits(policy, "gym_policy_memory")) {
+    policy$kept$memory[sub_env, ] <- fresh_memory(policy, length(sub_env))
+  }
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_memory <- function(policy, candidate, sub_env) {
+  policy$sub_env <- sub_env
+  policy
+}
+
+#' @exportS3Method
+act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
+  kept <- policy$kept
+  if (is.null(kept)) {
+    gym_abort(
+      c("The policy has a memory, so what it does does not follow from an observation alone.",
+        i = "`rollout()` plays it, and `act(policy, observation, memory)` asks it by hand."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
+    )
+  }
+  rows <- policy$sub_env
+  said <- asked_with_memory(
+    policy, observation, kept$memory[rows, , drop = FALSE], vector_env$call
+  )
+  kept$memory[rows, ] <- said$memory
+  batch_actions(said$action, n, vector_env)
+}
+
+# Functions that remember ------------------------------------------------------------------
+
+#' Watch what a function keeps outside of itself
+#'
+#' @return A function that says which variables of the function's environment, or of the global one,
+#'   have changed since.
+#' @noRd
+watch_variables <- function(policy) {
+  used <- all.names(body(policy))
+  where <- environment(policy)
+  places <- list()
+  while (!is.null(where) && !isNamespace(where) && !identical(where, emptyenv())) {
+    places <- c(places, where)
+    if (identical(where, globalenv())) break
+    where <- parent.env(where)
+  }
+  state <- function() {
+    unlist(lapply(places, function(place) {
+      names <- intersect(used, names(place))
+      names <- names[!vapply(names, bindingIsActive, NA, env = place)]
+      vapply(Filter(may_remember, mget(names, place)), rlang::hash, "")
+    }))
+  }
+  before <- state()
+  function() {
+    after <- state()
+    setdiff(paste(names(after), after), paste(names(before), before)) |>
+      sub(pattern = " [^ ]*$", replacement = "")
+  }
+}
+
+# Objects that stand for something outside of R change for reasons of their own.
+may_remember <- function(x) !is.function(x) && !(is.environment(x) && is.object(x))
+
+warn_of_memory <- function(changed, call) {
+  rlang::warn(
+    c(paste0("The policy changes `", changed[[1L]], "` outside of itself from call to call: ",
+             "episodes that are played together, or one after the other, share it."),
+      i = "`policy_memory()` makes a policy with a memory for each episode."),
+    class = "gym_warning_memory", call = call, .frequency = "once",
+    .frequency_id = "gym_policy_changes_variables"
+  )
+}
