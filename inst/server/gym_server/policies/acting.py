@@ -19,8 +19,14 @@ class Actor:
 
     Attributes:
         act: takes an observation, or a batch of them, as the environment gives it, and returns an
-            action, or a batch of them, as the environment's ``step()`` takes it.
+            action, or a batch of them, as the environment's ``step()`` takes it once ``clip`` has
+            been applied.
+        clip: returns an action, or a batch of them, cut at the bounds of the action space; None
+            where ``act`` returns none beyond them. What is drawn without bounds is kept as it was
+            drawn: its probability is that of the number drawn.
     """
+
+    clip: Callable[[Any], Any] | None = None
 
     def __init__(self, act: Callable[[Any], Any], *draws: Draws | Actor) -> None:
         """Keep what acts, and where it takes its random numbers from."""

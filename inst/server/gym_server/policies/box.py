@@ -32,6 +32,27 @@ def box_actions(space: Box, stretched_from: str | None, rows: int | None) -> Cal
     return _of_many(space, low, high, stretched_from, () if rows is None else (rows,))
 
 
+def drawn_actions(space: Box, rows: int | None) -> Callable[[np.ndarray], Any]:
+    """Return a function from float64[numbers], or float64[rows, numbers], to unbounded actions."""
+    shape = space.shape if rows is None else (rows, *space.shape)
+
+    def choose(values: np.ndarray) -> Any:
+        flat = values.ravel()
+        # A sum of squares is not a number if one of them is none, and is found in one call.
+        squares = flat.dot(flat)
+        if squares != squares:
+            raise not_a_number()
+        return values.astype(space.dtype).reshape(shape)
+
+    return choose
+
+
+def clip_to_bounds(space: Box) -> Callable[[Any], Any]:
+    """Return a function that cuts an action, or a batch of them, at the space's bounds."""
+    low, high = space.low, space.high
+    return lambda action: np.minimum(np.maximum(action, low), high)
+
+
 def _bounds(space: Box) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat bounds of a Box as float64, none beyond the space's own."""
     low, high = (bound.ravel().astype(np.float64) for bound in (space.low, space.high))

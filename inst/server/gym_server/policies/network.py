@@ -11,7 +11,7 @@ from gymnasium.spaces import Box, Discrete
 
 from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.activation import of_number
-from gym_server.policies.box import box_actions
+from gym_server.policies.box import box_actions, clip_to_bounds, drawn_actions
 from gym_server.policies.discrete import DiscreteChoice, not_a_number
 from gym_server.policies.draws import normals
 from gym_server.policies.layers import Forward, forward
@@ -73,9 +73,10 @@ class NetworkPolicy(Policy):
 
     def _box_actor(self, space: Box, outputs: Forward, candidate: int | np.ndarray) -> Actor:
         rows = None if isinstance(candidate, int) else len(candidate)
-        choose = box_actions(space, self.plan.stretched_from, rows)
         if self.deviation is None:
+            choose = box_actions(space, self.plan.stretched_from, rows)
             return Actor(lambda observation: choose(outputs(observation).T))
+        choose = drawn_actions(space, rows)
         deviation = self.deviation[candidate]
         draws = normals(*deviation.shape)
         take = draws.take
@@ -86,7 +87,9 @@ class NetworkPolicy(Policy):
             noise += outputs(observation).T
             return choose(noise)
 
-        return Actor(act, draws)
+        actor = Actor(act, draws)
+        actor.clip = clip_to_bounds(space)
+        return actor
 
 
 def _checked(outputs: Forward) -> Forward:

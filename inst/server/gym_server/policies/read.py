@@ -141,4 +141,15 @@ class PolicyList(Policy):
                 together[candidate == one] = own[candidate == one]
             return together
 
-        return Actor(act, *actors.values())
+        of_rows = Actor(act, *actors.values())
+        clips = {one: actor.clip for one, actor in actors.items() if actor.clip is not None}
+        if clips:
+            of_rows.clip = lambda action: _clip_rows(action, candidate, clips)
+        return of_rows
+
+
+def _clip_rows(action: Any, candidate: np.ndarray, clips: dict[int, Callable[[Any], Any]]) -> Any:
+    clipped = np.array(action)
+    for one, clip in clips.items():
+        clipped[candidate == one] = clip(action[candidate == one])
+    return clipped

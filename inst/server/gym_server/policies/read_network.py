@@ -110,7 +110,9 @@ def _activation(document: Mapping, layers: int) -> tuple[str, ...]:
 
 
 def _output(document: Mapping, outputs: int, space: Box | Discrete) -> str:
-    names = ["greedy", "gaussian"] if isinstance(space, Box) else ["greedy", "epsilon-greedy"]
+    names = ["greedy"] if isinstance(space, Box) else ["greedy", "epsilon-greedy"]
+    if isinstance(space, Box) and space.dtype.kind == "f":
+        names.append("gaussian")
     if isinstance(space, Discrete) and outputs == space.n:
         names.append("softmax")
     output = document.get("output", "greedy")

@@ -40,7 +40,7 @@ def play_episode(
     progress = serve.progress
     actor.begin(seed)
     observation, _ = env.reset(seed=seed)
-    act, step = actor.act, env.step
+    act, clip, step = actor.act, actor.clip, env.step
     earned = 0.0
     length = 0
     terminated = truncated = False
@@ -48,6 +48,8 @@ def play_episode(
         action = act(observation)
         if recorder is not None:
             recorder.before(observation, action)
+        if clip is not None:
+            action = clip(action)
         observation, reward, terminated, truncated, _ = step(action)
         try:
             reward = float(reward)

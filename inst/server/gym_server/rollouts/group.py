@@ -45,13 +45,14 @@ def play_group(
     keeps = keep.moments or keep.steps
     actor.begin(unit.seed)
     observation, _ = env.reset(seed=unit.seed)
-    act, step = actor.act, env.step
+    act, clip, step = actor.act, actor.clip, env.step
     taken = 0
     left = len(rows)
     while left:
         action = act(observation)
         before = observation
-        observation, reward, terminated, truncated, _ = step(action)
+        stepped = action if clip is None else clip(action)
+        observation, reward, terminated, truncated, _ = step(stepped)
         taken += 1
         progress[0] += 1
         np.add(earned, reward, out=earned, where=running)

@@ -193,7 +193,7 @@ def test_epsilon_greedy_explores_as_often_as_told():
 
 
 @pytest.mark.parametrize("width", [2, 12])
-def test_gaussian_noise_is_added_to_the_outputs(width):
+def test_gaussian_noise_is_added_to_the_outputs_and_cut_at_the_bounds_when_stepped(width):
     deviation = np.linspace(0, 2, width)
     policy = network(
         [1, width], ["tanh"], box(1), box(width, 1.5), np.full((1, width), 0.5),
@@ -202,8 +202,10 @@ def test_gaussian_noise_is_added_to_the_outputs(width):
     actor = begun(policy, seed=4)
     noise = episode_generator(4).standard_normal((40, width))
     for row in noise:
-        wanted = np.clip(np.tanh(0.5) + deviation * row, -1.5, 1.5).astype(np.float32)
-        np.testing.assert_allclose(actor.act(np.ones(1, np.float32)), wanted, rtol=1e-6)
+        wanted = (np.tanh(0.5) + deviation * row).astype(np.float32)
+        drawn = actor.act(np.ones(1, np.float32))
+        np.testing.assert_allclose(drawn, wanted, rtol=1e-6)
+        np.testing.assert_array_equal(actor.clip(drawn), np.clip(drawn, -1.5, 1.5))
 
 
 def test_an_episode_is_drawn_from_its_seed_alone():
