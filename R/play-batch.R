@@ -50,6 +50,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = with_memory(policy, at_once), max_steps = max_steps,
     keep_steps = keep_steps, keep_next = keep_next, learner = learner, at_once = at_once,
+    clips = clips_actions(policy),
     moments = if (keep_moments) no_moments(), noted = list()
   )
   # Where all sub-environments must be reset together, they wait for each other after each episode.
@@ -116,7 +117,8 @@ play_episodes <- function(batch, first, last) {
     if (!is.null(changed) && playing$taken == 1L) {
       if (length(changed())) warn_of_memory(changed(), vector_env$call)
     }
-    out <- step(action, playing$rows$sub_env)
+    stepped <- if (batch$clips) clip_actions(vector_env$action_space, action) else action
+    out <- step(stepped, playing$rows$sub_env)
     if (!is.null(batch$learner)) {
       batch$learner$observe(transitions_of(batch, playing, action, out))
     }

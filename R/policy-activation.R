@@ -1,13 +1,11 @@
 # The activation functions of a network's layers.
 
-base_activations <- c("tanh", "logistic", "identity")
-sigmoid_activations <- c("Gompertz", "ReLU", "leakyReLU")
+activations <- c("tanh", "logistic", "identity", "Gompertz", "ReLU", "leakyReLU")
 
 layer_activations <- function(activation, sizes, call = rlang::caller_env()) {
   for (i in seq_along(activation)) {
     check_choice(
-      activation[[i]], c(base_activations, sigmoid_activations),
-      arg = paste0("activation[", i, "]"), call = call
+      activation[[i]], activations, arg = paste0("activation[", i, "]"), call = call
     )
   }
   layers <- length(sizes) - 1L
@@ -23,31 +21,31 @@ layer_activations <- function(activation, sizes, call = rlang::caller_env()) {
   if (length(activation) != layers) {
     activation <- c(rep(activation[[1L]], layers - 1L), activation[[2L]])
   }
-  check_sigmoid_installed(activation, call)
   activation
 }
 
-check_sigmoid_installed <- function(activation, call,
-                                    installed = requireNamespace("sigmoid", quietly = TRUE)) {
-  wanted <- intersect(activation, sigmoid_activations)
-  if (length(wanted) && !installed) {
-    gym_abort(
-      c(
-        paste0("The activation \"", wanted[[1L]], "\" comes from the package sigmoid, ",
-               "which is not installed."),
-        i = "Install it with `install.packages(\"sigmoid\")`, or take \"tanh\" or \"logistic\"."
-      ),
-      class = "gym_error_argument", argument = "activation", value = activation, call = call
-    )
-  }
-}
-
+# The formulas are those of the package sigmoid.
 activate <- function(x, activation) {
   switch(activation,
     tanh = tanh(x),
     logistic = stats::plogis(x),
     identity = x,
-    sigmoid::sigmoid(x, method = activation)
+    Gompertz = exp(-exp(-x)),
+    ReLU = pmax(x, 0),
+    leakyReLU = pmax(x, 0.01 * x)
+  )
+}
+
+# The derivative of an activation, which each of them gives by its output.
+activation_slope <- function(y, activation) {
+  switch(activation,
+    tanh = 1 - y * y,
+    logistic = y * (1 - y),
+    identity = 1,
+    # Far below the middle the output is 0, which has no logarithm.
+    Gompertz = -y * log(pmax(y, .Machine$double.xmin)),
+    ReLU = y > 0,
+    leakyReLU = ifelse(y > 0, 1, 0.01)
   )
 }
 

@@ -27,7 +27,7 @@ policy_candidates <- function(policy, weights) {
   }
   check_network(policy)
   weights <- plain_numbers(weights)
-  check_candidate_weights(weights, sum(lengths(policy$weights)))
+  check_candidate_weights(weights, count_weights(policy))
   storage.mode(weights) <- "double"
   new_candidates(policy, weights)
 }
@@ -141,6 +141,7 @@ policy_rows.gym_policy_candidates <- function(policy, candidate, sub_env) {
     function(from, to) policy$weights[candidate, from:to, drop = FALSE],
     c(0L, ends[-length(ends)]) + 1L, ends
   )
+  if (is_gaussian(network)) network$log_std <- policy$weights[candidate, -seq_len(max(ends))]
   structure(list(network = network, layers = layers), class = c("gym_policy_rows", "gym_policy"))
 }
 

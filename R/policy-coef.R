@@ -5,7 +5,8 @@
 #' [stats::optim()].
 #'
 #' The order is that in which [policy_network()] draws them: layer after layer, each matrix column
-#' after column, that is first the weights of the first input.
+#' after column, that is first the weights of the first input. Of a network with the output
+#' `"gaussian"` the logarithms of its standard deviations follow, one for each output.
 #'
 #' @param object A network, made by [policy_network()] or found by a search; or candidates, made
 #'   by [policy_candidates()].
@@ -55,7 +56,7 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
 `coef<-.gym_policy_network` <- function(object, ..., value) {
   check_dots_empty(...)
   check_network(object)
-  count <- sum(lengths(object$weights))
+  count <- count_weights(object)
   value <- plain_numbers(value)
   if (!is.numeric(value) || length(value) != count) {
     abort_argument(value, paste("a vector of", count_of(count, "number")), "value",

@@ -32,13 +32,20 @@ data_of_policy.gym_policy_candidates <- function(policy, env) {
 
 # `weights` has a row for each candidate.
 network_data <- function(policy, weights) {
+  of_layers <- sum(lengths(policy$weights))
   list(
-    document = list(
-      kind = "network", sizes = as.list(policy$sizes), activation = as.list(policy$activation),
-      bias = isTRUE(policy$bias), output = "greedy"
+    document = c(
+      list(
+        kind = "network", sizes = as.list(policy$sizes), activation = as.list(policy$activation),
+        bias = isTRUE(policy$bias), output = policy$output
+      ),
+      if (policy$output == "epsilon-greedy") policy["epsilon"]
     ),
     tensors = c(
-      list(weights = unname(weights)),
+      list(weights = unname(weights[, seq_len(of_layers), drop = FALSE])),
+      if (is_gaussian(policy)) {
+        list(deviation = unname(exp(weights[, -seq_len(of_layers), drop = FALSE])))
+      },
       if (!is.null(policy$moments$mean)) policy$moments[c("mean", "scale")]
     )
   )

@@ -203,6 +203,7 @@ predict_policy.gym_policy_features <- function(policy, newdata, type, call = rla
   if (type == "action") {
     return(act(policy, newdata))
   }
+  if (type == "probability") abort_no_probabilities(policy, call)
   observed <- observed_batch(newdata, policy$observation_space)
   linear_values(policy$basis, policy$weights, policy$basis$of(observed$batch, observed$n))
 }

@@ -218,6 +218,7 @@ act.gym_policy_model <- function(policy, observation, ...) {
 
 #' @exportS3Method
 predict_policy.gym_policy_model <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (type == "probability") abort_no_probabilities(policy, call)
   observed <- list(batch = newdata, one = FALSE)
   if (is.data.frame(newdata)) {
     columns <- as.list(narrow_values(newdata))

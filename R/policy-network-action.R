@@ -1,6 +1,9 @@
 # From a network's outputs to an action.
 
 network_action <- function(space, outputs, policy, one) {
+  if (is_gaussian(policy)) {
+    return(drawn_numbers(space, outputs, policy, one))
+  }
   if (inherits(space, "gym_space_box")) {
     box_action(space, outputs, policy, one)
   } else {
@@ -9,14 +12,42 @@ network_action <- function(space, outputs, policy, one) {
 }
 
 discrete_action <- function(space, outputs, policy) {
-  chosen <- if (ncol(outputs) > 1L) {
+  chosen <- if (identical(policy$output, "softmax")) {
+    draw_by_row(softmax_rows(outputs)) - 1L
+  } else if (ncol(outputs) > 1L) {
     max.col(outputs, ties.method = "first") - 1L
   } else if (is.null(space) || space$n > 1L) {
     as.integer(above_half(outputs[, 1L], output_activation(policy)))
   } else {
     integer(nrow(outputs))
   }
+  if (identical(policy$output, "epsilon-greedy")) {
+    # As the greedy ones are found: a single output chooses between two.
+    chosen <- explore(chosen, policy$epsilon, space$n %||% max(ncol(outputs), 2L))
+  }
   if (is.null(space)) chosen else chosen + as.integer(space$start)
+}
+
+# Draws any of `n` actions, from 0, in the place of some.
+explore <- function(chosen, epsilon, n) {
+  explores <- stats::runif(length(chosen)) < epsilon
+  chosen[explores] <- sample.int(n, sum(explores), replace = TRUE) - 1L
+  chosen
+}
+
+# Draws numbers around the outputs. They are cut at the bounds when the step is taken.
+drawn_numbers <- function(space, outputs, policy, one) {
+  # Candidates have a row each.
+  deviation <- exp(policy$log_std)
+  if (is.null(dim(deviation))) deviation <- rep(deviation, each = nrow(outputs))
+  values <- outputs + deviation * stats::rnorm(length(outputs))
+  numbers_in_shape(values, space, one)
+}
+
+numbers_in_shape <- function(values, space, one) {
+  own <- if (is.null(space)) ncol(values) else space$shape
+  shape <- if (one) own else c(nrow(values), own)
+  if (length(shape) > 1L) aperm(array(t(values), rev(shape))) else as.vector(values)
 }
 
 box_action <- function(space, outputs, policy, one) {
@@ -35,8 +66,50 @@ box_action <- function(space, outputs, policy, one) {
   if (space$dtype %in% integer_dtypes) {
     values <- round(values)
   }
-  shape <- if (one) space$shape else c(rows, space$shape)
-  if (length(shape) > 1L) aperm(array(t(values), rev(shape))) else as.vector(values)
+  numbers_in_shape(matrix(values, rows), space, one)
+}
+
+is_gaussian <- function(policy) identical(policy$output, "gaussian")
+
+draws_by_probability <- function(policy) policy$output %in% c("softmax", "gaussian", NA)
+
+# The policy that takes the most likely action, or that of the largest value.
+greedy_policy <- function(policy) {
+  if (!inherits(policy, "gym_policy_network")) {
+    return(policy)
+  }
+  if (is_gaussian(policy) && is.null(policy$action_space)) {
+    # It knows of no bounds, but that its actions are numbers.
+    outputs <- policy$sizes[[length(policy$sizes)]]
+    policy$action_space <- space_box(rep(-Inf, outputs), rep(Inf, outputs))
+  }
+  policy$output <- "greedy"
+  policy
+}
+
+# What is drawn without bounds is cut at those of the action space when it is stepped. A list of
+# policies may have one that draws so; what other policies of ours return is within the bounds.
+clips_actions <- function(policy) UseMethod("clips_actions")
+
+#' @exportS3Method
+clips_actions.default <- function(policy) FALSE
+
+#' @exportS3Method
+clips_actions.gym_policy_network <- function(policy) is_gaussian(policy)
+
+#' @exportS3Method
+clips_actions.gym_policy_candidates <- function(policy) is_gaussian(policy$policy)
+
+#' @exportS3Method
+clips_actions.gym_policy_list <- function(policy) any(vapply(unclass(policy), clips_actions, NA))
+
+#' Cut the numbers of a batch of actions at the bounds of their space
+#' @noRd
+clip_actions <- function(space, action) {
+  n <- if (is.null(dim(action))) length(action) else nrow(action)
+  low <- aperm(array(space$low, rev(space$shape)))
+  high <- aperm(array(space$high, rev(space$shape)))
+  pmin(pmax(action, rep(low, each = n)), rep(high, each = n))
 }
 
 output_activation <- function(policy) policy$activation[[length(policy$activation)]]

@@ -4,13 +4,21 @@
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
   env <- one_sub_env(env)
-  policy <- with_sizes_of(policy, env)
+  policy <- with_sizes_of(with_output_of(policy, env), env)
   check_inputs(policy, env, call)
   check_outputs(policy, env, call)
   check_network(policy, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy["env_id"] <- list(env$spec$id)
+  policy
+}
+
+# Fills in the output that is the environment's own.
+with_output_of <- function(policy, env) {
+  if (is.na(policy$output)) {
+    policy$output <- if (inherits(env$action_space, "gym_space_box")) "gaussian" else "softmax"
+  }
   policy
 }
 
@@ -30,16 +38,19 @@ with_sizes_of <- function(policy, env) {
   if (!anyNA(policy$sizes)) {
     return(policy)
   }
-  own <- c(space_width(env$observation_space) %||% NA, outputs_for(env$action_space) %||% NA)
+  own <- c(
+    space_width(env$observation_space) %||% NA, outputs_for(env$action_space, policy$output) %||% NA
+  )
   ends <- c(1L, length(policy$sizes))
   policy$sizes[ends] <- as.integer(ifelse(is.na(policy$sizes[ends]), own, policy$sizes[ends]))
   if (anyNA(policy$sizes)) {
     return(policy)
   }
+  policy <- with_deviations(policy)
   policy$weights <- if (is.null(policy$weights_seed)) {
     zero_weights(policy$sizes, policy$bias)
   } else {
-    with_generator(new_generator(policy$weights_seed), draw_weights(policy$sizes, policy$bias))
+    with_generator(new_generator(policy$weights_seed), draw_first_weights(policy))
   }
   policy$weights_seed <- NULL
   policy
@@ -82,7 +93,8 @@ check_outputs <- function(policy, env, call) {
     abort_fit(policy, paste("A network cannot choose from", format(space)), env, call)
   }
   discrete <- inherits(space, "gym_space_discrete")
-  rounded <- discrete && outputs == 1L && width == 2
+  check_output_fits(policy, env, call)
+  rounded <- discrete && outputs == 1L && width == 2 && policy$output != "softmax"
   if (outputs != width && !rounded) {
     takes <- if (discrete) "has" else "takes an action of"
     problem <- paste0(
@@ -93,6 +105,25 @@ check_outputs <- function(policy, env, call) {
   }
   if (!discrete && has_range(policy)) {
     check_bounded(policy, env, call)
+  }
+}
+
+check_output_fits <- function(policy, env, call) {
+  space <- env$action_space
+  discrete <- inherits(space, "gym_space_discrete")
+  fits <- switch(policy$output,
+    greedy = TRUE,
+    gaussian = !discrete && !space$dtype %in% integer_dtypes,
+    discrete
+  )
+  if (!fits) {
+    needs <- if (is_gaussian(policy)) "a Box of real numbers" else "a Discrete action space"
+    gym_abort(
+      c(paste0("The output \"", policy$output, "\" needs ", needs, ", but ",
+               environment_label(env), " takes actions of ", format(space), "."),
+        i = if (!discrete) "`output = \"gaussian\"` draws numbers."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
   }
 }
 
@@ -123,7 +154,7 @@ abort_fit <- function(policy, problem, env, call) {
 # The sizes that would fit, with the hidden layers left as they are.
 fitting_sizes <- function(policy, env) {
   inputs <- space_width(env$observation_space)
-  outputs <- outputs_for(env$action_space)
+  outputs <- outputs_for(env$action_space, policy$output)
   if (is.null(inputs) || is.null(outputs)) {
     return(NULL)
   }
@@ -132,10 +163,11 @@ fitting_sizes <- function(policy, env) {
   paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
 }
 
-# How many outputs a network gets for actions of this space: a single one chooses between two.
-outputs_for <- function(space) {
+# How many outputs a network gets for actions of this space: a single one chooses between two, but
+# where each action has a probability or a value of its own.
+outputs_for <- function(space, output = "greedy") {
   width <- space_width(space)
-  if (inherits(space, "gym_space_discrete") && width == 2) 1L else width
+  if (output == "greedy" && inherits(space, "gym_space_discrete") && width == 2) 1L else width
 }
 
 # How many inputs a network needs for an observation of this space, or outputs for an action of it.

@@ -26,6 +26,19 @@
 #' second of two actions where it is above 0, and the outputs are the numbers of a Box, cut at its
 #' bounds where it has some.
 #'
+#' Such a policy is greedy: the same observation gives the same action. Others draw, and their
+#' outputs are those of `"identity"`:
+#'
+#' - `output = "softmax"` draws an action of a Discrete space with a probability that is
+#'   proportional to `exp(output)`. There is an output for each action.
+#' - `output = "gaussian"` draws the numbers of a Box, each from a normal distribution around its
+#'   output. The standard deviations do not depend on what is observed; their logarithms, `log_std`,
+#'   are weights, the last ones of [coef()][coef.gym_policy_network]. What is drawn is cut at the
+#'   bounds of the Box when the step is taken, but kept as it was drawn, in the steps of a
+#'   [rollout()] too: that is the action whose probability [policy_log_prob()] gives.
+#' - `output = "epsilon-greedy"` draws any action with the probability `epsilon`, and otherwise
+#'   takes that with the largest output.
+#'
 #' # Observations
 #'
 #' A Box gives as many inputs as it has numbers (of an array: row by row, as
@@ -47,9 +60,9 @@
 #'   are not given are then drawn when it is first played, from a number that is drawn now.
 #' @param activation The activations' names: one of the hidden layers and one of
 #'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
-#'   each layer after the inputs. `"tanh"`, `"logistic"` and `"identity"` (what comes in goes out)
-#'   are computed with base R; `"Gompertz"`, `"ReLU"` and `"leakyReLU"` come from the package
-#'   sigmoid, which must then be installed.
+#'   each layer after the inputs: `"tanh"`, `"logistic"`, `"identity"` (what comes in goes out),
+#'   `"Gompertz"`, `"ReLU"` or `"leakyReLU"`. Where the output is not `"greedy"` the default is
+#'   `c("tanh", "identity")`.
 #' @param weights The weights: a list of matrices, one for each layer after the
 #'   inputs, with one row for each neuron of the layer and one column for each of
 #'   the layer before; with `bias = TRUE` one column more, the last, for the bias. `NULL`, the
@@ -57,17 +70,35 @@
 #' @param bias Is a number added to what each neuron sums up, its bias? `FALSE`, the default, or
 #'   `TRUE`.
 #' @param normalize Are observations normalised? `FALSE`, the default, or `TRUE`, see below.
+#' @param output How an action is made of the outputs, a string: `"greedy"`, the default,
+#'   `"softmax"`, `"gaussian"` or `"epsilon-greedy"`, see below. `NA` stands for the environment's
+#'   own: softmax for a Discrete action space, gaussian for a Box.
+#' @param log_std The natural logarithm of the standard deviations that `"gaussian"` begins with, a
+#'   number, or one for each output; the default is 0, a standard deviation of 1.
+#' @param epsilon How often `"epsilon-greedy"` draws any action, a number from 0 to 1; the default
+#'   is 0.1.
+#' @param init How the first weights are drawn, a string: `"uniform"`, the default, between -1 and
+#'   1; or `"orthogonal"`, in layers whose rows (or columns, where these are fewer) stand at right
+#'   angles and have the length sqrt(2), of the outputs 1, and 0.01 where actions are drawn by their
+#'   probability; biases are 0 then (Saxe, McClelland and Ganguli 2014; Andrychowicz et al. 2021).
 #' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and
 #'   [search_random()]; a list with the elements `sizes` (integers), `activation`
 #'   (strings, one for each layer), `weights` (a list of matrices), `bias` (a logical), `moments`
-#'   (`NULL`, or a list of `count`, `mean`, `squares` and `scale`, of the observations),
+#'   (`NULL`, or a list of `count`, `mean`, `squares` and `scale`, of the observations), `output`
+#'   and `init` (strings), `log_std` (numbers, which only `"gaussian"` uses), `epsilon` (a number),
 #'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
 #'   string), all `NULL` until it is played.
 #' @section Errors: `gym_error_argument` when sizes, activations and weights do not
-#'   fit each other, or a package is missing; from [act()] when the observation
+#'   fit each other; from [act()] when the observation
 #'   does not have as many numbers as there are inputs.
 #' @references The network and the way its weights are drawn are those of the tutorial,
 #'   whose code computes the activations with the package sigmoid.
+#'
+#'   A. M. Saxe, J. L. McClelland and S. Ganguli (2014), Exact solutions to the nonlinear dynamics
+#'   of learning in deep linear neural networks, ICLR.
+#'
+#'   M. Andrychowicz et al. (2021), What matters for on-policy deep actor-critic methods? A
+#'   large-scale study, ICLR.
 #' @seealso [plot()][plot.gym_policy_network()] draws a network, [decision_map()] what it
 #'   does; [policy_random()].
 #' @export
@@ -81,13 +112,23 @@
 #' # The weights may be given, and need not be random: this one follows the pole.
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 1), nrow = 1)))
 #' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
-policy_network <- function(sizes = c(4, 2, 1), activation = c("tanh", "logistic"),
-                           weights = NULL, bias = FALSE, normalize = FALSE) {
+policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL, bias = FALSE,
+                           normalize = FALSE, output = "greedy", log_std = 0, epsilon = 0.1,
+                           init = "uniform") {
   sizes <- check_sizes(sizes)
   check_flag(bias)
   check_flag(normalize)
+  output <- check_output(output)
+  activation <- activation %||% c("tanh", if (identical(output, "greedy")) "logistic" else "identity")
   activation <- layer_activations(activation, sizes)
+  check_draws_from_sums(output, activation)
+  check_number(epsilon, min = 0, max = 1)
   policy <- new_network(sizes, activation, bias, normalize)
+  policy$output <- output
+  policy$log_std <- check_log_std(log_std)
+  policy$epsilon <- epsilon
+  policy$init <- check_choice(init, c("uniform", "orthogonal"))
+  if (!anyNA(sizes)) policy <- with_deviations(policy)
   weights <- narrow_values(weights, function(x) plain_numbers(x, "weights"))
   if (!is.null(weights)) {
     check_weights_fit(weights, policy)
@@ -106,6 +147,10 @@ new_network <- function(sizes, activation, bias, normalize) {
       weights = NULL,
       bias = bias,
       moments = if (normalize) no_moments(),
+      output = "greedy",
+      log_std = 0,
+      epsilon = 0,
+      init = "uniform",
       observation_space = NULL,
       action_space = NULL,
       env_id = NULL
@@ -125,6 +170,43 @@ check_weights_fit <- function(weights, policy, call = rlang::caller_env()) {
   check_weights(weights, policy$sizes, policy$bias, call = call)
 }
 
+check_output <- function(output, call = rlang::caller_env()) {
+  if (length(output) == 1L && is.na(output)) {
+    return(NA_character_)
+  }
+  check_choice(output, c("greedy", "softmax", "gaussian", "epsilon-greedy"), "output", call)
+}
+
+check_draws_from_sums <- function(output, activation, call = rlang::caller_env()) {
+  last <- activation[[length(activation)]]
+  if (!identical(output, "greedy") && last != "identity") {
+    gym_abort(
+      c(paste0("Outputs that actions are drawn from are those of \"identity\", not of \"", last,
+               "\"."),
+        i = "`activation = c(\"tanh\", \"identity\")` gives hidden layers a range, and outputs none."),
+      class = "gym_error_argument", argument = "activation", value = activation, call = call
+    )
+  }
+}
+
+check_log_std <- function(log_std, call = rlang::caller_env()) {
+  log_std <- plain_numbers(log_std, "log_std", call)
+  if (!is.numeric(log_std) || !length(log_std) || !all(is.finite(log_std))) {
+    abort_argument(log_std, "a finite number, or one for each output", "log_std", call)
+  }
+  as.numeric(log_std)
+}
+
+# One standard deviation for each output.
+with_deviations <- function(policy, call = rlang::caller_env()) {
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  if (!length(policy$log_std) %in% c(1L, outputs)) {
+    must <- paste("one number, or one for each of", count_of(outputs, "output"))
+    abort_argument(policy$log_std, must, "log_std", call)
+  }
+  policy$log_std <- rep_len(policy$log_std, outputs)
+  policy
+}
 
 # The first and the last may be `NA`: then they are the environment's own.
 check_sizes <- function(sizes, call = rlang::caller_env()) {
@@ -146,8 +228,10 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
 # From an observation to an action -------------------------------------------------
 
 #' @export
-act.gym_policy_network <- function(policy, observation, ...) {
+act.gym_policy_network <- function(policy, observation, draw = TRUE, ...) {
   check_network(policy)
+  check_flag(draw)
+  if (!draw) policy <- greedy_policy(policy)
   rows <- observation_rows(observation, policy$observation_space)
   outputs <- network_outputs(policy, rows$values)
   network_action(policy$action_space, outputs, policy, rows$one)
@@ -235,18 +319,21 @@ policy_resample.gym_policy_network <- function(policy, call = rlang::caller_env(
     # What is drawn when the sizes are known follows from this number.
     policy$weights_seed <- draw_seed()
   } else {
-    policy$weights <- draw_weights(policy$sizes, policy$bias)
+    policy$weights <- draw_first_weights(policy)
   }
   policy
 }
 
 #' @export
 format.gym_policy_network <- function(x, ...) {
-  weights <- if (!is.null(x$weights)) count_of(sum(lengths(x$weights)), "weight")
+  weights <- if (!is.null(x$weights)) count_of(count_weights(x), "weight")
+  output <- if (!identical(x$output, "greedy")) {
+    c(x$output, if (identical(x$output, "epsilon-greedy")) paste("epsilon", number_text(x$epsilon)))
+  }
   paste(
     c(
       paste("network", sizes_text(x$sizes)), x$activation, if (isTRUE(x$bias)) "bias",
-      if (!is.null(x$moments)) "normalized observations", weights
+      if (!is.null(x$moments)) "normalized observations", output[!is.na(output)], weights
     ),
     collapse = ", "
   )

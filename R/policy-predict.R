@@ -3,11 +3,13 @@
 #' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
 #'   a data frame, such as the steps of a [rollout()], with a column for each number of an
 #'   observation under its name there.
-#' @param type `"action"`, the default, for the policy's actions, or `"output"` for the outputs of
-#'   the network, or the predictions of the model, that they follow from.
+#' @param type `"action"`, the default, for the policy's actions, of one that draws the most likely
+#'   ones; `"output"` for the outputs of the network, or the predictions of the model, that they
+#'   follow from; or `"probability"` for how likely each action is, of a network with the output
+#'   `"softmax"` or `"epsilon-greedy"`, or a table.
 #' @export
-predict.gym_policy <- function(object, newdata, type = c("action", "output"), ...) {
-  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+predict.gym_policy <- function(object, newdata, type = c("action", "output", "probability"), ...) {
+  type <- check_choice(type[1L], c("action", "output", "probability"), arg = "type")
   predict_policy(object, newdata, type)
 }
 
@@ -28,11 +30,39 @@ predict_policy.default <- function(policy, newdata, type, call = rlang::caller_e
 predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlang::caller_env()) {
   observation <- observations_from(newdata, policy, call)
   if (type == "action") {
-    return(act(policy, observation))
+    return(act(policy, observation, draw = FALSE))
   }
+  check_network(policy, call)
   values <- observation_rows(observation, policy$observation_space)$values
   outputs <- network_outputs(policy, values, call)
+  if (type == "probability") {
+    return(output_probabilities(policy, outputs, call))
+  }
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
+}
+
+# How likely each action is, a row for each row of outputs.
+output_probabilities <- function(policy, outputs, call) {
+  if (identical(policy$output, "softmax")) {
+    return(softmax_rows(outputs))
+  }
+  if (!identical(policy$output, "epsilon-greedy")) {
+    abort_no_probabilities(policy, call)
+  }
+  n <- policy$action_space$n %||% max(ncol(outputs), 2L)
+  p <- matrix(policy$epsilon / n, nrow(outputs), n)
+  best <- cbind(seq_len(nrow(outputs)), discrete_action(NULL, outputs, greedy_policy(policy)) + 1L)
+  p[best] <- p[best] + 1 - policy$epsilon
+  p
+}
+
+abort_no_probabilities <- function(policy, call) {
+  gym_abort(
+    c(paste0("Only a policy that draws one of several actions has their probabilities, not ",
+             policy_text(policy), "."),
+      i = "`policy_network(output = \"softmax\")` makes one."),
+    class = "gym_error_argument", argument = "type", value = "probability", call = call
+  )
 }
 
 # The observations in a data frame: the columns with their names, or all columns where it has none

@@ -55,7 +55,8 @@ predict_policy.gym_policy_table <- function(policy, newdata, type, call = rlang:
   }
   # The output is a value for each action.
   observed <- observed_batch(newdata, states_of(policy))
-  table_rows(policy, observed$batch, observed$n)
+  rows <- table_rows(policy, observed$batch, observed$n)
+  if (type == "probability") row_probabilities(policy, rows) else rows
 }
 
 # What a table has rows for.

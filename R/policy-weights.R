@@ -8,10 +8,33 @@ weight_shapes <- function(sizes, bias) {
 
 # The weights are drawn in the order of the tutorial: first the matrix of the hidden layer, then
 # the weights of the output.
-draw_weights <- function(sizes, bias = FALSE) {
-  lapply(weight_shapes(sizes, bias), function(shape) {
+draw_weights <- function(sizes, bias = FALSE, init = "uniform", last_gain = 1) {
+  shapes <- weight_shapes(sizes, bias)
+  if (init == "orthogonal") {
+    gain <- c(rep(sqrt(2), length(shapes) - 1L), last_gain)
+    return(Map(function(shape, gain) draw_orthogonal(shape, gain, bias), shapes, gain))
+  }
+  lapply(shapes, function(shape) {
     matrix(stats::runif(prod(shape), -1, 1), shape[[1L]], shape[[2L]])
   })
+}
+
+# Saxe, McClelland and Ganguli (2014): rows, or columns where these are fewer, of length `gain` that
+# stand at right angles; biases are 0.
+draw_orthogonal <- function(shape, gain, bias) {
+  neurons <- shape[[1L]]
+  inputs <- shape[[2L]] - isTRUE(bias)
+  normal <- matrix(stats::rnorm(neurons * inputs), max(neurons, inputs))
+  parts <- qr(normal, LAPACK = FALSE)
+  signs <- sign(diag(as.matrix(qr.R(parts))))
+  basis <- qr.Q(parts) * rep(signs, each = nrow(normal))
+  cbind(gain * if (neurons >= inputs) basis else t(basis), if (isTRUE(bias)) numeric(neurons))
+}
+
+# Where actions are drawn the first ones are nearly as likely as each other.
+draw_first_weights <- function(policy) {
+  last_gain <- if (draws_by_probability(policy)) 0.01 else 1
+  draw_weights(policy$sizes, policy$bias, policy$init, last_gain)
 }
 
 zero_weights <- function(sizes, bias) {
@@ -65,12 +88,21 @@ check_layer <- function(layer, wanted, bias, arg, call) {
   }
 }
 
-# The weights as one vector, layer after layer, each matrix column after column.
-weight_vector <- function(policy) unlist(lapply(policy$weights, as.vector))
+# The weights as one vector, layer after layer, each matrix column after column; at last the
+# logarithms of standard deviations, where the policy has such.
+weight_vector <- function(policy) {
+  c(unlist(lapply(policy$weights, as.vector)), if (is_gaussian(policy)) policy$log_std)
+}
 
 with_weights <- function(policy, weights) {
-  policy$weights <- utils::relist(weights, policy$weights)
+  of_layers <- sum(lengths(policy$weights))
+  policy$weights <- utils::relist(weights[seq_len(of_layers)], policy$weights)
+  if (is_gaussian(policy)) policy$log_std <- weights[-seq_len(of_layers)]
   policy
+}
+
+count_weights <- function(policy) {
+  sum(lengths(policy$weights)) + if (is_gaussian(policy)) length(policy$log_std) else 0L
 }
 
 # "4-2-1", and "*" for a size that is the environment's own.

@@ -22,7 +22,10 @@
 #' row, an array, or a list of these for the parts. [rollout()] asks it about a single one
 #' before the first step, so that a function which cannot answer that fails at once.
 #'
-#' `predict()` gives the same actions, or the outputs that they follow from, for observations in a
+#' A policy that draws, such as a [policy_network()] with the output `"softmax"`, draws from R's
+#' generator, too; `draw = FALSE` gives its most likely action instead.
+#'
+#' `predict()` gives the same actions (where the policy draws the most likely ones), or the outputs that they follow from, for observations in a
 #' data frame, too. It never touches R's generator.
 #'
 #' # Saving policies
@@ -39,13 +42,16 @@
 #'   dimension more, the first; where they are single whole numbers, many of them
 #'   are an integer vector. A function knows of no space: to it a vector is always
 #'   passed as a matrix of one row.
+#' @param draw Does a network that draws its actions draw? `TRUE`, the default, or `FALSE` for the
+#'   most likely action, or that of the largest value.
 #' @param ... For methods.
 #' @return For one observation one action: a whole number for a discrete action
 #'   space, a numeric vector (or array) in the shape of the space for a Box. For
 #'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
 #'   (an array with `n` as its first dimension). `predict()` returns the same, and with
 #'   `type = "output"` a numeric vector of length `n` (a matrix with `n` rows where the network has
-#'   several outputs).
+#'   several outputs), with `type = "probability"` a matrix with a row for each observation and a
+#'   column for each action.
 #' @section Errors: `gym_error_argument` when `policy` is no policy, the observation
 #'   does not have as many numbers as the policy takes, or a function does not return one
 #'   action for one observation; from `predict()` also when the policy is no network.

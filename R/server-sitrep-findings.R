@@ -14,7 +14,7 @@ sitrep_versions <- function() {
 # Packages that only some functions need.
 suggested_packages <- c(
   ggplot2 = "autoplot()", magick = "animate()", png = "frames of rollouts",
-  sigmoid = "activations such as ReLU", bit64 = "integers beyond 2^53"
+  sigmoid = "the scripts of the tutorial", bit64 = "integers beyond 2^53"
 )
 
 sitrep_suggested <- function(packages = suggested_packages) {

@@ -39,13 +39,13 @@
 #'   of your own, see [agent_ask()].
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy whose weights are to be found: a network, by default
-#'   [policy_linear()]. Most agents begin with the weights that it has. A learner such as
+#'   [policy_linear()], or the one that an agent's help page tells. Most agents begin with the weights that it has. A learner such as
 #'   [agent_q()] makes a policy of its own, and may begin with a [policy_table()] of values.
 #' @param iterations,total_steps After how many iterations, or steps of the environment, to end,
 #'   whole numbers of at least 1. The iteration in which the steps are used up is played to its end.
 #'   One of the two must be given.
 #' @param episodes How many episodes each candidate, or the learner, plays in an iteration, a whole
-#'   number of at least 1; the default is 1.
+#'   number of at least 1; the default is 1. Agents that follow gradients choose it themselves.
 #' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
 #'   environment's own, where it has one; `Inf` goes on until the budget is used up.
 #' @param max_steps After how many steps to cut an episode short, as for [rollout()].
@@ -53,6 +53,10 @@
 #'   least 1; the default is 10.
 #' @param eval_episodes How many episodes decide whether training ends, and make the final
 #'   evaluation, a whole number of at least 2; the default is 100.
+#' @param evaluate How evaluations play a network that draws its actions, as agents that follow
+#'   gradients have: `"greedy"`, the default, by its most likely actions, or `"draw"`, as it is. The
+#'   same policy decides when training ends, is evaluated at the end, and is returned. Training
+#'   plays the agent's [behavior policy][agent_behavior()].
 #' @param seed A whole number that fixes all that is drawn, as for [rollout()].
 #' @param seeds `NULL`, the default, or different whole numbers: then the agent is trained anew with
 #'   each of them, and all trainings are returned. Each is the one that `train_agent(seed = )` gives
@@ -82,15 +86,17 @@
 #'   [plot()][plot.gym_training()], [predict()], [coef()], [animate()] and [provenance()] know; with
 #'   `seeds` one of class [gym_trainings]. A training is a list with the elements
 #'   \describe{
-#'     \item{policy}{The agent's policy, with the weights that it has at the end.}
+#'     \item{policy}{The agent's policy, with the weights that it has at the end, as it was
+#'       evaluated; `agent_policy(training$agent)` draws, where the agent's policy does.}
 #'     \item{agent}{The agent as it is at the end.}
 #'     \item{solved}{Whether a stopping evaluation, or a round by the tutorial's rule, has reached
 #'       the target, a logical.}
 #'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps`
 #'       (those of the training so far, double), `min_return`, `median_return`, `mean_return`,
-#'       `max_return` (of the candidates' mean returns, double), `mean_length` (of
-#'       their episodes, in steps), `evaluation` (the mean return of the agent's policy, `NA` where
-#'       it was not looked at) and `elapsed` (seconds, `NA` for the rounds of a search).}
+#'       `max_return` (of the candidates' mean returns, or of the returns where the agent learns
+#'       from steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean return of the agent's policy, `NA` where
+#'       it was not looked at), `elapsed` (seconds, `NA` for the rounds of a search) and what
+#'       [agent_log()] gives.}
 #'     \item{evaluations}{A data frame with a row for each evaluation: `iteration`, `kind`
 #'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
 #'       `mean_return` on.}
@@ -119,7 +125,8 @@
 #' trained$final
 train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_steps = NULL,
                         episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
-                        eval_episodes = 100, seed = NULL, seeds = NULL, ...,
+                        eval_episodes = 100, evaluate = c("greedy", "draw"), seed = NULL,
+                        seeds = NULL, ...,
                         solved_by = c("evaluation", "candidate"), callback = NULL, log = NULL,
                         checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
                         num_envs = NULL, num_workers = NULL, client = gym_client()) {
@@ -132,9 +139,10 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   settings <- list(
     agent = agent, env = env, kwargs = kwargs,
     # A learner makes its own.
-    policy = policy %||% if (!online) policy_linear(),
+    policy = policy %||% if (!online) default_policy(agent),
     iterations = iterations, total_steps = total_steps, episodes = episodes, target = target,
-    max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes, seed = seed,
+    max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes,
+    evaluate = check_choice(evaluate[1L], c("greedy", "draw"), arg = "evaluate"), seed = seed,
     callback = callback,
     # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
     search = solved_by == "candidate"

@@ -5,7 +5,9 @@
 #' training asks of it. Each returns a value and changes nothing else, so that an agent can be kept
 #' in a file and go on from there. What is drawn is drawn from R's generator, which training sets.
 #'
-#' An iteration is: ask, play each candidate, tell.
+#' An iteration is: ask, play each candidate, tell. An agent that follows a gradient has one
+#' candidate, the policy that it behaves by, and needs the trajectories;
+#' [policy_log_prob_gradient()] is what it climbs.
 #'
 #' @param agent The agent.
 #' @param policy The policy whose weights it finds, fitted to the environment: a network, see
@@ -17,15 +19,19 @@
 #'     \item{lengths}{The mean lengths of their episodes, in steps, a numeric vector.}
 #'     \item{moments}{The moments of all observations in these episodes, where the agent needs them;
 #'       else `NULL`.}
-#'     \item{trajectories}{Each step of these episodes, where the agent needs them: a data frame as
-#'       `rollout(steps = TRUE, next_observation = TRUE)` has it for several policies.}
+#'     \item{trajectories}{Each step of these episodes, where the agent needs them, one episode's
+#'       after the other's: a list with an element (or a row) for each step: `candidate`, `episode`
+#'       (integers), `observation`, `action` (as [act()] takes and returns them, for many), `reward`
+#'       (double), `terminated`, `truncated` (logical; of an episode that `max_steps` cuts short the
+#'       last step is truncated) and `next_observation`.}
 #'   }
 #' @return
 #' * `agent_start()`: the agent as it is before its first iteration. The method of `"gym_agent"`
 #'   keeps the policy as `agent$policy`.
 #' * `agent_ask()`: the candidates to play next, a numeric matrix with the weights of a candidate in
 #'   each row, in the order of [coef()][coef.gym_policy_network]. What the agent wants to know again
-#'   when it is told the results may be attributes of the matrix.
+#'   when it is told the results may be attributes of the matrix. The method of `"gym_agent"` asks
+#'   for the weights of `agent_behavior()`.
 #' * `agent_tell()`: the agent, wiser. The method of `"gym_agent"` merges the moments of the
 #'   observations into those of `agent$policy`; a method begins with `agent <- NextMethod()` where
 #'   observations may be normalised.
@@ -34,6 +40,14 @@
 #'   `"moments"` where its policy has `normalize = TRUE`.
 #' * `agent_policy()`: the policy with the agent's current weights, which need not be those of the
 #'   best candidate. The method of `"gym_agent"` returns `agent$policy`.
+#' * `agent_behavior()`: the policy whose candidates are played, the book's behavior policy. The
+#'   method of `"gym_agent"` returns `agent_policy(agent)`. Where it is no network, as a
+#'   [policy_random()] is none, it is played itself, and `agent_ask()` is not called.
+#' * `agent_episodes()`: how many episodes each candidate plays in this iteration. The method of
+#'   `"gym_agent"` returns `episodes`, as [train_agent()] was given them.
+#' * `agent_log()`: what the history and the log keep of the last iteration, a numeric vector whose
+#'   names are always the same. The method of `"gym_agent"` returns none.
+#' @param episodes How many episodes [train_agent()] was asked to play with each candidate.
 #' @export
 #' @examples
 #' # Steps in a random direction, kept where they are no worse.
@@ -68,6 +82,18 @@ agent_policy <- function(agent) UseMethod("agent_policy")
 
 #' @rdname agent_start
 #' @export
+agent_behavior <- function(agent) UseMethod("agent_behavior")
+
+#' @rdname agent_start
+#' @export
+agent_episodes <- function(agent, episodes) UseMethod("agent_episodes")
+
+#' @rdname agent_start
+#' @export
+agent_log <- function(agent) UseMethod("agent_log")
+
+#' @rdname agent_start
+#' @export
 agent_needs <- function(agent) UseMethod("agent_needs")
 
 #' @export
@@ -90,7 +116,25 @@ agent_tell.gym_agent <- function(agent, results) {
 }
 
 #' @export
+agent_ask.gym_agent <- function(agent) rbind(stats::coef(agent_behavior(agent)))
+
+#' @export
 agent_policy.gym_agent <- function(agent) agent$policy
+
+#' @export
+agent_behavior.gym_agent <- function(agent) agent_policy(agent)
+
+#' @export
+agent_episodes.gym_agent <- function(agent, episodes) episodes
+
+#' @export
+agent_log.gym_agent <- function(agent) numeric()
+
+# What an agent learns where no policy is given.
+default_policy <- function(agent) UseMethod("default_policy")
+
+#' @exportS3Method
+default_policy.gym_agent <- function(agent) policy_linear()
 
 #' @export
 print.gym_agent <- function(x, ...) {

@@ -117,6 +117,7 @@ training_arguments <- function(settings) {
       policy = comparable_policy(settings$policy, settings$agent)
     ),
     if (settings$search) list(rounds = settings$iterations),
+    settings["evaluate"],
     lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
 }

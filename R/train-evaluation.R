@@ -37,7 +37,7 @@ training_ends <- function(state, vector_env, settings) {
 #' @return A row of the training's evaluations.
 #' @noRd
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
-  policy <- agent_policy(state$agent)
+  policy <- judged_policy(settings, state$agent)
   final <- kind == "final"
   exact <- if (!is.null(settings$model)) {
     evaluate_exactly(settings$model, policy, settings$max_steps)
@@ -50,6 +50,13 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
     state$history[[state$iteration]]$evaluation <- row$mean_return
   }
   row
+}
+
+# The policy that is evaluated and returned. By the tutorial's rule a candidate was judged as it is.
+judged_policy <- function(settings, agent) {
+  policy <- agent_policy(agent)
+  greedy <- !settings$search && identical(settings$evaluate, "greedy")
+  if (greedy) greedy_policy(policy) else policy
 }
 
 play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {

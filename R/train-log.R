@@ -23,7 +23,10 @@ log_lines <- function(state, iterations) {
     round(rows$steps / pmax(rows$elapsed, 1e-3)), rows$mean_return, rows$min_return,
     rows$median_return, rows$max_return, rows$mean_length, evaluated$mean_return, length
   )
-  csv_lines(rlang::set_names(table, log_columns))
+  of_agent <- setdiff(names(rows), names(no_iterations))
+  csv_lines(rlang::set_names(
+    cbind(table, rows[of_agent]), c(log_columns, paste0("train/", of_agent, recycle0 = TRUE))
+  ))
 }
 
 # Numbers with as many digits as they need and without an exponent, and nothing for `NA`.

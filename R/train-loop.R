@@ -80,13 +80,12 @@ train_iteration <- function(state, vector_env, settings, call) {
   }
   agent <- state$agent
   if (settings$search) agent$candidates <- rounds_together(state, vector_env, settings)
-  asked <- with_generator(state$streams$agent, agent_ask(agent))
-  policy <- agent_policy(agent)
-  asked <- plain_numbers(asked, "agent_ask()", call)
   needs <- agent_needs(agent)
-  check_asked(asked, needs, policy, call)
-  candidates <- policy_candidates(policy, asked)
-  history <- new_history(nrow(asked), settings$episodes, state$streams)
+  check_needs(needs, call)
+  asked <- asked_candidates(state, agent, call)
+  candidates <- asked$candidates
+  episodes <- agent_episodes(agent, settings$episodes)
+  history <- new_history(count_candidates(candidates) %||% 1L, episodes, state$streams)
   if (!settings$search) history$draw_seeds <- draw_training_seeds
   play_batches(
     vector_env, history, function(which) policy_subset(candidates, which),
@@ -97,15 +96,36 @@ train_iteration <- function(state, vector_env, settings, call) {
     keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
     keep_next = "trajectories" %in% needs
   )
-  results <- candidate_results(history, asked, call)
+  results <- candidate_results(history, asked$weights, call)
   if ("trajectories" %in% needs) {
     results$trajectories <- played_trajectories(history, vector_env)
   }
+  steps <- round(results$lengths * history$episodes)
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
-  steps <- round(results$lengths * settings$episodes)
   episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
+  if ("trajectories" %in% needs) results[c("returns", "lengths")] <- episode_results(history)
   enter_iteration(state, settings, agent, results, steps, episodes)
+}
+
+# What plays an iteration: candidates, networks with the weights that the agent asks for; or the
+# behavior policy itself where it has no weights.
+asked_candidates <- function(state, agent, call) {
+  policy <- agent_behavior(agent)
+  if (!inherits(policy, "gym_policy_network")) {
+    return(list(candidates = policy))
+  }
+  asked <- with_generator(state$streams$agent, agent_ask(agent))
+  asked <- plain_numbers(asked, "agent_ask()", call)
+  check_asked(asked, policy, call)
+  list(candidates = policy_candidates(policy, asked), weights = asked)
+}
+
+# An agent that learns from steps is told by its episodes, not by the means of candidates.
+episode_results <- function(history) {
+  lapply(c("return", "length"), function(name) {
+    unlist(lapply(history$batches, `[[`, name))
+  })
 }
 
 # As many rounds of a search are played side by side as a batch of episodes has room for.
@@ -132,9 +152,10 @@ enter_iteration <- function(state, settings, agent, results, steps, episodes = N
     episodes$candidate <- episodes$candidate + state$iteration
   } else {
     elapsed <- proc.time()[["elapsed"]] - state$started
-    history <- list(history_row(
+    row <- history_row(
       state$iteration + 1L, state$steps + sum(steps), results$returns, results$lengths, elapsed
-    ))
+    )
+    history <- list(c(row, as.list(agent_log(agent))))
   }
   last <- history[[length(history)]]
   suspendInterrupts({
@@ -161,7 +182,7 @@ check_is_agent <- function(agent, method, call) {
   }
 }
 
-check_asked <- function(asked, needs, policy, call) {
+check_asked <- function(asked, policy, call) {
   count <- length(stats::coef(policy))
   if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
     must <- paste("a numeric matrix with", count_of(count, "column"))
@@ -170,6 +191,9 @@ check_asked <- function(asked, needs, policy, call) {
   if (!all(is.finite(asked))) {
     abort_agent(asked, "agent_ask()", "finite numbers", call)
   }
+}
+
+check_needs <- function(needs, call) {
   known <- c("returns", "moments", "trajectories")
   if (!is.character(needs) || !all(needs %in% known)) {
     must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
@@ -184,10 +208,32 @@ abort_agent <- function(value, method, must, call) {
   )
 }
 
-# The steps of all candidates, as a rollout of them has them.
+# The steps of all candidates as rows, episode after episode.
 played_trajectories <- function(history, vector_env) {
-  episodes <- episodes_table(history$batches, several = TRUE)
-  steps_table(history$batches, episodes, vector_env, several = TRUE, next_observation = TRUE)
+  batches <- history$batches
+  steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
+  row <- step_rows(batches)
+  # Step by step the episodes were played side by side.
+  mixed <- is.unsorted(row)
+  order <- if (mixed) order(row, method = "radix") else seq_along(row)
+  row <- row[order]
+  each <- function(name) lapply(steps, function(step) step[[name]])
+  bind <- function(space, name) {
+    values <- bind_batches(space, each(name))
+    if (mixed) batch_rows(space, values, order) else values
+  }
+  episodes <- episodes_table(batches, several = TRUE)
+  truncated <- unlist(each("truncated"))[order]
+  # An episode that `max_steps` cut short is truncated in its last step.
+  truncated[!duplicated(row, fromLast = TRUE)] <- episodes$truncated
+  list(
+    candidate = episodes$candidate[row], episode = episodes$episode[row],
+    observation = bind(vector_env$observation_space, "observation"),
+    action = bind(vector_env$action_space, "action"),
+    reward = as.numeric(unlist(each("reward")))[order],
+    terminated = unlist(each("terminated"))[order], truncated = truncated,
+    next_observation = bind(vector_env$observation_space, "next_observation")
+  )
 }
 
 # What an agent is told of its candidates. Those after one that has ended the search were not
@@ -203,10 +249,11 @@ candidate_results <- function(history, asked, call) {
     gym_abort(
       paste0("The mean return of candidate ", wrong, " of ", length(returns), " is ",
              returns[[wrong]], ": a reward of the environment was no finite number."),
-      class = "gym_error_agent", candidate = wrong, weights = asked[wrong, ], call = call
+      class = "gym_error_agent", candidate = wrong,
+      weights = if (!is.null(asked)) asked[wrong, ], call = call
     )
   }
-  if (length(returns) < nrow(asked)) {
+  if (length(returns) < NROW(asked)) {
     asked <- asked[seq_along(returns), , drop = FALSE]
   }
   list(

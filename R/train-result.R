@@ -10,7 +10,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
     c(
       list(
         # A policy of which nothing was played is no finding of a search.
-        policy = if (!search || state$iteration > 0L) agent_policy(state$agent),
+        policy = if (!search || state$iteration > 0L) judged_policy(settings, state$agent),
         agent = state$agent,
         solved = state$solved,
         history = history,
@@ -97,8 +97,9 @@ evaluation_text <- function(row) {
 }
 
 #' @export
-predict.gym_training <- function(object, newdata, type = c("action", "output"), ...) {
-  type <- check_choice(type[1L], c("action", "output"), arg = "type")
+predict.gym_training <- function(object, newdata,
+                                 type = c("action", "output", "probability"), ...) {
+  type <- check_choice(type[1L], c("action", "output", "probability"), arg = "type")
   check_found(object)
   predict_policy(object$policy, newdata, type)
 }

@@ -50,21 +50,6 @@ test_that("every activation is that of the package sigmoid", {
   }
 })
 
-test_that("activations of sigmoid are accepted by name and used", {
-  skip_if_not_installed("sigmoid")
-  policy <- policy_network(c(2, 2), c("tanh", "ReLU"), weights = list(diag(c(-1, 1))))
-  expect_identical(network_outputs(policy, rbind(c(3, 4))), rbind(c(0, 4)))
-  expect_identical(act(policy, c(3, 4)), 1L)
-})
-
-test_that("without sigmoid its activations are refused with what to do", {
-  expect_error(
-    check_sigmoid_installed(c("ReLU", "logistic"), NULL, installed = FALSE), "install.packages",
-    class = "gym_error_argument"
-  )
-  expect_error(check_sigmoid_installed(c("tanh", "logistic"), NULL, installed = FALSE), NA)
-})
-
 test_that("activations are one of hidden layers and one of outputs, or one for each layer", {
   expect_identical(policy_network(c(4, 3, 3, 1))$activation, c("tanh", "tanh", "logistic"))
   expect_identical(policy_network(c(4, 1))$activation, "logistic")
@@ -74,7 +59,6 @@ test_that("activations are one of hidden layers and one of outputs, or one for e
   expect_error(policy_network(activation = "tanh"), "not 1", class = "gym_error_argument")
   expect_error(policy_network(activation = c("tanh", "softmax")), "`activation[2]` must be one of",
                fixed = TRUE, class = "gym_error_argument")
-  expect_error(policy_network(activation = NULL), class = "gym_error_argument")
 })
 
 test_that("sizes are two or more whole numbers", {
@@ -177,7 +161,6 @@ test_that("a discrete observation is one input for each of its values", {
 test_that("a single output without a range gives its sign", {
   policy <- policy_network(c(1, 1), "identity", weights = list(matrix(2)))
   expect_identical(act(policy, matrix(c(-1, 0, 1e-9), 3)), c(0L, 0L, 1L))
-  skip_if_not_installed("sigmoid")
   policy <- policy_network(c(1, 1), "ReLU", weights = list(matrix(2)))
   expect_identical(act(policy, matrix(c(-1, 0, 0.1), 3)), c(0L, 0L, 1L))
 })
@@ -272,4 +255,64 @@ test_that("weights that were given another shape by hand are named", {
   }
   expect_error(policy_network(weights = numeric(10)), "a list of 2 matrices (2 x 4, 1 x 2)",
                fixed = TRUE, class = "gym_error_argument")
+})
+
+test_that("orthogonal weights stand at right angles, and outputs that are drawn from begin near 0", {
+  set.seed(1)
+  policy <- policy_network(c(6, 4, 5, 3), bias = TRUE, output = "softmax", init = "orthogonal")
+  weights <- lapply(policy$weights, function(layer) layer[, -ncol(layer)])
+  expect_equal(tcrossprod(weights[[1]]), 2 * diag(4))
+  expect_equal(crossprod(weights[[2]]), 2 * diag(4))
+  expect_equal(tcrossprod(weights[[3]]), 1e-4 * diag(3))
+  expect_identical(policy$weights[[2]][, 5], numeric(5))
+  values <- policy_network(c(6, 4, 3), c("tanh", "identity"), init = "orthogonal")
+  expect_equal(tcrossprod(values$weights[[2]]), diag(3))
+})
+
+test_that("a network that draws, draws by its probabilities; without draws it takes the best", {
+  set.seed(1)
+  observation <- matrix(1, 4000, 1)
+  near <- function(x, y) expect_lt(max(abs(x - y)), 0.03)
+  logits <- log(c(0.1, 0.6, 0.3))
+  softmax <- policy_network(c(1, 3), weights = list(cbind(logits)), output = "softmax")
+  near(tabulate(act(softmax, observation) + 1L, 3) / 4000, exp(logits))
+  expect_equal(predict(softmax, 1, "probability"), rbind(exp(logits)))
+  expect_identical(c(act(softmax, 1, draw = FALSE), predict(softmax, 1)), c(1L, 1L))
+  greedily <- policy_network(
+    c(1, 3), weights = list(cbind(logits)), output = "epsilon-greedy", epsilon = 0.3
+  )
+  expect_equal(predict(greedily, 1, "probability"), rbind(c(0.1, 0.8, 0.1)))
+  near(tabulate(act(greedily, observation) + 1L, 3) / 4000, c(0.1, 0.8, 0.1))
+  gaussian <- policy_network(
+    c(1, 2), weights = list(cbind(c(5, -5))), output = "gaussian", log_std = log(c(0.1, 0.5))
+  )
+  drawn <- act(gaussian, observation)
+  near(c(colMeans(drawn), apply(drawn, 2, sd)), c(5, -5, 0.1, 0.5))
+  expect_identical(act(gaussian, 1, draw = FALSE), c(5, -5))
+  expect_identical(coef(gaussian), c(5, -5, log(c(0.1, 0.5))))
+  coef(gaussian) <- c(0, 1, 2, 3)
+  expect_identical(gaussian$log_std, c(2, 3))
+  expect_error(predict(gaussian, 1, "probability"), class = "gym_error_argument")
+})
+
+test_that("an output is refused where it does not fit, and NA is the environment's own", {
+  box <- fake_environment(action_space = box_space(c(-1, -1), c(1, 1)))
+  own <- policy_network(c(NA, 3, NA), output = NA)
+  expect_identical(format(own), "network *-3-*, tanh, identity")
+  expect_identical(policy_bind(own, box)$output, "gaussian")
+  expect_identical(policy_bind(own, box)$log_std, c(0, 0))
+  two <- policy_bind(own, fake_environment())
+  expect_identical(two$output, "softmax")
+  expect_identical(two$sizes, c(4L, 3L, 2L))
+  for (output in c("softmax", "epsilon-greedy")) {
+    expect_error(policy_bind(policy_network(c(NA, NA), "identity", output = output), box),
+                 "needs a Discrete action space", class = "gym_error_argument")
+  }
+  gaussian <- policy_network(c(NA, NA), "identity", output = "gaussian")
+  expect_error(policy_bind(gaussian, fake_environment()), "Box", class = "gym_error_argument")
+  expect_error(policy_network(c(2, 2), c("tanh", "tanh"), output = "softmax"),
+               "\"identity\", not of \"tanh\"", class = "gym_error_argument")
+  expect_error(policy_network(c(2, 2), output = "gaussian", log_std = 1:3), "log_std",
+               class = "gym_error_argument")
+  expect_error(policy_network(output = "soft"), class = "gym_error_argument")
 })

@@ -31,8 +31,8 @@ write_case <- function(policy, observation, file) {
   )
 }
 
-# How many of the actions differ, of those chosen one by one and of those in groups.
-differing <- function(policies, observation) {
+# What the server's policies do, chosen one by one and then in groups: of a Box an action in each row.
+acted_on_server <- function(policies, observation) {
   folder <- withr::local_tempdir()
   names <- file.path(folder, seq_along(policies))
   Map(function(policy, name) {
@@ -42,12 +42,20 @@ differing <- function(policies, observation) {
     working_python(), c(test_path("act_on_server.py"), folder),
     env = c("current", PYTHONPATH = server_modules(), OPENBLAS_NUM_THREADS = "1")
   )
-  unlist(Map(function(policy, name) {
+  Map(function(policy, name) {
+    numbers <- max(1, prod(policy$action_space$shape))
+    acted <- readBin(paste0(name, ".acted"), "numeric", 2 * numbers * nrow(observation))
+    if (numbers > 1) t(matrix(acted, numbers)) else acted
+  }, policies, names)
+}
+
+# How many of the actions differ.
+differing <- function(policies, observation) {
+  unlist(Map(function(policy, theirs) {
     own <- act(policy, observation)
-    if (is.matrix(own)) own <- to_float32(t(own))
-    theirs <- readBin(paste0(name, ".acted"), "numeric", 2L * length(own))
-    sum(theirs != rep(as.vector(own), 2L))
-  }, policies, names))
+    if (is.matrix(own)) own <- to_float32(own)
+    sum(theirs != if (is.matrix(own)) rbind(own, own) else c(own, own))
+  }, policies, acted_on_server(policies, observation)))
 }
 
 # Where the modules are that the server of the session runs.
@@ -60,7 +68,6 @@ actions <- list(
 
 test_that("networks act the same with every activation, saturated, tied, with a bias, normalized", {
   skip_if_no_server()
-  skip_if_not_installed("sigmoid")
   withr::local_seed(1)
   # With make soak PARTS=policies more than a million.
   rows <- if (soaks("GYM_TEST_POLICIES")) 80L else 2L
@@ -68,7 +75,7 @@ test_that("networks act the same with every activation, saturated, tied, with a 
   # Rows of zeros tie all outputs.
   observation[1:3, ] <- 0
   cases <- expand.grid(
-    activation = c(base_activations, sigmoid_activations), space = names(actions),
+    activation = activations, space = names(actions),
     scale = c(1, 1000), stringsAsFactors = FALSE
   )
   policies <- Map(function(activation, space, scale) {
@@ -82,4 +89,31 @@ test_that("networks act the same with every activation, saturated, tied, with a 
   }, cases$activation, cases$space, cases$scale)
   cases$differ <- differing(policies, observation)
   expect_identical(cases[cases$differ > 0, ], cases[0, ])
+})
+
+test_that("networks that draw have on the server the probabilities that they have in R", {
+  skip_if_no_server()
+  withr::local_seed(1)
+  n <- 20L * 256L
+  observation <- matrix(rep(c(0.5, -1, 0.25, 2), each = n), n)
+  outputs <- c("softmax", "epsilon-greedy", "gaussian")
+  policies <- lapply(outputs, function(output) {
+    gaussian <- output == "gaussian"
+    policy <- policy_network(
+      c(4, 5, if (gaussian) 2 else 3), bias = TRUE, output = output, log_std = -0.5, epsilon = 0.3
+    )
+    bound_to(policy, actions[[if (gaussian) "box" else "several"]])
+  })
+  acted <- acted_on_server(policies, observation)
+  for (i in 1:2) {
+    wanted <- predict(policies[[i]], observation[1, ], "probability")
+    for (part in list(seq_len(n), n + seq_len(n))) {
+      expect_lt(max(abs(tabulate(acted[[i]][part] - 1L, 3) / n - wanted)), 0.03)
+    }
+  }
+  # Neither here nor there are they cut at the bounds.
+  drawn <- acted[[3]]
+  expect_gt(max(abs(drawn)), 3)
+  expect_lt(max(abs(colMeans(drawn) - predict(policies[[3]], observation[1, ], "output"))), 0.05)
+  expect_lt(max(abs(apply(drawn, 2, sd) - exp(-0.5))), 0.05)
 })

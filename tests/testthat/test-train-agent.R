@@ -432,9 +432,9 @@ test_that("an agent is told the trajectories that it needs, step by step", {
   # Two candidates with two episodes of three steps.
   expect_identical(steps$candidate, rep(1:2, each = 6))
   expect_identical(steps$episode, rep(rep(1:2, each = 3), 2))
-  expect_identical(steps$step, rep(1:3, 4))
   expect_equal(as.vector(tapply(steps$reward, steps$candidate, sum)) / 2, told$returns)
-  expect_identical(steps$next_obs_1[1:2], steps$obs_1[2:3])
+  expect_identical(steps$next_observation[1:2, ], steps$observation[2:3, ])
+  expect_identical(which(steps$terminated | steps$truncated), c(3L, 6L, 9L, 12L))
   .S3method("agent_needs", "curious", function(agent) "gradients")
   expect_error(quiet_training(curious, iterations = 1), class = "gym_error_agent")
 })

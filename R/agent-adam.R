@@ -1,0 +1,27 @@
+# Adam (Kingma and Ba 2015, Algorithm 1), and the clipping of gradients.
+
+new_adam <- function(count) list(mean = numeric(count), square = numeric(count), steps = 0)
+
+#' Take a step down a gradient
+#' @param weights,gradient Vectors of the same length.
+#' @param adam The moments so far, as new_adam() makes them and this function returns them.
+#' @param epsilon Keeps what is divided by from 0.
+#' @return A list: `weights` and `adam`.
+#' @noRd
+adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
+  steps <- adam$steps + 1
+  mean <- 0.9 * adam$mean + 0.1 * gradient
+  square <- 0.999 * adam$square + 0.001 * (gradient * gradient)
+  size <- learning_rate / (1 - 0.9^steps)
+  deviation <- sqrt(square) / sqrt(1 - 0.999^steps) + epsilon
+  list(
+    weights = weights - size * mean / deviation,
+    adam = list(mean = mean, square = square, steps = steps)
+  )
+}
+
+# Makes a gradient that is longer than `longest` as long as that.
+clip_norm <- function(gradient, longest) {
+  norm <- sqrt(sum(gradient * gradient))
+  if (norm > longest) gradient * (longest / (norm + 1e-6)) else gradient
+}

@@ -1,0 +1,52 @@
+# Returns and advantages of whole episodes, whose steps follow one another.
+
+#' Sum what comes after each step, backwards
+#' @param values What a step adds.
+#' @param decay What the sum is multiplied by for each step.
+#' @param last Whether a step is the last of its episode.
+#' @noRd
+sum_backwards <- function(values, decay, last) {
+  sum <- 0
+  for (t in rev(seq_along(values))) {
+    sum <- values[[t]] + if (last[[t]]) 0 else decay * sum
+    values[[t]] <- sum
+  }
+  values
+}
+
+# The value of the state after each step: 0 where the episode terminated. One that was truncated
+# would have gone on, so its last state keeps its value.
+next_values <- function(value, last_value, terminated, last) {
+  after <- c(value[-1L], 0)
+  after[last] <- last_value
+  after[terminated] <- 0
+  after
+}
+
+#' Estimate advantages (generalized advantage estimation, Schulman et al. 2016)
+#' @param after As next_values() returns it.
+#' @noRd
+estimate_advantages <- function(reward, value, after, last, gamma, lambda) {
+  sum_backwards(reward + gamma * after - value, gamma * lambda, last)
+}
+
+# Rewards divided by the standard deviation of the discounted return so far, and cut at 10 of them.
+# Returns a list: `reward`, and `moments` of that return.
+scale_rewards <- function(reward, last, gamma, moments) {
+  so_far <- reward
+  for (t in seq_along(reward)[-1L]) {
+    if (!last[[t - 1L]]) so_far[[t]] <- reward[[t]] + gamma * so_far[[t - 1L]]
+  }
+  moments <- merge_moments(moments, moments_of(matrix(so_far)))
+  deviation <- sqrt(moments$squares / moments$count)
+  list(reward = pmax(-10, pmin(reward / max(deviation, 1e-4), 10)), moments = moments)
+}
+
+standardized <- function(x) {
+  if (length(x) < 2L) x - mean(x) else (x - mean(x)) / (stats::sd(x) + 1e-8)
+}
+
+explained_variance <- function(value, return) {
+  spread <- stats::var(return)
+  if (isTRUE(spread > 0)) 1 - stats::var(return - value) / spread else NA_real_
+}

@@ -1,0 +1,250 @@
+#' Deep Q-networks
+#'
+#' Learns the value of each action by a network (Mnih et al. 2015): plays epsilon-greedily, keeps
+#' every step in a memory, and from minibatches that are drawn from it moves the values towards the
+#' reward plus the discounted value of the best next action. That value is given by a target
+#' network, an older copy; with `double = TRUE` the action is the network's own choice (van Hasselt,
+#' Guez and Silver 2016).
+#'
+#' The policy is a [policy_network()] with the output `"epsilon-greedy"`, by default with two hidden
+#' layers of 64 ReLU neurons. Its `epsilon` is the agent's. The loss is Huber's, its gradient, not
+#' longer than `max_grad_norm`, goes into Adam (Kingma and Ba 2015).
+#'
+#' An iteration is whole episodes, by default one or two. They are played with one `epsilon` and the
+#' same weights; then come as many updates as `updates_per_step` times its steps, where a remainder
+#' is carried to the next iteration. An episode that was truncated would have gone on, so the value
+#' of its last state counts; after one that was terminated nothing is to come. With a policy that
+#' has `normalize = TRUE` the first iteration is random episodes, as of [agent_ppo()].
+#'
+#' A checkpoint keeps the memory in a file beside its own, `training.rds.memory` for
+#' `training.rds`, to which only what is new is appended.
+#'
+#' @param memory How many steps the memory has at most, a whole number; the oldest are forgotten.
+#'   The default is 50,000.
+#' @param learning_starts After how many steps learning begins, a whole number; the default is 1000.
+#' @param batch How many steps a minibatch has, a whole number; the default is 64.
+#' @param updates_per_step How many minibatches are learned from for each step, a number above 0;
+#'   the default is 0.5.
+#' @param learning_rate The step size of Adam, a number above 0, or a function of the steps so far;
+#'   the default is 1e-3.
+#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
+#' @param epsilon How often any action is drawn, a number from 0 to 1, or a function of the steps so
+#'   far; the default goes from 1 to 0.05 in 10,000 steps.
+#' @param double Does the network choose the action that the target network values? `TRUE`, the
+#'   default, or `FALSE` as in Mnih et al. (2015).
+#' @param target_every After how many steps the target network becomes a copy of the network, a
+#'   whole number; the default is 500. The updates of an iteration count as if they were spread
+#'   evenly over its steps.
+#' @param target_rate `NULL`, the default, or a number from 0 to 1: then the target network comes
+#'   nearer by this part in each update, and `target_every` does not count.
+#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`; the default is 10.
+#' @param batch_steps About how many steps an iteration has, a whole number; the default is 1.
+#' @param min_episodes The least number of episodes of an iteration; the default is 1.
+#' @inheritParams agent_ars
+#' @param policy The policy; `NULL`, the default, is the preset's, or the one told above.
+#' @return `agent_dqn()` an agent of class `gym_agent_dqn`; `learn_dqn()` makes that agent, trains
+#'   it and returns what [train_agent()] does. Its history, and the log, have for each iteration
+#'   `loss`, `n_updates`, `exploration_rate` and `learning_rate`.
+#' @section Errors: As [agent_ppo()]; also for an environment whose actions are no Discrete space.
+#' @references V. Mnih et al. (2015), Human-level control through deep reinforcement learning,
+#'   Nature 518.
+#'
+#'   H. van Hasselt, A. Guez and D. Silver (2016), Deep reinforcement learning with double
+#'   Q-learning, AAAI.
+#' @seealso [agent_ppo()]
+#' @export
+#' @examples
+#' agent_dqn()
+#' @examplesIf gym:::can_start_server()
+#' learn_dqn("CartPole-v1", total_steps = 1500, seed = 1)
+agent_dqn <- function(memory = 50000, learning_starts = 1000, batch = 64, updates_per_step = 0.5,
+                      learning_rate = 1e-3, gamma = 0.99,
+                      epsilon = schedule_linear(1, 0.05, 10000), double = TRUE,
+                      target_every = 500, target_rate = NULL, max_grad_norm = 10,
+                      batch_steps = 1, min_episodes = 1) {
+  settings <- mget(names(formals()))
+  check_count(memory)
+  check_count(learning_starts, min = 0)
+  check_count(batch, max = memory)
+  check_above_zero(updates_per_step)
+  check_scheduled(settings, "learning_rate")
+  check_number(gamma, min = 0, max = 1)
+  check_schedule(epsilon, "epsilon", 0, 1, rlang::current_env())
+  check_flag(double)
+  check_count(target_every)
+  check_number(target_rate, min = 0, max = 1, allow_null = TRUE)
+  check_number(max_grad_norm, min = 0)
+  check_iteration(batch_steps, min_episodes)
+  names(settings)[[1L]] <- "memory_size"
+  new_gradient_agent("dqn", c(settings, list(
+    carried = 0, log = rlang::rep_named(dqn_log, NA_real_)
+  )))
+}
+
+dqn_log <- c("loss", "n_updates", "exploration_rate", "learning_rate")
+
+#' @export
+agent_start.gym_agent_dqn <- function(agent, policy) {
+  agent <- NextMethod()
+  check_values(policy, "DQN")
+  agent$target <- weight_vector(policy)
+  agent$adam <- new_adam(count_weights(policy))
+  agent$updates <- 0
+  agent$memory <- new_memory()
+  agent
+}
+
+#' @exportS3Method
+default_policy.gym_agent_dqn <- function(agent) {
+  policy_network(
+    c(NA, 64, 64, NA), c("ReLU", "identity"), bias = TRUE, output = "epsilon-greedy",
+    init = "orthogonal"
+  )
+}
+
+#' @export
+agent_behavior.gym_agent_dqn <- function(agent) {
+  behavior <- NextMethod()
+  if (!is_warming_up(agent)) behavior$epsilon <- epsilon_now(agent)
+  behavior
+}
+
+epsilon_now <- function(agent) scheduled(agent$epsilon, agent$steps, "epsilon")
+
+#' @export
+agent_tell.gym_agent_dqn <- function(agent, results) {
+  now <- scheduled_settings(agent, "learning_rate")
+  agent$log[c("exploration_rate", "learning_rate")] <- c(epsilon_now(agent), now$learning_rate)
+  steps <- length(results$trajectories$reward)
+  # Taken out of the agent, so that R writes into it without another copy.
+  memory <- agent$memory
+  agent$memory <- NULL
+  memory <- remember_steps(memory, agent$policy, results$trajectories, agent$memory_size)
+  if (!is_warming_up(agent) && memory$count >= agent$learning_starts) {
+    due <- agent$carried + steps * agent$updates_per_step
+    agent$carried <- due - floor(due)
+    agent <- learn_from_memory(agent, memory, floor(due), steps, now)
+  }
+  agent$memory <- memory
+  end_iteration(agent, results)
+}
+
+learn_from_memory <- function(agent, memory, updates, steps, settings) {
+  policy <- agent$policy
+  state <- list(weights = weight_vector(policy), target = agent$target, adam = agent$adam)
+  kept <- min(memory$count, agent$memory_size)
+  # The steps of the iteration at which each update comes, and which of them renew the target.
+  at <- agent$steps + steps * seq_len(updates) / max(updates, 1)
+  period <- floor(c(agent$steps, at) / agent$target_every)
+  renews <- is.null(agent$target_rate) & diff(period) > 0
+  drawn <- matrix(sample.int(kept, agent$batch * updates, replace = TRUE), agent$batch)
+  losses <- numeric(updates)
+  for (update in seq_len(updates)) {
+    rows <- recalled(memory, policy, drawn[, update])
+    state <- dqn_update(policy, state, rows, settings)
+    losses[[update]] <- state$loss
+    if (renews[[update]]) {
+      state$target <- state$weights
+    } else if (!is.null(agent$target_rate)) {
+      state$target <- state$target + agent$target_rate * (state$weights - state$target)
+    }
+  }
+  check_finite_weights(state$weights, agent)
+  agent$policy <- with_weights(policy, state$weights)
+  agent[c("target", "adam")] <- state[c("target", "adam")]
+  agent$updates <- agent$updates + updates
+  agent$log[c("loss", "n_updates")] <- c(if (updates) mean(losses) else NA_real_, agent$updates)
+  agent
+}
+
+#' Follow the gradient of a minibatch
+#' @param policy The network, of which all but the weights counts.
+#' @param state A list: `weights`, `target`, the weights of the target network, and `adam`.
+#' @param rows What was played: `inputs` and `next_inputs`, matrices with an observation in each
+#'   column, `action`, numbers from 1, `reward` and `terminated`.
+#' @param settings As agent_dqn() takes them, none of them a schedule.
+#' @return The list with new `weights` and `adam`, and the `loss` before.
+#' @noRd
+dqn_update <- function(policy, state, rows, settings) {
+  n <- length(rows$reward)
+  values_after <- outputs_of(policy, state$target, rows$next_inputs)
+  best <- if (settings$double) {
+    own <- outputs_of(policy, state$weights, rows$next_inputs)
+    values_after[places_of_actions(nrow(own), max.col(t(own), "first"))]
+  } else {
+    column_max(values_after)
+  }
+  wanted <- rows$reward + settings$gamma * ifelse(rows$terminated, 0, best)
+
+  layers <- layers_of(policy, state$weights)
+  signals <- forward_layers(layers, policy$activation, rows$inputs)
+  outputs <- signals[[length(signals)]]
+  taken <- places_of_actions(nrow(outputs), rows$action)
+  error <- outputs[taken] - wanted
+  # Huber's loss: the slope of the squared error up to 1, and then no steeper.
+  slopes <- matrix(0, nrow(outputs), n)
+  slopes[taken] <- pmax(-1, pmin(error, 1)) / n
+  gradient <- clip_norm(
+    backward_layers(layers, policy$activation, signals, slopes), settings$max_grad_norm
+  )
+  moved <- adam_step(state$weights, gradient, state$adam, settings$learning_rate)
+  size <- abs(error)
+  state[c("weights", "adam")] <- moved
+  state$loss <- mean(ifelse(size < 1, error * error / 2, size - 0.5))
+  state
+}
+
+# The memory ---------------------------------------------------------------------------------
+
+# A step in each column, the oldest overwritten when it is full: `steps` has the numbers of the
+# observation, those of the next one, then action, reward and whether it terminated. `count` is how
+# many there were in all.
+new_memory <- function() list(steps = NULL, count = 0)
+
+remember_steps <- function(memory, policy, trajectories, size) {
+  new <- rbind(
+    t(number_rows(trajectories$observation)), t(number_rows(trajectories$next_observation)),
+    network_actions(policy, trajectories$action), trajectories$reward, trajectories$terminated
+  )
+  n <- ncol(new)
+  # One whose episodes are longer than the memory keeps their ends.
+  keep <- seq.int(max(1L, n - size + 1L), n)
+  at <- (memory$count + keep - 1) %% size + 1
+  room <- max(0L, ncol(memory$steps))
+  if (max(at) > room) {
+    grown <- matrix(0, nrow(new), min(size, max(2 * room, at, 1024)))
+    if (room) grown[, seq_len(room)] <- memory$steps
+    memory$steps <- grown
+  }
+  memory$steps[, at] <- new[, keep]
+  memory$count <- memory$count + n
+  memory
+}
+
+recalled <- function(memory, policy, at) {
+  steps <- memory$steps[, at, drop = FALSE]
+  width <- (nrow(steps) - 3L) %/% 2L
+  own <- seq_len(width)
+  seen <- function(rows) network_columns(policy, t(steps[rows, , drop = FALSE]))
+  list(
+    inputs = seen(own), next_inputs = seen(width + own), action = as.integer(steps[2L * width + 1L, ]),
+    reward = steps[2L * width + 2L, ], terminated = steps[2L * width + 3L, ] == 1
+  )
+}
+
+#' @export
+format.gym_agent_dqn <- function(x, ...) {
+  gradient_text(if (x$double) "Double DQN" else "DQN", x[c(
+    "memory_size", "batch", "updates_per_step", "learning_rate", "gamma", "epsilon"
+  )])
+}
+
+#' @rdname agent_dqn
+#' @export
+learn_dqn <- function(env = "CartPole-v1", policy = NULL, memory = NULL, learning_starts = NULL,
+                      batch = NULL, updates_per_step = NULL, learning_rate = NULL, gamma = NULL,
+                      epsilon = NULL, double = NULL, target_every = NULL, target_rate = NULL,
+                      max_grad_norm = NULL, batch_steps = NULL, min_episodes = NULL,
+                      iterations = NULL, total_steps = NULL, target = NULL, ...) {
+  make_and_train("agent_dqn", rlang::current_env(), ...)
+}

@@ -1,0 +1,193 @@
+# What the agents that follow gradients share: how many episodes an iteration has, the first moments
+# of observations, and the steps of an iteration as rows.
+
+new_gradient_agent <- function(class, settings) {
+  structure(
+    c(settings, list(policy = NULL, iteration = 0L, steps = 0, episodes = settings$min_episodes)),
+    class = c(paste0("gym_agent_", class), "gym_agent_gradient", "gym_agent")
+  )
+}
+
+#' @export
+agent_start.gym_agent_gradient <- function(agent, policy) {
+  space <- policy$observation_space
+  if (length(space$shape) > 1L) {
+    gym_abort(
+      paste0("A gradient is followed where observations are vectors, and those of ", policy$env_id,
+             " are of ", format(space), "."),
+      class = "gym_error_argument", argument = "env", call = NULL
+    )
+  }
+  agent <- NextMethod()
+  if (is_warming_up(agent)) agent$episodes <- max(agent$min_episodes, warm_up_episodes)
+  agent
+}
+
+#' @export
+agent_needs.gym_agent_gradient <- function(agent) c("returns", "trajectories")
+
+#' @export
+agent_episodes.gym_agent_gradient <- function(agent, episodes) agent$episodes
+
+#' @exportS3Method
+default_policy.gym_agent_gradient <- function(agent) {
+  policy_network(c(NA, 64, 64, NA), bias = TRUE, output = NA, init = "orthogonal")
+}
+
+# Observations are normalised from the first step of learning on: random episodes make the first
+# moments, or the policy would jump when it is given some.
+warm_up_episodes <- 8L
+
+is_warming_up <- function(agent) identical(agent$policy$moments$count, 0)
+
+#' @export
+agent_behavior.gym_agent_gradient <- function(agent) {
+  if (is_warming_up(agent)) {
+    policy_bind(policy_random(), agent$policy[c("observation_space", "action_space")])
+  } else {
+    agent$policy
+  }
+}
+
+#' Put the steps of an iteration into rows
+#' @return A list: `inputs` and `last_inputs`, matrices with an observation in each column, as the
+#'   network takes them in, of each step and of the observations after the episodes' last steps;
+#'   `observations` as they were seen; `action`, the numbers of actions from 1, or a matrix with an
+#'   action in each column; `reward`, `terminated`; `last`, whether a step is an episode's last.
+#' @noRd
+iteration_rows <- function(policy, trajectories) {
+  n <- length(trajectories$reward)
+  last <- c(trajectories$episode[-1L] != trajectories$episode[-n], TRUE)
+  observations <- number_rows(trajectories$observation)
+  after <- number_rows(trajectories$next_observation)
+  list(
+    inputs = network_columns(policy, observations),
+    last_inputs = network_columns(policy, after[last, , drop = FALSE]),
+    observations = observations, action = network_actions(policy, trajectories$action),
+    reward = trajectories$reward, terminated = trajectories$terminated, last = last
+  )
+}
+
+network_actions <- function(policy, action) {
+  space <- policy$action_space
+  if (inherits(space, "gym_space_discrete")) {
+    as.integer(action) - as.integer(space$start) + 1L
+  } else {
+    matrix(row_major(action), prod(space$shape))
+  }
+}
+
+#' End an iteration: count, update the moments of observations, choose how many episodes come next
+#'
+#' Their number is fixed before they are played. Were an iteration cut off at a number of steps, it
+#' would have more of the short episodes.
+#' @noRd
+end_iteration <- function(agent, results) {
+  trajectories <- results$trajectories
+  agent$iteration <- agent$iteration + 1L
+  agent$steps <- agent$steps + length(trajectories$reward)
+  if (!is.null(agent$policy$moments)) {
+    seen <- moments_of(number_rows(trajectories$observation))
+    agent$policy$moments <- merge_moments(agent$policy$moments, seen)
+  }
+  played <- trajectories$episode[[length(trajectories$episode)]]
+  wanted <- round(agent$batch_steps / (length(trajectories$reward) / played))
+  agent$episodes <- as.integer(max(agent$min_episodes, min(wanted, 4 * played)))
+  agent
+}
+
+# Weights that are not finite stay outside: training ends with those before.
+check_finite_weights <- function(weights, agent) {
+  if (!all(is.finite(weights))) {
+    gym_abort(
+      c(paste0("The weights became NaN or infinite in iteration ", agent$iteration + 1L, "."),
+        i = "A smaller `learning_rate`, or normalized observations and rewards, may keep them finite."),
+      class = "gym_error_agent", iteration = agent$iteration + 1L, call = NULL
+    )
+  }
+}
+
+# A network of values with the hidden layers of a policy.
+value_network <- function(policy) {
+  sizes <- policy$sizes
+  sizes[[length(sizes)]] <- 1L
+  activation <- policy$activation
+  activation[[length(activation)]] <- "identity"
+  value <- new_network(sizes, activation, policy$bias, normalize = FALSE)
+  value$init <- policy$init
+  value$observation_space <- policy$observation_space
+  value$weights <- draw_first_weights(value)
+  value
+}
+
+expected_values <- function(value, inputs) outputs_of(value, weight_vector(value), inputs)[1L, ]
+
+outputs_of <- function(policy, weights, inputs) {
+  signals <- forward_layers(layers_of(policy, weights), policy$activation, inputs)
+  signals[[length(signals)]]
+}
+
+#' Cut rows into minibatches of nearly equal size, in a random order
+#' @return A list of vectors of row numbers.
+#' @noRd
+draw_minibatches <- function(n, batch) {
+  count <- max(1, round(n / batch))
+  split(sample.int(n), ceiling(seq_len(n) * count / n))
+}
+
+#' @export
+agent_log.gym_agent_gradient <- function(agent) agent$log
+
+# The settings as they are at the steps taken so far, those that are schedules, too.
+scheduled_settings <- function(agent, names) {
+  for (name in names) agent[[name]] <- scheduled(agent[[name]], agent$steps, name, max = Inf)
+  agent
+}
+
+check_scheduled <- function(settings, names, call = rlang::caller_env()) {
+  for (name in names) check_schedule(settings[[name]], name, 0, Inf, call)
+}
+
+check_iteration <- function(batch_steps, min_episodes, call = rlang::caller_env()) {
+  check_count(batch_steps, arg = "batch_steps", call = call)
+  check_count(min_episodes, arg = "min_episodes", call = call)
+}
+
+# An agent that follows the gradient of log-probabilities needs a policy that has them.
+check_has_log_prob <- function(policy, name) {
+  if (!policy$output %in% c("softmax", "gaussian")) {
+    box <- inherits(policy$action_space, "gym_space_box")
+    gym_abort(
+      c(paste0(name, " needs a policy that draws its actions",
+               if (box) ", with standard deviations", ", not ", format(policy), "."),
+        i = paste0("`policy_network(output = \"", if (box) "gaussian" else "softmax", "\")` does.")),
+      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    )
+  }
+}
+
+# An agent of values has one for each action.
+check_values <- function(policy, name) {
+  space <- policy$action_space
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  if (!inherits(space, "gym_space_discrete")) {
+    gym_abort(
+      c(paste0(name, " finds a value for each action of a Discrete space, and ", policy$env_id,
+               " takes actions of ", format(space), "."),
+        i = "`agent_ppo()` learns there."),
+      class = "gym_error_argument", argument = "env", call = NULL
+    )
+  }
+  if (!identical(policy$output, "epsilon-greedy") || outputs != space$n) {
+    gym_abort(
+      c(paste0(name, " needs a network with a value for each of ", count_of(space$n, "action"),
+               " and the output \"epsilon-greedy\", not ", format(policy), "."),
+        i = "`policy_network(c(NA, 64, 64, NA), output = \"epsilon-greedy\")` is one."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    )
+  }
+}
+
+gradient_text <- function(name, settings) {
+  agent_text(name, Filter(Negate(is.function), settings))
+}

@@ -1,0 +1,272 @@
+#' Proximal policy optimization
+#'
+#' Plays whole episodes with a policy that draws its actions, estimates how much better each action
+#' was than what a network of values expected, and makes the better ones more likely: `epochs`
+#' passes over the steps in minibatches, in each of which an action's probability counts no further
+#' than `clip` from what it was when it was played (Schulman et al. 2017).
+#'
+#' The policy is a [policy_network()] with the output `"softmax"` for a Discrete action space, or
+#' `"gaussian"` for a Box; by default it has two hidden layers of 64 tanh neurons. The network of
+#' values has the same hidden layers. For each minibatch the loss is that of
+#' [Stable-Baselines3](https://stable-baselines3.readthedocs.io/en/master/modules/ppo.html): the
+#' clipped objective, minus `entropy` times the policy's entropy, plus `value_weight` times the
+#' squared error of the values; its gradient, not longer than `max_grad_norm`, goes into Adam
+#' (Kingma and Ba 2015, with an epsilon of 1e-5).
+#'
+#' With `epochs = 1, batch = Inf, clip = Inf` this is the advantage actor-critic A2C (Mnih et al.
+#' 2016; Huang et al. 2022), with Adam in place of RMSprop.
+#'
+#' # Iterations
+#'
+#' An iteration is whole episodes, so that training can go on from any checkpoint as if it had never
+#' been interrupted. How many is fixed before they are played: `batch_steps` divided by the mean
+#' length of the last iteration's episodes, rounded, at least `min_episodes` and at most four times
+#' as many as the last time. An episode that was truncated, by the environment or by `max_steps`,
+#' would have gone on: the value of its last state takes the place of the rewards to come. One that
+#' was terminated has none to come.
+#'
+#' With a policy that has `normalize = TRUE` the first iteration is random episodes, which make the
+#' first moments of observations. Later ones are added after each iteration's learning.
+#'
+#' @param batch_steps About how many steps an iteration has, a whole number; the default is 2048.
+#' @param batch How many steps a minibatch has, about: the steps of an iteration are cut into
+#'   minibatches of nearly equal size. A number of at least 1, `Inf` for all in one; the default is
+#'   64.
+#' @param epochs How often an iteration's steps are gone through, a whole number; the default is 10.
+#' @param learning_rate The step size of Adam, a number above 0, or a function of the steps so far
+#'   such as [schedule_linear()]; the default is 3e-4.
+#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
+#' @param lambda How far advantages look ahead, a number from 0 (one step) to 1 (to the end of the
+#'   episode); the default is 0.95 (generalized advantage estimation, Schulman et al. 2016).
+#' @param clip How far from 1 the ratio of an action's probability to that when it was played may
+#'   count, a number, a function of the steps so far, or `Inf`; the default is 0.2.
+#' @param entropy How much the policy's entropy counts in the loss, a number or a function of the
+#'   steps so far; the default is 0.
+#' @param value_weight How much the squared error of values counts, a number; the default is 0.5.
+#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`; the default is 0.5.
+#' @param normalize_advantages Are the advantages of a minibatch brought to the mean 0 and the
+#'   standard deviation 1? `TRUE`, the default, or `FALSE`.
+#' @param normalize_rewards Are rewards divided by the running standard deviation of the discounted
+#'   return, and cut at 10? `FALSE`, the default, or `TRUE`. What is logged stays as it was.
+#' @param target_kl `NULL`, the default, or a number: an iteration's learning ends before a
+#'   minibatch in which the policy has moved further than 1.5 times that from the one that played
+#'   (an estimate of the Kullback-Leibler divergence).
+#' @param min_episodes The least number of episodes of an iteration; the default is 8.
+#' @inheritParams agent_ars
+#' @param policy The policy; `NULL`, the default, is the preset's, or the one told above.
+#' @return `agent_ppo()` an agent of class `gym_agent_ppo`; `learn_ppo()` makes that agent, trains
+#'   it and returns what [train_agent()] does. Its history, and the log, have for each iteration
+#'   `approx_kl`, `clip_fraction`, `entropy_loss`, `explained_variance`, `loss`,
+#'   `policy_gradient_loss`, `value_loss` and `learning_rate`, as Stable-Baselines3 names them.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be, a policy
+#'   that does not draw its actions by their probability, and observations that are no vectors;
+#'   `gym_error_agent` when weights become infinite or `NaN`: the training that the condition has as
+#'   `result` has the last good ones.
+#' @references J. Schulman et al. (2017), Proximal policy optimization algorithms, arXiv:1707.06347.
+#'
+#'   J. Schulman et al. (2016), High-dimensional continuous control using generalized advantage
+#'   estimation, ICLR.
+#'
+#'   S. Huang et al. (2022), The 37 implementation details of proximal policy optimization, ICLR
+#'   Blog Track; A2C is a special case of PPO, arXiv:2205.09123.
+#'
+#'   V. Mnih et al. (2016), Asynchronous methods for deep reinforcement learning, ICML.
+#'
+#'   D. P. Kingma and J. Ba (2015), Adam: a method for stochastic optimization, ICLR.
+#' @seealso [agent_reinforce()], [agent_dqn()]; [policy_log_prob()] for writing such an agent
+#' @export
+#' @examples
+#' agent_ppo()
+#' @examplesIf gym:::can_start_server()
+#' learn_ppo("CartPole-v1", batch_steps = 512, total_steps = 2000, seed = 1)
+agent_ppo <- function(batch_steps = 2048, batch = 64, epochs = 10, learning_rate = 3e-4,
+                      gamma = 0.99, lambda = 0.95, clip = 0.2, entropy = 0, value_weight = 0.5,
+                      max_grad_norm = 0.5, normalize_advantages = TRUE, normalize_rewards = FALSE,
+                      target_kl = NULL, min_episodes = 8) {
+  settings <- mget(names(formals()))
+  check_iteration(batch_steps, min_episodes)
+  check_number(batch, min = 1)
+  if (is.finite(batch) && batch > batch_steps) {
+    must <- paste("at most `batch_steps`,", number_text(batch_steps), "or Inf")
+    abort_argument(batch, must, "batch", rlang::current_env())
+  }
+  check_count(epochs)
+  check_scheduled(settings, c("learning_rate", "clip", "entropy"))
+  for (name in c("gamma", "lambda")) check_number(settings[[name]], min = 0, max = 1, arg = name)
+  check_number(value_weight, min = 0)
+  check_number(max_grad_norm, min = 0)
+  check_flag(normalize_advantages)
+  check_flag(normalize_rewards)
+  check_number(target_kl, min = 0, allow_null = TRUE)
+  new_gradient_agent("ppo", c(settings, list(log = rlang::rep_named(ppo_log, NA_real_))))
+}
+
+ppo_log <- c(
+  "approx_kl", "clip_fraction", "entropy_loss", "explained_variance", "loss",
+  "policy_gradient_loss", "value_loss", "learning_rate"
+)
+
+#' @export
+agent_start.gym_agent_ppo <- function(agent, policy) {
+  agent <- NextMethod()
+  check_has_log_prob(policy, "PPO")
+  agent$value <- value_network(policy)
+  agent$adam <- new_adam(count_weights(policy) + count_weights(agent$value))
+  agent
+}
+
+#' @export
+agent_tell.gym_agent_ppo <- function(agent, results) {
+  if (is_warming_up(agent)) {
+    return(end_iteration(agent, results))
+  }
+  now <- scheduled_settings(agent, c("learning_rate", "clip", "entropy"))
+  rows <- iteration_rows(agent$policy, results$trajectories)
+  reward <- rows$reward
+  if (agent$normalize_rewards) {
+    normal <- scale_rewards(reward, rows$last, agent$gamma, agent$return_moments)
+    reward <- normal$reward
+    agent$return_moments <- normal$moments
+  }
+  weights <- c(weight_vector(agent$policy), weight_vector(agent$value))
+
+  # How likely the actions were, and what was expected, by the networks that played.
+  before <- ppo_forward(agent$policy, agent$value, weights, rows$inputs, rows$action)
+  last_value <- expected_values(agent$value, rows$last_inputs)
+  after <- next_values(before$value, last_value, rows$terminated, rows$last)
+  rows$advantage <- estimate_advantages(
+    reward, before$value, after, rows$last, agent$gamma, agent$lambda
+  )
+  rows$return <- rows$advantage + before$value
+  rows$log_prob <- before$draws$log_prob
+
+  epochs <- lapply(seq_len(agent$epochs), function(epoch) {
+    draw_minibatches(length(reward), agent$batch)
+  })
+  learned <- ppo_update(agent$policy, agent$value, weights, agent$adam, rows, epochs, now)
+  check_finite_weights(learned$weights, agent)
+  of_policy <- seq_len(count_weights(agent$policy))
+  agent$policy <- with_weights(agent$policy, learned$weights[of_policy])
+  agent$value <- with_weights(agent$value, learned$weights[-of_policy])
+  agent$adam <- learned$adam
+  agent$log[] <- c(
+    learned$log, explained_variance = explained_variance(before$value, rows$return),
+    learning_rate = now$learning_rate
+  )[ppo_log]
+  end_iteration(agent, results)
+}
+
+#' Follow the gradient through all minibatches
+#' @param policy,value The networks, of which all but the weights counts.
+#' @param weights The weights of both, one after the other.
+#' @param rows What was played: `inputs`, `action`, `log_prob`, `advantage` and `return`.
+#' @param epochs A list with a list of minibatches, vectors of row numbers, for each epoch.
+#' @param settings As agent_ppo() takes them, none of them a schedule.
+#' @return A list: `weights`, `adam`, and `log`, of which the divergence is that of the last epoch,
+#'   the loss that of the last minibatch, the others means.
+#' @noRd
+ppo_update <- function(policy, value, weights, adam, rows, epochs, settings) {
+  log <- list()
+  too_far <- FALSE
+  for (batches in epochs) {
+    divergences <- numeric()
+    for (at in batches) {
+      step <- ppo_gradient(policy, value, weights, batch_of_rows(rows, at), settings)
+      log[[length(log) + 1L]] <- step$log
+      divergences <- c(divergences, step$log[["approx_kl"]])
+      too_far <- isTRUE(step$log[["approx_kl"]] > 1.5 * settings$target_kl)
+      if (too_far) break
+      gradient <- clip_norm(step$gradient, settings$max_grad_norm)
+      moved <- adam_step(weights, gradient, adam, settings$learning_rate, epsilon = 1e-5)
+      weights <- moved$weights
+      adam <- moved$adam
+    }
+    if (too_far) break
+  }
+  log <- do.call(rbind, log)
+  means <- colMeans(log)
+  means[["approx_kl"]] <- mean(divergences)
+  means[["loss"]] <- log[nrow(log), "loss"]
+  list(weights = weights, adam = adam, log = means)
+}
+
+batch_of_rows <- function(rows, at) {
+  list(
+    inputs = rows$inputs[, at, drop = FALSE],
+    action = if (is.matrix(rows$action)) rows$action[, at, drop = FALSE] else rows$action[at],
+    log_prob = rows$log_prob[at], advantage = rows$advantage[at], return = rows$return[at]
+  )
+}
+
+#' Differentiate the loss of a minibatch
+#' @return A list: `gradient`, of the weights of both networks, and `log`, numbers.
+#' @noRd
+ppo_gradient <- function(policy, value, weights, batch, settings) {
+  n <- length(batch$return)
+  both <- ppo_forward(policy, value, weights, batch$inputs, batch$action)
+  advantage <- batch$advantage
+  if (settings$normalize_advantages) advantage <- standardized(advantage)
+
+  # The objective is the smaller of ratio x advantage and clipped ratio x advantage; beyond the
+  # clip, in the direction of the advantage, it has no slope.
+  log_ratio <- both$draws$log_prob - batch$log_prob
+  ratio <- exp(log_ratio)
+  clipped <- pmin(pmax(ratio, 1 - settings$clip), 1 + settings$clip)
+  objective <- pmin(ratio * advantage, clipped * advantage)
+  counts <- (advantage >= 0 & ratio <= 1 + settings$clip) |
+    (advantage < 0 & ratio >= 1 - settings$clip)
+  slopes <- log_prob_slopes(
+    policy, both$draws, -(advantage * ratio * counts) / n, -settings$entropy / n
+  )
+  error <- both$value - batch$return
+  gradient <- c(
+    backward_layers(both$policy_layers, policy$activation, both$policy_signals, slopes$outputs),
+    slopes$log_std,
+    backward_layers(
+      both$value_layers, value$activation, both$value_signals,
+      matrix(2 * settings$value_weight / n * error, 1L)
+    )
+  )
+  policy_loss <- -mean(objective)
+  value_loss <- mean(error * error)
+  entropy_loss <- -mean(both$draws$entropy)
+  list(gradient = gradient, log = c(
+    approx_kl = mean(ratio - 1 - log_ratio), clip_fraction = mean(abs(ratio - 1) > settings$clip),
+    entropy_loss = entropy_loss, policy_gradient_loss = policy_loss, value_loss = value_loss,
+    loss = policy_loss + settings$entropy * entropy_loss + settings$value_weight * value_loss
+  ))
+}
+
+# Both networks, forwards.
+ppo_forward <- function(policy, value, weights, inputs, action) {
+  count <- count_weights(policy)
+  policy_layers <- layers_of(policy, weights)
+  value_layers <- layers_of(value, weights[-seq_len(count)])
+  policy_signals <- forward_layers(policy_layers, policy$activation, inputs)
+  value_signals <- forward_layers(value_layers, value$activation, inputs)
+  outputs <- policy_signals[[length(policy_signals)]]
+  log_std <- if (is_gaussian(policy)) weights[(count - length(policy$log_std) + 1L):count]
+  list(
+    draws = log_prob_of(policy, outputs, log_std, places_of_actions(nrow(outputs), action)),
+    value = value_signals[[length(value_signals)]][1L, ],
+    policy_layers = policy_layers, value_layers = value_layers,
+    policy_signals = policy_signals, value_signals = value_signals
+  )
+}
+
+#' @export
+format.gym_agent_ppo <- function(x, ...) {
+  gradient_text("PPO", x[c("batch_steps", "batch", "epochs", "learning_rate", "gamma", "lambda",
+                           "clip")])
+}
+
+#' @rdname agent_ppo
+#' @export
+learn_ppo <- function(env = "CartPole-v1", policy = NULL, batch_steps = NULL, batch = NULL,
+                      epochs = NULL, learning_rate = NULL, gamma = NULL, lambda = NULL,
+                      clip = NULL, entropy = NULL, value_weight = NULL, max_grad_norm = NULL,
+                      normalize_advantages = NULL, normalize_rewards = NULL, target_kl = NULL,
+                      min_episodes = NULL, iterations = NULL, total_steps = NULL, target = NULL,
+                      ...) {
+  make_and_train("agent_ppo", rlang::current_env(), ...)
+}

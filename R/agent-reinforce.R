@@ -1,0 +1,167 @@
+#' REINFORCE
+#'
+#' Plays whole episodes with a policy that draws its actions, and makes each action more likely in
+#' proportion to the discounted return that followed it (Williams 1992; Sutton and Barto 2018,
+#' sections 13.3 and 13.4): one step of Adam along the mean, over all steps, of (return - baseline)
+#' times the gradient of the action's log-probability.
+#'
+#' The baseline is a network of values with the policy's hidden layers, fitted after each iteration
+#' to the returns by `value_updates` steps of Adam. Without a baseline the return itself counts. An
+#' episode that was truncated would have gone on: with a baseline the value of its last state takes
+#' the place of the rewards to come; without one nothing can, and its returns are too low.
+#'
+#' Sutton and Barto multiply each step by `gamma^t`, which counts late steps less, as the gradient of
+#' the discounted return from the start asks for. This agent leaves the factor out, as nearly all
+#' implementations do: it would hardly learn from the end of an episode.
+#'
+#' Iterations, normalised observations and the default policy are those of [agent_ppo()].
+#'
+#' @param batch_steps About how many steps an iteration has, a whole number; the default is 1000.
+#' @param learning_rate The step size of Adam for the policy, a number above 0, or a function of the
+#'   steps so far such as [schedule_linear()]; the default is 0.01.
+#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
+#' @param baseline Is there a baseline? `TRUE`, the default, or `FALSE`.
+#' @param value_learning_rate The step size of Adam for the baseline; the default is 0.01.
+#' @param value_updates How many steps of Adam the baseline takes after each iteration, a whole
+#'   number; the default is 20.
+#' @param entropy How much the policy's entropy counts beside the return, a number or a function of
+#'   the steps so far; the default is 0.
+#' @param normalize_advantages Are the factors of the log-probabilities brought to the mean 0 and
+#'   the standard deviation 1? `TRUE`, the default, or `FALSE`.
+#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`, the default.
+#' @param min_episodes The least number of episodes of an iteration; the default is 8.
+#' @inheritParams agent_ars
+#' @param policy The policy; `NULL`, the default, is the preset's, or that of [agent_ppo()].
+#' @return `agent_reinforce()` an agent of class `gym_agent_reinforce`; `learn_reinforce()` makes
+#'   that agent, trains it and returns what [train_agent()] does. Its history, and the log, have for
+#'   each iteration `entropy_loss`, `explained_variance`, `policy_gradient_loss`, `value_loss` and
+#'   `learning_rate`.
+#' @section Errors: As [agent_ppo()].
+#' @references R. J. Williams (1992), Simple statistical gradient-following algorithms for
+#'   connectionist reinforcement learning, Machine Learning 8.
+#'
+#'   R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second edition,
+#'   MIT Press.
+#' @seealso [agent_ppo()]; `vignette("own-agent")`, which writes it in thirty lines
+#' @export
+#' @examples
+#' agent_reinforce()
+#' @examplesIf gym:::can_start_server()
+#' learn_reinforce("CartPole-v1", total_steps = 5000, seed = 1)
+agent_reinforce <- function(batch_steps = 1000, learning_rate = 0.01, gamma = 0.99,
+                            baseline = TRUE, value_learning_rate = 0.01, value_updates = 20,
+                            entropy = 0, normalize_advantages = TRUE, max_grad_norm = Inf,
+                            min_episodes = 8) {
+  settings <- mget(names(formals()))
+  check_iteration(batch_steps, min_episodes)
+  check_scheduled(settings, c("learning_rate", "value_learning_rate", "entropy"))
+  check_number(gamma, min = 0, max = 1)
+  check_flag(baseline)
+  check_count(value_updates)
+  check_flag(normalize_advantages)
+  check_number(max_grad_norm, min = 0)
+  new_gradient_agent("reinforce", c(settings, list(log = rlang::rep_named(reinforce_log, NA_real_))))
+}
+
+reinforce_log <- c(
+  "entropy_loss", "explained_variance", "policy_gradient_loss", "value_loss", "learning_rate"
+)
+
+#' @export
+agent_start.gym_agent_reinforce <- function(agent, policy) {
+  agent <- NextMethod()
+  check_has_log_prob(policy, "REINFORCE")
+  agent$adam <- new_adam(count_weights(policy))
+  if (agent$baseline) {
+    agent$value <- value_network(policy)
+    agent$value_adam <- new_adam(count_weights(agent$value))
+  }
+  agent
+}
+
+#' @export
+agent_tell.gym_agent_reinforce <- function(agent, results) {
+  if (is_warming_up(agent)) {
+    return(end_iteration(agent, results))
+  }
+  now <- scheduled_settings(agent, c("learning_rate", "value_learning_rate", "entropy"))
+  rows <- iteration_rows(agent$policy, results$trajectories)
+  n <- length(rows$reward)
+
+  # The discounted return from each step on.
+  reward <- rows$reward
+  value <- numeric(n)
+  if (agent$baseline) {
+    value <- expected_values(agent$value, rows$inputs)
+    last_value <- ifelse(rows$terminated[rows$last], 0, expected_values(agent$value, rows$last_inputs))
+    reward[rows$last] <- reward[rows$last] + agent$gamma * last_value
+  }
+  return <- sum_backwards(reward, agent$gamma, rows$last)
+  advantage <- return - value
+  if (agent$normalize_advantages) advantage <- standardized(advantage)
+
+  # A step up the gradient of mean(advantage * log-probability).
+  policy <- agent$policy
+  weights <- weight_vector(policy)
+  layers <- layers_of(policy, weights)
+  signals <- forward_layers(layers, policy$activation, rows$inputs)
+  outputs <- signals[[length(signals)]]
+  draws <- log_prob_of(
+    policy, outputs, policy$log_std, places_of_actions(nrow(outputs), rows$action)
+  )
+  slopes <- log_prob_slopes(policy, draws, -advantage / n, -now$entropy / n)
+  gradient <- c(
+    backward_layers(layers, policy$activation, signals, slopes$outputs), slopes$log_std
+  )
+  moved <- adam_step(
+    weights, clip_norm(gradient, agent$max_grad_norm), agent$adam, now$learning_rate
+  )
+  check_finite_weights(moved$weights, agent)
+  agent$policy <- with_weights(policy, moved$weights)
+  agent$adam <- moved$adam
+
+  if (agent$baseline) agent <- fit_baseline(agent, rows$inputs, return, now$value_learning_rate)
+  agent$log[] <- c(
+    -mean(draws$entropy), if (agent$baseline) explained_variance(value, return) else NA,
+    -mean(advantage * draws$log_prob), if (agent$baseline) mean((value - return)^2) else NA,
+    now$learning_rate
+  )
+  end_iteration(agent, results)
+}
+
+# Steps down the gradient of the squared error.
+fit_baseline <- function(agent, inputs, return, learning_rate) {
+  value <- agent$value
+  weights <- weight_vector(value)
+  for (update in seq_len(agent$value_updates)) {
+    layers <- layers_of(value, weights)
+    signals <- forward_layers(layers, value$activation, inputs)
+    error <- signals[[length(signals)]] - return
+    gradient <- backward_layers(layers, value$activation, signals, 2 / length(return) * error)
+    moved <- adam_step(weights, gradient, agent$value_adam, learning_rate)
+    weights <- moved$weights
+    agent$value_adam <- moved$adam
+  }
+  check_finite_weights(weights, agent)
+  agent$value <- with_weights(value, weights)
+  agent
+}
+
+#' @export
+format.gym_agent_reinforce <- function(x, ...) {
+  gradient_text(
+    if (x$baseline) "REINFORCE with baseline" else "REINFORCE",
+    x[c("batch_steps", "learning_rate", "gamma")]
+  )
+}
+
+#' @rdname agent_reinforce
+#' @export
+learn_reinforce <- function(env = "CartPole-v1", policy = NULL, batch_steps = NULL,
+                            learning_rate = NULL, gamma = NULL, baseline = NULL,
+                            value_learning_rate = NULL, value_updates = NULL, entropy = NULL,
+                            normalize_advantages = NULL, max_grad_norm = NULL,
+                            min_episodes = NULL, iterations = NULL, total_steps = NULL,
+                            target = NULL, ...) {
+  make_and_train("agent_reinforce", rlang::current_env(), ...)
+}

@@ -1,0 +1,213 @@
+#' Differentiate a network by hand
+#'
+#' What it takes to write an agent that climbs a gradient: how likely a policy's actions were, and
+#' how that changes with the weights. Both are calculated by matrix algebra, without automatic
+#' differentiation.
+#'
+#' `policy_log_prob()` and `policy_log_prob_gradient()` are for a [policy_network()] with the output
+#' `"softmax"`, whose actions have probabilities, or `"gaussian"`, whose actions have densities:
+#' those of the numbers that were drawn, not of those that were cut at the action's bounds.
+#'
+#' `policy_output_gradient()` is for any network, such as one of values:
+#' `policy_network(c(4, 64, 1), c("tanh", "identity"))` has one output, `predict(type = "output")`
+#' gives it, and this is its gradient.
+#'
+#' @param policy A network.
+#' @param observation Observations, as for [act()]: a matrix with one in each row, or a single one.
+#' @param action An action for each observation: a vector of whole numbers of a Discrete action
+#'   space (from 0 where the policy has not been played); for a Box a matrix with an action in each
+#'   row.
+#' @param weights How much each observation counts, a numeric vector, or one number for all; of
+#'   `policy_output_gradient()` for a network with several outputs a matrix with a row for each
+#'   observation and a column for each output. The default is 1.
+#' @return `policy_log_prob()` a numeric vector with the natural logarithm of a probability (or
+#'   density) for each observation. The others a numeric vector aligned with
+#'   [coef()][coef.gym_policy_network]: the gradient of the sum of `weights` times the logarithms,
+#'   or times the outputs. Its mean, such as the policy gradient of Sutton and Barto (2018, chapter
+#'   13) is, has `weights` that are divided by the number of observations.
+#' @section Errors: `gym_error_argument` for a policy that is no such network, and for observations,
+#'   actions and weights that do not fit it and each other.
+#' @references R. J. Williams (1992), Simple statistical gradient-following algorithms for
+#'   connectionist reinforcement learning, Machine Learning 8.
+#'
+#'   R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second edition,
+#'   MIT Press.
+#' @seealso [agent_reinforce()] and [agent_ppo()], which are made of these formulas
+#' @export
+#' @examples
+#' set.seed(1)
+#' policy <- policy_network(c(4, 8, 2), output = "softmax", init = "orthogonal")
+#' observations <- matrix(rnorm(12), ncol = 4)
+#' actions <- act(policy, observations)
+#' policy_log_prob(policy, observations, actions)
+#'
+#' # A step that makes these actions more likely.
+#' gradient <- policy_log_prob_gradient(policy, observations, actions)
+#' coef(policy) <- coef(policy) + 0.1 * gradient
+#' policy_log_prob(policy, observations, actions)
+policy_log_prob <- function(policy, observation, action) {
+  check_draws_known(policy)
+  seen <- seen_columns(policy, observation)
+  chosen <- action_places(policy, action, ncol(seen))
+  layers <- layers_of(policy, weight_vector(policy))
+  signals <- forward_layers(layers, policy$activation, seen)
+  log_prob_of(policy, signals[[length(signals)]], policy$log_std, chosen)$log_prob
+}
+
+#' @rdname policy_log_prob
+#' @export
+policy_log_prob_gradient <- function(policy, observation, action, weights = 1) {
+  check_draws_known(policy)
+  seen <- seen_columns(policy, observation)
+  n <- ncol(seen)
+  chosen <- action_places(policy, action, n)
+  weights <- check_row_weights(weights, n, 1L)[, 1L]
+  layers <- layers_of(policy, weight_vector(policy))
+  signals <- forward_layers(layers, policy$activation, seen)
+  parts <- log_prob_of(policy, signals[[length(signals)]], policy$log_std, chosen)
+  slopes <- log_prob_slopes(policy, parts, weights)
+  c(backward_layers(layers, policy$activation, signals, slopes$outputs), slopes$log_std)
+}
+
+#' @rdname policy_log_prob
+#' @export
+policy_output_gradient <- function(policy, observation, weights = 1) {
+  check_is_network(policy)
+  seen <- seen_columns(policy, observation)
+  weights <- check_row_weights(weights, ncol(seen), policy$sizes[[length(policy$sizes)]])
+  layers <- layers_of(policy, weight_vector(policy))
+  signals <- forward_layers(layers, policy$activation, seen)
+  gradient <- backward_layers(layers, policy$activation, signals, t(weights))
+  # The outputs do not depend on standard deviations.
+  c(gradient, if (is_gaussian(policy)) numeric(length(policy$log_std)))
+}
+
+# The formulas --------------------------------------------------------------------------------
+
+#' Compute how likely actions are
+#' @param outputs A matrix with a column for each observation.
+#' @param log_std The logarithms of standard deviations.
+#' @param chosen As action_places() returns it.
+#' @return A list: `log_prob` and `entropy`, vectors, and what their derivatives are made of.
+#' @noRd
+log_prob_of <- function(policy, outputs, log_std, chosen) {
+  n <- ncol(outputs)
+  if (is_gaussian(policy)) {
+    deviation <- exp(log_std)
+    z <- (chosen - outputs) / deviation
+    constant <- sum(log_std) + nrow(outputs) * log(2 * pi) / 2
+    return(list(
+      log_prob = -colSums(z * z) / 2 - constant, entropy = rep(constant + nrow(outputs) / 2, n),
+      z = z, deviation = deviation
+    ))
+  }
+  largest <- column_max(outputs)
+  logs <- outputs - rep(largest, each = nrow(outputs))
+  logs <- logs - rep(log(colSums(exp(logs))), each = nrow(outputs))
+  p <- exp(logs)
+  list(
+    log_prob = logs[chosen], entropy = -colSums(p * logs), logs = logs, p = p, chosen = chosen
+  )
+}
+
+#' Compute the derivatives of log-probabilities and entropies
+#' @param weights,of_entropy The derivatives of what is differentiated in each log-probability, and
+#'   in each entropy.
+#' @return A list: `outputs`, a matrix, and `log_std`, `NULL` for a softmax.
+#' @noRd
+log_prob_slopes <- function(policy, parts, weights, of_entropy = 0) {
+  if (is_gaussian(policy)) {
+    k <- nrow(parts$z)
+    by_output <- rep(weights, each = k)
+    return(list(
+      outputs = by_output * parts$z / parts$deviation,
+      log_std = rowSums(by_output * (parts$z * parts$z - 1)) +
+        sum(rep_len(of_entropy, ncol(parts$z)))
+    ))
+  }
+  k <- nrow(parts$p)
+  slopes <- parts$p * -rep(weights, each = k)
+  slopes[parts$chosen] <- slopes[parts$chosen] + weights
+  if (any(of_entropy != 0)) {
+    slopes <- slopes - of_entropy * parts$p * (parts$logs + rep(parts$entropy, each = k))
+  }
+  list(outputs = slopes)
+}
+
+column_max <- function(x) {
+  largest <- x[1L, ]
+  for (row in seq_len(nrow(x))[-1L]) largest <- pmax(largest, x[row, ])
+  largest
+}
+
+# What goes in --------------------------------------------------------------------------------
+
+seen_columns <- function(policy, observation, call = rlang::caller_env()) {
+  check_network(policy, call)
+  observation <- observations_from(observation, policy, call)
+  network_columns(policy, observation_rows(observation, policy$observation_space, call)$values, call)
+}
+
+#' Find the actions among the outputs
+#' @return For a softmax the places of the actions' outputs in a matrix with a column for each
+#'   observation, for a Gaussian a matrix with an action in each column.
+#' @noRd
+action_places <- function(policy, action, n, call = rlang::caller_env()) {
+  action <- plain_numbers(action, "action", call)
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  count <- if (is_gaussian(policy)) n * outputs else n
+  if (!is.numeric(action) || length(action) != count || anyNA(action)) {
+    of <- if (is_gaussian(policy)) paste0(" of ", count_of(outputs, "number"))
+    must <- paste0(count_of(n, "action"), of, ", one for each observation")
+    abort_argument(action, must, "action", call)
+  }
+  if (is_gaussian(policy)) {
+    # Of an action with several dimensions the numbers are taken row by row.
+    return(matrix(row_major(action), outputs))
+  }
+  start <- policy$action_space$start %||% 0L
+  at <- as.vector(action) - start + 1
+  if (any(at < 1 | at > outputs | at != trunc(at))) {
+    must <- paste("whole numbers from", start, "to", start + outputs - 1L)
+    abort_argument(action, must, "action", call)
+  }
+  places_of_actions(outputs, as.integer(at))
+}
+
+# Actions from 1 as places in a matrix with so many outputs in each column; the numbers of a Box as
+# they are.
+places_of_actions <- function(outputs, action) {
+  if (is.matrix(action)) action else (seq_along(action) - 1L) * outputs + action
+}
+
+check_row_weights <- function(weights, n, outputs, call = rlang::caller_env()) {
+  fits <- is.numeric(weights) && !anyNA(weights) && (
+    length(weights) == 1L || identical(dim(weights), c(n, outputs)) ||
+      (outputs == 1L && length(weights) == n)
+  )
+  if (!fits) {
+    must <- if (outputs == 1L) {
+      paste("one number, or one for each of", count_of(n, "observation"))
+    } else {
+      paste("one number, or a matrix of", n, "x", outputs)
+    }
+    abort_argument(weights, must, "weights", call)
+  }
+  matrix(weights, n, outputs)
+}
+
+check_is_network <- function(policy, call = rlang::caller_env()) {
+  if (!inherits(policy, "gym_policy_network")) abort_no_weights(policy, "policy", call)
+}
+
+check_draws_known <- function(policy, call = rlang::caller_env()) {
+  check_is_network(policy, call)
+  if (!policy$output %in% c("softmax", "gaussian")) {
+    gym_abort(
+      c(paste0("Actions have a probability where a network draws them by it, not in ",
+               policy_text(policy), "."),
+        i = "`policy_network(output = \"softmax\")` and `output = \"gaussian\"` do."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+}

@@ -1,0 +1,71 @@
+# The layers of a network for gradients by hand: forwards with what each layer gives kept, and
+# backwards from the outputs' derivatives to those of the weights. Observations are columns here, so
+# that a minibatch is cut out of memory in one piece and a bias is added to each column by R's own
+# recycling; network_outputs() has them in rows, as users do.
+
+#' Cut a vector of weights into layers
+#' @param policy A network, of which the sizes count, not the weights.
+#' @param weights Its weights, in the order of `coef()`.
+#' @return A list with a list for each layer: `weights`, a matrix with a row for each neuron, `bias`
+#'   (`NULL` for none).
+#' @noRd
+layers_of <- function(policy, weights) {
+  bias <- isTRUE(policy$bias)
+  end <- 0L
+  lapply(weight_shapes(policy$sizes, FALSE), function(shape) {
+    count <- shape[[1L]] * shape[[2L]]
+    own <- weights[end + seq_len(count)]
+    dim(own) <- shape
+    end <<- end + count
+    if (!bias) {
+      return(list(weights = own))
+    }
+    end <<- end + shape[[1L]]
+    list(weights = own, bias = weights[(end - shape[[1L]] + 1L):end])
+  })
+}
+
+#' Compute what each layer gives
+#' @param inputs A matrix with an observation in each column, as network_columns() returns it.
+#' @return A list of matrices: the inputs, then the outputs of each layer.
+#' @noRd
+forward_layers <- function(layers, activation, inputs) {
+  signals <- vector("list", length(layers) + 1L)
+  signals[[1L]] <- inputs
+  for (i in seq_along(layers)) {
+    sums <- layers[[i]]$weights %*% signals[[i]]
+    if (!is.null(layers[[i]]$bias)) sums <- sums + layers[[i]]$bias
+    signals[[i + 1L]] <- activate(sums, activation[[i]])
+  }
+  signals
+}
+
+#' Compute the derivatives of the weights
+#' @param signals As forward_layers() returns them.
+#' @param slopes The derivatives of the outputs, a matrix as they are.
+#' @return A vector in the order of `coef()`: the sums over all observations.
+#' @noRd
+backward_layers <- function(layers, activation, signals, slopes) {
+  gradient <- vector("list", length(layers))
+  for (i in rev(seq_along(layers))) {
+    if (activation[[i]] != "identity") {
+      slopes <- slopes * activation_slope(signals[[i + 1L]], activation[[i]])
+    }
+    gradient[[i]] <- c(
+      tcrossprod(slopes, signals[[i]]), if (!is.null(layers[[i]]$bias)) rowSums(slopes)
+    )
+    if (i > 1L) slopes <- crossprod(layers[[i]]$weights, slopes)
+  }
+  unlist(gradient)
+}
+
+#' Put observations into the columns of a matrix, as the network takes them in
+#' @param values A matrix with an observation in each row.
+#' @noRd
+network_columns <- function(policy, values, call = rlang::caller_env()) {
+  inputs <- network_inputs(policy$observation_space, values, call)
+  if (ncol(inputs) != policy$sizes[[1L]] || !is.numeric(inputs)) {
+    abort_observation(policy, values, call)
+  }
+  t(normalized(inputs, policy$moments))
+}
