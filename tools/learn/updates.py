@@ -1,0 +1,420 @@
+"""Makes tests/testthat/gradient_updates.json: ten updates of PPO and of DQN on stored data.
+
+Each was made twice: by Stable-Baselines3's own PPO.train() and DQN.train(), with networks of
+doubles, and by the NumPy code below, which knows nothing of torch and has double DQN as well. The
+script fails where the two differ. test-agent-gradient-updates.R compares the agents with both.
+
+    python3 -m venv sb3 && sb3/bin/pip install stable-baselines3==2.9.2
+    sb3/bin/python tools/learn/updates.py
+"""
+
+import itertools
+import json
+import sys
+
+import gymnasium
+import numpy as np
+import stable_baselines3 as sb3
+import torch
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.torch_layers import FlattenExtractor
+
+UPDATES = 10
+rng = np.random.default_rng(40)
+
+
+class InDoubles(FlattenExtractor):
+    """Stable-Baselines3 hands observations to the networks in single precision."""
+
+    def forward(self, observations):
+        """Flatten, as it is done there, and widen."""
+        return super().forward(observations).double()
+
+
+class Nothing(gymnasium.Env):
+    """An environment that only has spaces."""
+
+    def __init__(self, observation_space, action_space):
+        self.observation_space = observation_space
+        self.action_space = action_space
+
+
+def box(size, bound=np.inf):
+    """Make a space of vectors."""
+    return gymnasium.spaces.Box(-bound, bound, (size,), np.float32)
+
+
+def coarse(values):
+    """Round to numbers that single precision has, too, and that are short in a file."""
+    return np.round(values * 256) / 256
+
+
+# Weights: a list of matrices with a row for each neuron, the last column is the bias --------------
+
+
+def draw_weights(sizes):
+    """Draw the weights of a network."""
+    pairs = itertools.pairwise(sizes)
+    return [coarse(rng.normal(0, 0.7, (after, before + 1))) for before, after in pairs]
+
+
+def vector(layers, extra=()):
+    """In the order of coef(): layer after layer, each matrix column after column."""
+    return [float(x) for x in np.concatenate([*(w.ravel("F") for w in layers), extra])]
+
+
+def into_torch(layers, *modules):
+    """Put weights into the linear layers of modules."""
+    linear = [m for module in modules for m in module.modules() if hasattr(m, "bias")]
+    for weights, module in zip(layers, linear, strict=True):
+        module.weight.data = torch.from_numpy(weights[:, :-1].copy())
+        module.bias.data = torch.from_numpy(weights[:, -1].copy())
+
+
+def from_torch(*modules):
+    """Read the weights of the linear layers of modules."""
+    linear = [m for module in modules for m in module.modules() if hasattr(m, "bias")]
+    return [np.column_stack([m.weight.detach().numpy(), m.bias.detach().numpy()]) for m in linear]
+
+
+# The same in NumPy --------------------------------------------------------------------------------
+
+ACTIVATE = {"tanh": np.tanh, "ReLU": lambda x: np.maximum(x, 0)}
+SLOPE = {"tanh": lambda y: 1 - y**2, "ReLU": lambda y: (y > 0).astype(float)}
+
+
+def forward(layers, observations, activation):
+    """What comes into each layer, with its constant 1, and the outputs."""
+    seen, signal = [], observations
+    for number, weights in enumerate(layers):
+        seen.append(np.column_stack([signal, np.ones(len(signal))]))
+        signal = seen[-1] @ weights.T
+        if number < len(layers) - 1:
+            signal = ACTIVATE[activation](signal)
+    return seen, signal
+
+
+def backward(layers, seen, outputs, activation):
+    """The gradients of the weights, given that of the outputs."""
+    gradients, back = [], outputs
+    for number in reversed(range(len(layers))):
+        gradients.insert(0, back.T @ seen[number])
+        if number:
+            incoming = seen[number][:, :-1]
+            back = (back @ layers[number][:, :-1]) * SLOPE[activation](incoming)
+    return gradients
+
+
+class Adam:
+    """Kingma and Ba (2015), algorithm 1, after a cut of the gradient's norm."""
+
+    def __init__(self, learning_rate, eps, max_norm):
+        self.learning_rate, self.eps, self.max_norm = learning_rate, eps, max_norm
+        self.count, self.first, self.second, self.norms = 0, 0.0, 0.0, []
+
+    def step(self, gradients):
+        """Return what is added to the weights."""
+        flat = np.concatenate([g.ravel() for g in gradients])
+        self.norms.append(float(np.sqrt(flat @ flat)))
+        flat = flat * min(1.0, self.max_norm / (self.norms[-1] + 1e-6))
+        self.count += 1
+        self.first = 0.9 * self.first + 0.1 * flat
+        self.second = 0.999 * self.second + 0.001 * flat**2
+        mean = self.first / (1 - 0.9**self.count)
+        square = self.second / (1 - 0.999**self.count)
+        change = -self.learning_rate * mean / (np.sqrt(square) + self.eps)
+        ends = np.cumsum([g.size for g in gradients])[:-1]
+        return [c.reshape(g.shape) for c, g in zip(np.split(change, ends), gradients, strict=True)]
+
+
+def numpy_ppo(case, policy, value, log_std):
+    """Return the weights after each update of PPO."""
+    adam = Adam(case["learning_rate"], 1e-5, case["max_grad_norm"])
+    observations, actions = np.array(case["observation"]), np.array(case["action"])
+    after, clipped = [], 0
+    for rows in case["order"]:
+        seen_pi, out = forward(policy, observations[rows], "tanh")
+        seen_v, values = forward(value, observations[rows], "tanh")
+        n, d_log_std = len(rows), np.zeros(0)
+        action = actions[rows]
+        if log_std is None:
+            shifted = out - out.max(1, keepdims=True)
+            log_p = shifted - np.log(np.exp(shifted).sum(1, keepdims=True))
+            p = np.exp(log_p)
+            taken = np.eye(out.shape[1])[action]
+            log_prob = (log_p * taken).sum(1)
+            d_log_prob = taken - p
+            entropies = -(p * log_p).sum(1, keepdims=True)
+            d_entropy = -p * (log_p + entropies)
+        else:
+            z = (action - out) / np.exp(log_std)
+            log_prob = (-(z**2) / 2 - log_std - np.log(2 * np.pi) / 2).sum(1)
+            d_log_prob = z / np.exp(log_std)
+            d_entropy = np.zeros_like(out)
+        advantage = np.array(case["advantage"])[rows]
+        advantage = (advantage - advantage.mean()) / (advantage.std(ddof=1) + 1e-8)
+        ratio = np.exp(log_prob - np.array(case["log_prob"])[rows])
+        out_of_reach = np.where(advantage > 0, ratio > 1 + case["clip"], ratio < 1 - case["clip"])
+        clipped += out_of_reach.sum()
+        weight = -np.where(out_of_reach, 0, advantage * ratio) / n
+        d_out = weight[:, None] * d_log_prob - case["entropy"] * d_entropy / n
+        error = values[:, 0] - np.array(case["return"])[rows]
+        d_values = (2 * case["value_weight"] * error / n)[:, None]
+        gradients = backward(policy, seen_pi, d_out, "tanh")
+        gradients += backward(value, seen_v, d_values, "tanh")
+        if log_std is not None:
+            d_log_std = (weight[:, None] * (z**2 - 1)).sum(0) - case["entropy"]
+            gradients.append(d_log_std)
+        changes = adam.step(gradients)
+        if log_std is not None:
+            log_std = log_std + changes.pop()
+        policy = [w + c for w, c in zip(policy, changes, strict=False)]
+        value = [w + c for w, c in zip(value, changes[len(policy) :], strict=True)]
+        after.append(vector(policy, () if log_std is None else log_std) + vector(value))
+    # Each rule had something to do, and not everywhere.
+    assert 0 < clipped < len(observations) * UPDATES / 2, clipped
+    assert min(adam.norms) < case["max_grad_norm"] < max(adam.norms), adam.norms
+    return after
+
+
+def numpy_dqn(case, values):
+    """Return the weights after each update of DQN, and those of its target."""
+    adam = Adam(case["learning_rate"], 1e-8, case["max_grad_norm"])
+    target = values
+    after, errors, differs = [], [], False
+    data = {
+        name: np.array(case[name])
+        for name in ("observation", "action", "reward", "terminated", "next_observation")
+    }
+    for number, rows in enumerate(case["order"], start=1):
+        of = {name: column[rows] for name, column in data.items()}
+        n = np.arange(len(rows))
+        _, later = forward(target, of["next_observation"], "ReLU")
+        chosen = forward(values, of["next_observation"], "ReLU")[1] if case["double"] else later
+        differs = differs or (chosen.argmax(1) != later.argmax(1)).any()
+        later = later[n, chosen.argmax(1)]
+        wanted = of["reward"] + (1 - of["terminated"]) * case["discount"] * later
+        seen, out = forward(values, of["observation"], "ReLU")
+        error = out[n, of["action"]] - wanted
+        errors += list(np.abs(error))
+        d_out = np.zeros_like(out)
+        d_out[n, of["action"]] = np.clip(error, -1, 1) / len(rows)
+        changes = adam.step(backward(values, seen, d_out, "ReLU"))
+        values = [w + c for w, c in zip(values, changes, strict=True)]
+        if number % case["target_every"] == 0:
+            tau = case["tau"]
+            target = [(1 - tau) * t + tau * w for t, w in zip(target, values, strict=True)]
+        after.append(vector(values))
+    assert differs == case["double"]
+    assert min(errors) < 1 < max(errors), "Huber's loss has two branches"
+    assert min(adam.norms) < case["max_grad_norm"] < max(adam.norms), adam.norms
+    return after
+
+
+# Stable-Baselines3 --------------------------------------------------------------------------------
+
+
+def permutations(seed, rows, count):
+    """Draw the orders that the same seed gives Stable-Baselines3."""
+    np.random.seed(seed)
+    return [np.random.permutation(rows) for _ in range(count)]
+
+
+def sb3_ppo(case, policy, value, log_std, seed, epochs, batch):
+    """Return the weights after each step of the optimizer in PPO.train()."""
+    rows = len(case["action"])
+    observations = np.array(case["observation"])
+    discrete = log_std is None
+    outputs = len(policy[-1])
+    action_space = gymnasium.spaces.Discrete(outputs) if discrete else box(outputs, 100)
+    hidden = {"pi": [len(w) for w in policy[:-1]], "vf": [len(w) for w in value[:-1]]}
+    model = sb3.PPO(
+        "MlpPolicy",
+        Nothing(box(observations.shape[1]), action_space),
+        n_steps=rows,
+        n_epochs=epochs,
+        batch_size=batch,
+        learning_rate=case["learning_rate"],
+        clip_range=case["clip"],
+        ent_coef=case["entropy"],
+        vf_coef=case["value_weight"],
+        max_grad_norm=case["max_grad_norm"],
+        device="cpu",
+        policy_kwargs={"net_arch": hidden, "features_extractor_class": InDoubles},
+    )
+    model.set_logger(configure(None, []))
+    own = model.policy.double()
+    parts = (
+        [own.mlp_extractor.policy_net, own.action_net],
+        [own.mlp_extractor.value_net, own.value_net],
+    )
+    into_torch(policy, *parts[0])
+    into_torch(value, *parts[1])
+    if not discrete:
+        own.log_std.data = torch.from_numpy(log_std.copy())
+    buffer = model.rollout_buffer
+    buffer.observations[:, 0] = observations
+    buffer.actions[:, 0] = np.array(case["action"]).reshape(rows, -1)
+    for name, column in {
+        "log_probs": "log_prob",
+        "advantages": "advantage",
+        "returns": "return",
+        "values": "return",
+    }.items():
+        setattr(buffer, name, np.array(case[column]).reshape(rows, 1))
+    buffer.full = True
+    after = []
+
+    def keep(*_):
+        extra = () if discrete else own.log_std.detach().numpy()
+        after.append(vector(from_torch(*parts[0]), extra) + vector(from_torch(*parts[1])))
+
+    own.optimizer.register_step_post_hook(keep)
+    np.random.seed(seed)
+    model.train()
+    return after
+
+
+def sb3_dqn(case, values, seed, batch):
+    """Return the weights after each call of DQN.train()."""
+    rows = len(case["action"])
+    observations = np.array(case["observation"])
+    model = sb3.DQN(
+        "MlpPolicy",
+        Nothing(box(observations.shape[1]), gymnasium.spaces.Discrete(len(values[-1]))),
+        buffer_size=rows,
+        learning_rate=case["learning_rate"],
+        gamma=case["discount"],
+        max_grad_norm=case["max_grad_norm"],
+        tau=case["tau"],
+        target_update_interval=case["target_every"],
+        device="cpu",
+        policy_kwargs={
+            "net_arch": [len(w) for w in values[:-1]],
+            "features_extractor_class": InDoubles,
+        },
+    )
+    model.set_logger(configure(None, []))
+    model.policy.double()
+    into_torch(values, model.q_net)
+    into_torch(values, model.q_net_target)
+    buffer = model.replay_buffer
+    buffer.observations[:, 0] = observations
+    buffer.next_observations[:, 0] = np.array(case["next_observation"])
+    buffer.actions[:, 0, 0] = case["action"]
+    buffer.rewards[:, 0] = case["reward"]
+    buffer.dones[:, 0] = case["terminated"]
+    buffer.full = True
+    np.random.seed(seed)
+    after = []
+    for _ in range(UPDATES):
+        model.train(1, batch)
+        model._on_step()
+        after.append(vector(from_torch(model.q_net)))
+    return after
+
+
+# The cases ----------------------------------------------------------------------------------------
+
+
+def ppo_case(discrete, seed):
+    """Draw what an iteration of PPO might have, and update by it."""
+    rows, batch, epochs = 40, 20, 5
+    sizes = [4, 5, 3, 2]
+    policy, value = draw_weights(sizes), draw_weights([4, 4, 3, 1])
+    log_std = None if discrete else np.array([-0.3, 0.2])
+    observations = coarse(rng.normal(size=(rows, 4)))
+    _, out = forward([w + rng.normal(0, 0.05, w.shape) for w in policy], observations, "tanh")
+    if discrete:
+        action = rng.integers(0, 2, rows)
+        log_prob = (out - np.log(np.exp(out).sum(1, keepdims=True)))[np.arange(rows), action]
+    else:
+        action = coarse(out + np.exp(log_std) * rng.normal(size=out.shape))
+        z = (action - out) / np.exp(log_std)
+        log_prob = (-(z**2) / 2 - log_std - np.log(2 * np.pi) / 2).sum(1)
+    case = dict(
+        sizes=sizes,
+        value_sizes=[4, 4, 3, 1],
+        activation="tanh",
+        learning_rate=0.02,
+        clip=0.2,
+        entropy=0.01,
+        value_weight=0.5,
+        max_grad_norm=1.5,
+        observation=observations.tolist(),
+        action=action.tolist(),
+        log_prob=log_prob.tolist(),
+        advantage=coarse(rng.normal(2, 3, rows)).tolist(),
+        **{"return": coarse(rng.normal(1, 2, rows)).tolist()},
+        order=[
+            part.tolist()
+            for order in permutations(seed, rows, epochs)
+            for part in np.split(order, rows // batch)
+        ],
+        start={"policy": vector(policy, () if discrete else log_std), "value": vector(value)},
+    )
+    case["numpy"] = numpy_ppo(case, policy, value, log_std)
+    case["sb3"] = sb3_ppo(case, policy, value, log_std, seed, epochs, batch)
+    return case
+
+
+def dqn_case(seed, *, tau, target_every, max_grad_norm, double=False):
+    """Draw what a memory of DQN might have, and update by it."""
+    rows, batch = 40, 16
+    sizes = [4, 4, 4, 3]
+    values = draw_weights(sizes)
+    np.random.seed(seed)
+    order = []
+    for _ in range(UPDATES):
+        order.append(np.random.randint(0, rows, size=batch).tolist())
+        # Stable-Baselines3 draws a sub-environment for each row, too.
+        np.random.randint(0, high=1, size=(batch,))
+    case = {
+        "sizes": sizes,
+        "activation": "ReLU",
+        "learning_rate": 0.03,
+        "discount": 0.875,
+        "double": double,
+        "tau": tau,
+        "target_every": target_every,
+        "max_grad_norm": max_grad_norm,
+        "observation": coarse(rng.normal(size=(rows, 4))).tolist(),
+        "action": rng.integers(0, 3, rows).tolist(),
+        "reward": coarse(rng.normal(0, 1, rows)).tolist(),
+        "terminated": (rng.random(rows) < 0.2).astype(int).tolist(),
+        "next_observation": coarse(rng.normal(size=(rows, 4))).tolist(),
+        "order": order,
+        "start": vector(values),
+    }
+    case["numpy"] = numpy_dqn(case, values)
+    if not double:
+        case["sb3"] = sb3_dqn(case, values, seed, batch)
+    return case
+
+
+cases = {
+    "ppo": {"discrete": ppo_case(True, 1), "gaussian": ppo_case(False, 2)},
+    "dqn": {
+        "hard": dqn_case(3, tau=1.0, target_every=4, max_grad_norm=1.2),
+        "soft": dqn_case(4, tau=0.1, target_every=1, max_grad_norm=1.7),
+        "double": dqn_case(5, tau=1.0, target_every=5, max_grad_norm=0.45, double=True),
+    },
+}
+for agent, of_agent in cases.items():
+    for name, case in of_agent.items():
+        ours = np.array(case["numpy"])
+        if "sb3" in case:
+            apart = np.abs(ours - np.array(case["sb3"])).max()
+            print(f"{agent}, {name}: NumPy and Stable-Baselines3 are {apart:.1e} apart")
+            assert apart < 1e-12
+            case["sb3"] = np.round(case["sb3"], 12).tolist()
+        case["numpy"] = np.round(ours, 12).tolist()
+cases["made_with"] = {
+    "stable_baselines3": sb3.__version__,
+    "torch": torch.__version__,
+    "numpy": np.__version__,
+    "python": sys.version.split()[0],
+}
+with open("tests/testthat/gradient_updates.json", "w") as file:
+    json.dump(cases, file, separators=(",", ":"))
+    file.write("\n")
