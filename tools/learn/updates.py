@@ -20,6 +20,14 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.torch_layers import FlattenExtractor
 
 UPDATES = 10
+LOGGED = (
+    "approx_kl",
+    "clip_fraction",
+    "entropy_loss",
+    "policy_gradient_loss",
+    "value_loss",
+    "loss",
+)
 rng = np.random.default_rng(40)
 
 
@@ -221,7 +229,7 @@ def permutations(seed, rows, count):
 
 
 def sb3_ppo(case, policy, value, log_std, seed, epochs, batch):
-    """Return the weights after each step of the optimizer in PPO.train()."""
+    """Return the weights after each step of PPO.train(), and what it logs."""
     rows = len(case["action"])
     observations = np.array(case["observation"])
     discrete = log_std is None
@@ -272,7 +280,8 @@ def sb3_ppo(case, policy, value, log_std, seed, epochs, batch):
     own.optimizer.register_step_post_hook(keep)
     np.random.seed(seed)
     model.train()
-    return after
+    logged = {name: float(model.logger.name_to_value[f"train/{name}"]) for name in LOGGED}
+    return after, logged
 
 
 def sb3_dqn(case, values, seed, batch):
@@ -332,29 +341,29 @@ def ppo_case(discrete, seed):
         action = coarse(out + np.exp(log_std) * rng.normal(size=out.shape))
         z = (action - out) / np.exp(log_std)
         log_prob = (-(z**2) / 2 - log_std - np.log(2 * np.pi) / 2).sum(1)
-    case = dict(
-        sizes=sizes,
-        value_sizes=[4, 4, 3, 1],
-        activation="tanh",
-        learning_rate=0.02,
-        clip=0.2,
-        entropy=0.01,
-        value_weight=0.5,
-        max_grad_norm=1.5,
-        observation=observations.tolist(),
-        action=action.tolist(),
-        log_prob=log_prob.tolist(),
-        advantage=coarse(rng.normal(2, 3, rows)).tolist(),
-        **{"return": coarse(rng.normal(1, 2, rows)).tolist()},
-        order=[
+    case = {
+        "sizes": sizes,
+        "value_sizes": [4, 4, 3, 1],
+        "activation": "tanh",
+        "learning_rate": 0.02,
+        "clip": 0.2,
+        "entropy": 0.01,
+        "value_weight": 0.5,
+        "max_grad_norm": 1.5,
+        "observation": observations.tolist(),
+        "action": action.tolist(),
+        "log_prob": coarse(log_prob).tolist(),
+        "advantage": coarse(rng.normal(2, 3, rows)).tolist(),
+        "return": coarse(rng.normal(1, 2, rows)).tolist(),
+        "order": [
             part.tolist()
             for order in permutations(seed, rows, epochs)
             for part in np.split(order, rows // batch)
         ],
-        start={"policy": vector(policy, () if discrete else log_std), "value": vector(value)},
-    )
+        "start": vector(policy, () if discrete else log_std) + vector(value),
+    }
     case["numpy"] = numpy_ppo(case, policy, value, log_std)
-    case["sb3"] = sb3_ppo(case, policy, value, log_std, seed, epochs, batch)
+    case["sb3"], case["log"] = sb3_ppo(case, policy, value, log_std, seed, epochs, batch)
     return case
 
 
