@@ -6,32 +6,8 @@
 #   tools/in-env Rscript --no-init-file tools/bench-cpu.R [LunarLander-v3 ...]
 
 library(gym)
-for (file in c("turns", "workers", "tasks", "rollouts")) {
+for (file in c("turns", "workers", "cpu", "tasks", "rollouts")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
-}
-
-# The seconds that all threads of some processes have run.
-cpu_seconds <- function(pids) {
-  files <- Sys.glob(file.path("/proc", pids, "task", "*", "schedstat"))
-  times <- vapply(files, function(file) {
-    # A thread may end meanwhile.
-    line <- tryCatch(readLines(file), error = function(cnd) "0", warning = function(cnd) "0")
-    as.numeric(strsplit(line, " ")[[1L]][[1L]])
-  }, 0)
-  sum(times) / 1e9
-}
-
-# The processes that a process has started, and those that these have.
-descendants <- function(pid) {
-  table <- utils::read.table(text = system2("ps", c("-eo", "pid=,ppid="), stdout = TRUE))
-  found <- pid
-  repeat {
-    more <- setdiff(table[[1L]][table[[2L]] %in% found], found)
-    if (!length(more)) {
-      return(setdiff(found, pid))
-    }
-    found <- c(found, more)
-  }
 }
 
 seconds_of <- function(code) {
@@ -46,7 +22,7 @@ measure_task <- function(setup, task, turns = 3L) {
   loop <- python_loop(setup$python, task, list(task_numbers(task)))
   play(max_steps = 2)
   loop(2L)
-  server <- client_health(setup$client)$pid
+  server <- server_pid(setup$client)
   each <- vapply(seq_len(turns), function(turn) {
     processes <- list(R = Sys.getpid(), server = server, workers = descendants(server))
     before <- vapply(processes, cpu_seconds, 0)
@@ -56,8 +32,6 @@ measure_task <- function(setup, task, turns = 3L) {
   }, numeric(5L))
   apply(each, 1L, stats::median)
 }
-
-client_health <- function(client) get_request(client, "/v1/health/")
 
 wanted <- commandArgs(trailingOnly = TRUE)
 chosen <- if (length(wanted)) tasks[wanted] else tasks

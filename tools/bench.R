@@ -9,11 +9,12 @@
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
-#   [beside] [wire] [memory] runs parts.
+#   [beside] [wire] [memory] [gradients] runs parts. The last one, PPO against Stable-Baselines3, is
+# only run where GYM_SB3_PYTHON names a Python that has that; see tools/bench/gradients.R.
 
 library(gym)
-for (file in c("turns", "workers", "classic", "contenders", "r-env", "search", "tasks", "rollouts",
-               "beside", "wire", "results", "goals", "table", "figure",
+for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
+               "rollouts", "beside", "wire", "gradients", "results", "goals", "table", "figure",
                "figure-environments", "readme")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
@@ -26,11 +27,14 @@ settings <- function(quick) {
   if (quick) {
     list(turns = 3L, seconds = 0.3, num_envs = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,
          fresh = 1L, steps = 1e5, rollout_turns = 2L,
-         step_turns = 10L, turn_steps = 80)
+         step_turns = 10L, turn_steps = 80, gradient_turns = c("CartPole-v1" = 3L),
+         gradient_seeds = c("CartPole-v1" = 3L))
   } else {
     list(turns = 7L, seconds = 0.7, num_envs = c(1, 32, 256, 1024, 4096, 8192), searches = 5L,
          rounds = 50, fresh = 5L, steps = 1e6, rollout_turns = 3L,
-         step_turns = 40L, turn_steps = 160)
+         step_turns = 40L, turn_steps = 160,
+         gradient_turns = c("CartPole-v1" = 7L, "LunarLander-v3" = 5L),
+         gradient_seeds = c("CartPole-v1" = 10L, "LunarLander-v3" = 10L))
   }
 }
 
@@ -54,9 +58,10 @@ bench <- function(parts, quick) {
     if ("env_rollouts" %in% parts) compare_rollouts(python, scale$rollout_turns, quick),
     if ("beside" %in% parts) compare_beside(python, scale$rollout_turns, quick),
     if ("wire" %in% parts) compare_steps(python, scale$step_turns, scale$turn_steps),
+    if ("gradients" %in% parts) compare_gradients(python, scale),
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
-  list(rows = rows, run = c(describe_run(setup), took = paste(round(now() - started), "s")))
+  list(rows = rows, run = c(describe_run(setup, parts), took = paste(round(now() - started), "s")))
 }
 
 set_up <- function(python) {
@@ -85,7 +90,7 @@ measure_memory <- function(steps) {
   }))
 }
 
-describe_run <- function(setup) {
+describe_run <- function(setup, parts) {
   server <- ask(setup$python, "versions")
   ours <- c("gym", "httr", "curl", "jsonlite")
   reticulates <- lapply(setup$reticulate, ask, "versions")
@@ -99,7 +104,8 @@ describe_run <- function(setup) {
     reticulate = paste(vapply(reticulates, function(its) {
       paste0(its$reticulate, " on Python ", its$Python, " with gymnasium ", its$Gymnasium,
              ", NumPy ", its$NumPy)
-    }, ""), collapse = " and ")
+    }, ""), collapse = " and "),
+    if ("gradients" %in% parts) sb3_versions()
   )
 }
 
@@ -123,10 +129,10 @@ report <- function(result, csv, text, figure, environments) {
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
 all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
-               "memory")
+               "memory", "gradients")
 parts <- intersect(all_parts, arguments)
 whole <- !quick && !length(parts)
-if (!length(parts)) parts <- all_parts
+if (!length(parts)) parts <- setdiff(all_parts, if (!has_sb3()) "gradients")
 if (!whole) dir.create("pictures", showWarnings = FALSE)
 result <- bench(parts, quick)
 report(

@@ -82,7 +82,7 @@ measure_rollout_memory <- function(client) {
   if (!dir.exists("/proc")) {
     return(NULL)
   }
-  pid <- gym:::get_answer(client, "/v1/health/")$pid
+  pid <- server_pid(client)
   before <- private_megabytes(pid)
   lander_seconds(client)
   value <- private_megabytes(pid) - before

@@ -25,6 +25,7 @@ check_goals <- function(rows) {
     if ("candidates" %in% parts) list(candidates_goal(rows)),
     if ("beside" %in% parts) beside_goals(rows),
     if ("wire" %in% parts) wire_goals(rows),
+    if ("gradients" %in% parts) gradient_goals(rows),
     if ("memory" %in% parts) memory_goals(rows)
   )))
 }
@@ -187,4 +188,29 @@ memory_goals <- function(rows) {
     grown("R's objects"), grown("R"), grown("server"),
     goal("an instance of 8192 sub-environments: at most 100 MB of the server", many, at_most = 100)
   )
+}
+
+# Gradients --------------------------------------------------------------------------
+
+# A training that failed has taken infinitely long: what counts are medians of both.
+gradient_goals <- function(rows) {
+  gradients <- rows[rows$part == "gradients", ]
+  share <- function(env_id, unit, ratio) {
+    took <- lapply(gradient_names, function(name) {
+      values_of(rows, "gradients", name, unit = unit, env_id = env_id)
+    })
+    ratio(took$gym, took$sb3)
+  }
+  unlist(lapply(unique(gradients$env_id), function(env_id) {
+    list(
+      goal(paste0("PPO, ", env_id, ": the processor's time of a step, at most half of ",
+                  "Stable-Baselines3"),
+           share(env_id, "microseconds", function(gym, sb3) stats::median(gym / sb3)),
+           at_most = 0.5),
+      goal(paste0("PPO, ", env_id, ": the processor's time to the target, at most 0.6 of ",
+                  "Stable-Baselines3"),
+           share(env_id, "s", function(gym, sb3) stats::median(gym) / stats::median(sb3)),
+           at_most = 0.6)
+    )
+  }), recursive = FALSE)
 }

@@ -41,7 +41,8 @@ ratios <- function(gym, other, unit) {
 
 own <- c(
   single = "gym, env$step()", vector = "gym, env$step()", search = "gym, search_random()",
-  env_rollouts = "gym, rollout()", candidates = "gym, rollout()", wire = "gym, env$step()"
+  env_rollouts = "gym, rollout()", candidates = "gym, rollout()", wire = "gym, env$step()",
+  gradients = "gym, learn_ppo()"
 )
 
 # One row for each contender and number of sub-environments.
@@ -57,7 +58,8 @@ summarise <- function(rows) {
     ratio <- NA
     if (!is.na(reference) && reference != key$contender && key$unit != "steps") {
       gym <- values_of(rows, key$part, reference, key$num_envs, key$unit, key$env_id)
-      ratio <- stats::median(ratios(gym, values, key$unit))
+      # Where both failed there is no ratio.
+      ratio <- stats::median(ratios(gym, values, key$unit), na.rm = TRUE)
     }
     called <- rows$called[rows$part == key$part & rows$contender == key$contender &
                             rows$env_id == key$env_id & rows$num_envs == key$num_envs][1L]
