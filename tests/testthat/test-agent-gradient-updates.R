@@ -50,3 +50,34 @@ test_that("what PPO logs are the numbers of Stable-Baselines3", {
     expect_equal(log[names(case$log)], unlist(case$log), tolerance = 1e-7)
   }
 })
+
+test_that("ten updates of DQN are those of Stable-Baselines3 and of NumPy, the target's too", {
+  seeds <- c(hard = 3, soft = 4, double = 5)
+  cases <- stored_updates("dqn")
+  env <- fake_environment(action_space = discrete_space(3))
+  for (name in names(cases)) {
+    case <- cases[[name]]
+    soft <- case$target_every == 1L
+    agent <- agent_dqn(
+      memory = 40, batch = ncol(case$order), learning_rate = case$learning_rate,
+      gamma = case$discount, double = case$double, target_every = case$target_every,
+      target_rate = if (soft) case$tau, max_grad_norm = case$max_grad_norm
+    )
+    policy <- policy_network(
+      case$sizes, c("ReLU", "identity"), bias = TRUE, output = "epsilon-greedy"
+    )
+    coef(policy) <- case$start
+    agent <- agent_start(agent, policy_bind(policy, env))
+    memory <- remember_steps(new_memory(), agent$policy, list(
+      observation = case$observation, next_observation = case$next_observation,
+      action = case$action, reward = case$reward, terminated = case$terminated
+    ), 40)
+    set.seed(seeds[[name]])
+    weights <- vapply(0:9, function(steps) {
+      agent$steps <<- steps
+      agent <<- learn_from_memory(agent, memory, 1, 1, agent)
+      coef(agent$policy)
+    }, case$start)
+    expect_same_updates(t(weights), case)
+  }
+})

@@ -6,10 +6,13 @@ script fails where the two differ. test-agent-gradient-updates.R compares the ag
 
     python3 -m venv sb3 && sb3/bin/pip install stable-baselines3==2.9.2
     sb3/bin/python tools/learn/updates.py
+
+It asks Rscript which rows of its memory agent_dqn() draws.
 """
 
 import itertools
 import json
+import subprocess
 import sys
 
 import gymnasium
@@ -284,7 +287,7 @@ def sb3_ppo(case, policy, value, log_std, seed, epochs, batch):
     return after, logged
 
 
-def sb3_dqn(case, values, seed, batch):
+def sb3_dqn(case, values):
     """Return the weights after each call of DQN.train()."""
     rows = len(case["action"])
     observations = np.array(case["observation"])
@@ -313,11 +316,11 @@ def sb3_dqn(case, values, seed, batch):
     buffer.actions[:, 0, 0] = case["action"]
     buffer.rewards[:, 0] = case["reward"]
     buffer.dones[:, 0] = case["terminated"]
-    buffer.full = True
-    np.random.seed(seed)
+    orders = iter(case["order"])
+    buffer.sample = lambda batch_size, env: buffer._get_samples(np.array(next(orders)), env)
     after = []
     for _ in range(UPDATES):
-        model.train(1, batch)
+        model.train(1)
         model._on_step()
         after.append(vector(from_torch(model.q_net)))
     return after
@@ -367,21 +370,22 @@ def ppo_case(discrete, seed):
     return case
 
 
+def drawn_by_r(seed, rows, batch):
+    """Return the rows that agent_dqn() draws after set.seed(), which R has to say."""
+    script = f"set.seed({seed}); cat(sample.int({rows}, {batch * UPDATES}, replace = TRUE) - 1L)"
+    said = subprocess.run(["Rscript", "-e", script], capture_output=True, check=True, text=True)
+    return np.array(said.stdout.split(), dtype=int).reshape(UPDATES, batch).tolist()
+
+
 def dqn_case(seed, *, tau, target_every, max_grad_norm, double=False):
     """Draw what a memory of DQN might have, and update by it."""
     rows, batch = 40, 16
     sizes = [4, 4, 4, 3]
     values = draw_weights(sizes)
-    np.random.seed(seed)
-    order = []
-    for _ in range(UPDATES):
-        order.append(np.random.randint(0, rows, size=batch).tolist())
-        # Stable-Baselines3 draws a sub-environment for each row, too.
-        np.random.randint(0, high=1, size=(batch,))
     case = {
         "sizes": sizes,
         "activation": "ReLU",
-        "learning_rate": 0.03,
+        "learning_rate": 0.1 if double else 0.03,
         "discount": 0.875,
         "double": double,
         "tau": tau,
@@ -392,19 +396,19 @@ def dqn_case(seed, *, tau, target_every, max_grad_norm, double=False):
         "reward": coarse(rng.normal(0, 1, rows)).tolist(),
         "terminated": (rng.random(rows) < 0.2).astype(int).tolist(),
         "next_observation": coarse(rng.normal(size=(rows, 4))).tolist(),
-        "order": order,
+        "order": drawn_by_r(seed, rows, batch),
         "start": vector(values),
     }
     case["numpy"] = numpy_dqn(case, values)
     if not double:
-        case["sb3"] = sb3_dqn(case, values, seed, batch)
+        case["sb3"] = sb3_dqn(case, values)
     return case
 
 
 cases = {
     "ppo": {"discrete": ppo_case(True, 1), "gaussian": ppo_case(False, 2)},
     "dqn": {
-        "hard": dqn_case(3, tau=1.0, target_every=4, max_grad_norm=1.2),
+        "hard": dqn_case(3, tau=1.0, target_every=4, max_grad_norm=0.35),
         "soft": dqn_case(4, tau=0.1, target_every=1, max_grad_norm=1.7),
         "double": dqn_case(5, tau=1.0, target_every=5, max_grad_norm=0.45, double=True),
     },
