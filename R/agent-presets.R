@@ -3,21 +3,26 @@
 
 #' Settings that solve environments
 #'
-#' [search_ars()] and [search_cem()] take these settings where the environment is named by its id
-#' and has a row here, and say so. Arguments that are given take the place of the preset's.
+#' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()] and [learn_dqn()] take these
+#' settings where the environment is named by its id and has a row here, and say so. Arguments that
+#' are given take the place of the preset's.
 #'
 #' @param env_id The id of an environment, a string, for its presets alone; `NULL`, the default, for
 #'   all.
 #' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the environment's
-#'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"` or `"cem"`), the
-#'   agent's arguments (see [agent_ars()] and [agent_cem()]; `NA` where it has no such one), of the
-#'   policy `hidden` (how many hidden neurons a network has, which are tanh and see normalised
-#'   observations, `NA` for a linear policy) and `bias` (a logical), of the training `episodes`,
+#'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"`, `"cem"`, `"ppo"`,
+#'   `"reinforce"` or `"dqn"`), the agent's arguments (see [agent_ars()] and the others; `NA` where
+#'   it has no such one, or keeps its default), of the policy of a search `hidden` (how many hidden
+#'   neurons a network has, which are tanh and see normalised observations, `NA` for a linear policy)
+#'   and `bias` (a logical), of the others `normalize` (whether their network sees normalised
+#'   observations), of the training `episodes`,
 #'   `total_steps` (its budget) and `target` (the mean return at which it stops, which lies above
 #'   the one that the environment counts as solved, so that the final evaluation reaches that), and
 #'   where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how
 #'   many settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
-#'   `vignette("solved")` reports other seeds.
+#'   `vignette("solved")` reports other seeds. Where `linear` is `TRUE`, `learning_rate` and `clip`
+#'   go from their numbers to 0 in `total_steps`; `epsilon` goes from 1 to its number in
+#'   `epsilon_steps`.
 #' @section Errors: `gym_error_argument` when `env_id` is no string.
 #' @export
 #' @examples
@@ -48,10 +53,35 @@ find_preset <- function(agent, env, kwargs) {
     preset <- as.list(presets[row, ])
     own <- if (nzchar(preset$kwargs)) from_json(preset$kwargs) else list()
     if (identical(sorted_by_name(own), sorted_by_name(kwargs))) {
-      return(Filter(function(value) !is.na(value) && !identical(value, ""), preset))
+      return(preset_settings(preset))
     }
   }
   NULL
+}
+
+# What a row of the table has.
+preset_settings <- function(row) {
+  Filter(function(value) !is.na(value) && !identical(value, ""), as.list(row))
+}
+
+# What a preset gives the function that makes its agent.
+preset_arguments <- function(preset) {
+  if (isTRUE(preset$linear)) {
+    falling <- intersect(c("learning_rate", "clip"), names(preset))
+    preset[falling] <- lapply(preset[falling], schedule_linear, 0, preset$total_steps)
+  }
+  if (!is.null(preset$epsilon_steps)) {
+    preset$epsilon <- schedule_linear(1, preset$epsilon, preset$epsilon_steps)
+  }
+  preset[intersect(names(formals(preset_maker(preset))), names(preset))]
+}
+
+preset_maker <- function(preset) get(paste0("agent_", preset$agent), mode = "function")
+
+# The agent of a row of the table.
+preset_agent <- function(row) {
+  preset <- preset_settings(row)
+  rlang::exec(preset_maker(preset), !!!preset_arguments(preset))
 }
 
 # An empty list may have names or none.
@@ -76,7 +106,7 @@ make_and_train <- function(make, frame, ...) {
   kwargs <- dots[!names(dots) %in% of_training]
   preset <- find_preset(sub("agent_", "", make), env, kwargs)
   own <- intersect(of_agent, names(given))
-  arguments <- preset[intersect(of_agent, names(preset))]
+  arguments <- if (!is.null(preset)) preset_arguments(preset) else list()
   # A part of the candidates that was meant for another number of them, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
@@ -91,7 +121,7 @@ make_and_train <- function(make, frame, ...) {
   if (!is.null(preset)) {
     from_preset <- setdiff(c("episodes", "target", if (!budget) "total_steps"), names(training))
     training[from_preset] <- preset[from_preset]
-    training$policy <- training$policy %||% preset_policy(preset)
+    training$policy <- training$policy %||% preset_policy(preset, agent)
     inform_of_preset(preset, env)
     agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
     agent$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
@@ -118,8 +148,12 @@ preset_hints <- function(env, kwargs) {
   )
 }
 
-preset_policy <- function(preset) {
-  if (is.null(preset$hidden)) {
+preset_policy <- function(preset, agent) {
+  if (inherits(agent, "gym_agent_gradient")) {
+    policy <- default_policy(agent)
+    if (isTRUE(preset$normalize)) policy$moments <- no_moments()
+    policy
+  } else if (is.null(preset$hidden)) {
     policy_linear(bias = preset$bias)
   } else {
     policy_network(

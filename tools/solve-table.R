@@ -3,6 +3,7 @@
 # with the settings of agent_presets(), with seeds that no setting was tried on.
 #
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
+#     [methods=METHOD,...]
 #
 # It takes hours. What the tables have already is not trained again, so that it may be stopped at
 # any time; a row that is to be made anew is deleted from both first. At the end the short table of
@@ -12,10 +13,11 @@ source("tools/solve/jobs.R")
 source("tools/solve/readme.R")
 
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
+methods <- strsplit(option("methods", paste(unique(solve_jobs$method), collapse = ",")), ",")[[1L]]
 
 table_file <- "inst/extdata/solve-table.csv.gz"
 curve_file <- "inst/extdata/solve-curves.csv.gz"
-key <- function(rows) paste(rows$env_id, rows$kwargs, rows$seed)
+key <- function(rows) paste(job_key(rows), rows$seed)
 read_rows <- function(file) {
   if (file.exists(file)) {
     utils::read.csv(file, na.strings = "NA", colClasses = c(kwargs = "character"))
@@ -25,7 +27,7 @@ read_rows <- function(file) {
 # Adds rows in the order of the jobs and seeds.
 add_rows <- function(file, rows) {
   all <- rbind(read_rows(file), rows)
-  of_job <- match(paste(all$env_id, all$kwargs), paste(solve_jobs$env_id, solve_jobs$kwargs))
+  of_job <- match(job_key(all), job_key(solve_jobs))
   all <- all[order(of_job, all$seed, method = "radix"), ]
   to <- if (endsWith(file, ".gz")) gzfile(file, compression = 9L) else base::file(file)
   open(to, "w")
@@ -36,11 +38,12 @@ add_rows <- function(file, rows) {
 todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
   job <- solve_jobs[row, ]
   data.frame(
-    row = row, env_id = job$env_id, kwargs = job$kwargs,
+    row = row, env_id = job$env_id, kwargs = job$kwargs, method = job$method,
     seed = first_seed(job) + seq_len(job$seeds) - 1L
   )
 }))
-todo <- todo[todo$env_id %in% only & !key(todo) %in% key(read_rows(table_file)), ]
+todo <- todo[todo$env_id %in% only & todo$method %in% methods, ]
+todo <- todo[!key(todo) %in% key(read_rows(table_file)), ]
 cat(nrow(todo), "trainings to come\n")
 
 run_side_by_side(

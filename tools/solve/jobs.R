@@ -6,7 +6,7 @@
 # reported on the seeds from 2001 on, and so on; the rows of the first choice stay in the table.
 
 solve_jobs <- utils::read.csv(text = "
-env_id,kwargs,agent,target,target_source,choice,seeds
+env_id,kwargs,method,target,target_source,choice,seeds
 CartPole-v1,,ars,475,registered,1,20
 Acrobot-v1,,ars,-100,registered,1,20
 MountainCarContinuous-v0,,ars,90,registered,1,20
@@ -17,7 +17,20 @@ HalfCheetah-v5,,ars,3430,paper (registered 4800),1,10
 Pendulum-v1,,cem,-200,ours,2,10
 Hopper-v5,,ars,3120,paper (registered 3800),1,1
 BipedalWalker-v3,,ars,300,registered,1,1
+CartPole-v1,,ppo,475,registered,1,10
+CartPole-v1,,reinforce,475,registered,1,10
+CartPole-v1,,dqn,475,registered,1,5
+Acrobot-v1,,ppo,-100,registered,1,5
+Pendulum-v1,,ppo,-200,ours,1,5
+LunarLander-v3,,ppo,200,registered,1,5
+LunarLander-v3,continuous,ppo,200,registered,1,5
 ", strip.white = TRUE, na.strings = "NA", colClasses = c(kwargs = "character"))
+
+# What a job is told apart from others by. Searches of one environment are one: the first choices of
+# Swimmer-v5 were of another method than the last one.
+job_key <- function(rows) {
+  paste(rows$env_id, rows$kwargs, ifelse(rows$method %in% c("ars", "cem"), "search", rows$method))
+}
 
 first_seed <- function(job) 1000L * job$choice + 1L
 
