@@ -13,9 +13,9 @@
 #'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"`, `"cem"`, `"ppo"`,
 #'   `"reinforce"` or `"dqn"`), the agent's arguments (see [agent_ars()] and the others; `NA` where
 #'   it has no such one, or keeps its default), of the policy of a search `hidden` (how many hidden
-#'   neurons a network has, which are tanh and see normalised observations, `NA` for a linear policy)
-#'   and `bias` (a logical), of the others `normalize` (whether their network sees normalised
-#'   observations), of the training `episodes`,
+#'   neurons a network has, which are tanh and see normalised observations, `NA` for a linear
+#'   policy) and `bias` (a logical), of the others `normalize` (whether their network sees
+#'   normalised observations), of the training `episodes`,
 #'   `total_steps` (its budget) and `target` (the mean return at which it stops, which lies above
 #'   the one that the environment counts as solved, so that the final evaluation reaches that), and
 #'   where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how

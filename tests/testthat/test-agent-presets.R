@@ -6,10 +6,8 @@ test_that("every preset makes its agent, and says where it comes from", {
   for (row in seq_len(nrow(presets))) {
     agent <- preset_agent(presets[row, ])
     expect_s3_class(agent, "gym_agent")
-    preset <- preset_settings(presets[row, ])
-    given <- preset[intersect(names(preset), names(agent))]
-    plain <- !vapply(agent[names(given)], is.function, NA)
-    expect_equal(agent[names(given)][plain], given[plain])
+    given <- Filter(Negate(is.function), preset_arguments(preset_settings(presets[row, ])))
+    expect_equal(agent[names(given)], given)
   }
   ppo <- preset_agent(presets[presets$agent == "ppo" & presets$env_id == "CartPole-v1", ])
   expect_equal(ppo$learning_rate(c(0, 5e4, 1e5)), c(1e-3, 5e-4, 0))

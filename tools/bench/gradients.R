@@ -59,9 +59,10 @@ compare_gradients <- function(python, scale) {
     play_gradients(contenders, scale$gradient_turns, "a step", function(env_id, seed) {
       timed_task(env_id, seed, timed_steps[[env_id]])
     }, function(took) measured_cpu(took$seconds / took$steps * 1e6, "microseconds")),
-    play_gradients(contenders, scale$gradient_seeds, "until the target", gradient_task, function(took) {
-      measured_cpu(if (took$reached) took$seconds else Inf, "s")
-    })
+    play_gradients(
+      contenders, scale$gradient_seeds, "until the target", gradient_task,
+      function(took) measured_cpu(if (took$reached) took$seconds else Inf, "s")
+    )
   )
 }
 

@@ -21,8 +21,8 @@ training <- suppressMessages(do.call(search, c(
 )))
 processor <- round(used() - before, 1)
 
-# What the policy earns where it draws its actions, as it did in training; the final evaluation takes
-# the most likely one.
+# What the policy earns where it draws its actions, as it did in training; the final evaluation
+# takes the most likely one.
 drawn_return <- if (job$method %in% c("ppo", "reinforce")) {
   do.call(evaluate_policy, c(
     list(job$env_id, training$policy, episodes = 100, seed = training$seed),
