@@ -132,7 +132,9 @@ outputs_of <- function(policy, weights, inputs) {
 #' @noRd
 draw_minibatches <- function(n, batch) {
   count <- max(1, round(n / batch))
-  split(sample.int(n), ceiling(seq_len(n) * count / n))
+  order <- sample.int(n)
+  ends <- (0:count * as.numeric(n)) %/% count
+  lapply(seq_len(count), function(i) order[(ends[[i]] + 1):ends[[i + 1L]]])
 }
 
 #' @export

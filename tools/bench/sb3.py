@@ -15,7 +15,7 @@ import torch
 from stable_baselines3 import PPO, __version__
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 torch.set_num_threads(1)
 
@@ -45,8 +45,6 @@ def train(task):
     """Train once and tell what it took."""
     # make_vec_env() would ask some environments for a picture of each step.
     envs = DummyVecEnv([lambda: Monitor(gymnasium.make(task["env_id"]))] * task["num_envs"])
-    if task["normalize"]:
-        envs = VecNormalize(envs, norm_reward=False)
     schedule = linear if task["linear"] else float
     model = PPO(
         "MlpPolicy",

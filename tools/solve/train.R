@@ -25,7 +25,7 @@ processor <- round(used() - before, 1)
 # takes the most likely one.
 drawn_return <- if (job$method %in% c("ppo", "reinforce")) {
   do.call(evaluate_policy, c(
-    list(job$env_id, training$policy, episodes = 100, seed = training$seed),
+    list(job$env_id, agent_behavior(training$agent), episodes = 100, seed = training$seed),
     job_kwargs(job$kwargs)
   ))$mean_return
 } else {
