@@ -48,59 +48,94 @@ agent_start.gym_agent_monte_carlo <- function(agent, policy) {
   agent
 }
 
-#' @export
-agent_act.gym_agent_monte_carlo <- function(agent, observation, sub_env) {
-  values <- values_of(agent, seen_by(agent, observation, sub_env))
-  column <- choose_actions(agent, values)
-  if (agent$exploring_starts) {
-    known <- lengths(agent$pending)
-    starts <- is.na(known[sub_env]) | known[sub_env] == 0L
-    column[starts] <- draw_table_actions(list(epsilon = 1), values)[starts]
-  }
-  column - 1L + agent$spaces$action_space$start
+#' @exportS3Method
+learner_of.gym_agent_monte_carlo <- function(agent) {
+  learning <- learning_of(agent)
+  row <- learning$store$row
+  choose <- learning$choose
+  draw <- learning$uniform$draw
+  taken <- agent$taken
+  returns <- new_returns(agent, learning$store)
+  episode_of <- for_each_sub_env(new_episode)
+  starts <- agent$exploring_starts
+  new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) {
+      values <- row(x)
+      if (starts) draw_place(values > -Inf, draw()) else choose(values, taken)
+    },
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      episode <- episode_of(sub_env)
+      episode$add(x, column, reward)
+      taken <<- taken + 1
+      if (ended) {
+        returns$learn(episode$take(), taken)
+        NA_integer_
+      } else {
+        choose(row(after), taken)
+      }
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      agent$visited <- returns$visited()
+      agent
+    }
+  )
 }
 
-#' @export
-agent_observe.gym_agent_monte_carlo <- function(agent, transitions) {
-  column <- action_columns(agent$spaces, transitions$action)
-  row <- seen_by(agent, transitions$observation, column)[, 1L]
-  cell <- row + nrow(agent$weights) * (column - 1L)
-  ended <- transitions$terminated | transitions$truncated
-  for (i in seq_along(cell)) {
-    place <- transitions$sub_env[[i]]
-    episode <- if (!transitions$first[[i]]) agent$pending[[place]]
-    episode <- c(episode, list(c(cell[[i]], transitions$reward[[i]])))
-    if (ended[[i]]) {
-      agent <- learn_episode(agent, do.call(rbind, episode))
-      episode <- list()
+# Keeps the steps of an episode until it has ended.
+new_episode <- function() {
+  x <- integer()
+  column <- integer()
+  reward <- numeric()
+  count <- 0L
+  list(
+    add = function(state, action, won) {
+      count <<- count + 1L
+      x[[count]] <<- state
+      column[[count]] <<- action
+      reward[[count]] <<- won
+    },
+    take = function() {
+      all <- seq_len(count)
+      count <<- 0L
+      list(x = x[all], column = column[all], reward = reward[all])
     }
-    agent$pending[place] <- list(episode)
-  }
-  agent$taken <- agent$taken + length(cell)
-  agent
+  )
 }
 
-# `episode` has a row for each step: the cell of the table, and the reward.
-learn_episode <- function(agent, episode) {
-  cell <- as.integer(episode[, 1L])
-  returns <- discounted_returns(episode[, 2L], agent$discount)
-  counted <- if (agent$visits == "first") which(!duplicated(cell)) else rev(seq_along(cell))
-  for (i in counted) {
-    at <- cell[[i]]
-    agent$visited[[at]] <- agent$visited[[at]] + 1
-    rate <- if (is.null(agent$learning_rate)) {
-      1 / agent$visited[[at]]
-    } else {
-      scheduled(agent$learning_rate, agent$taken, "learning_rate")
-    }
-    agent$weights[[at]] <- agent$weights[[at]] + rate * (returns[[i]] - agent$weights[[at]])
-  }
-  agent
+#' Keep the means of returns
+#' @return A list of functions: `learn(episode, taken)`, of the steps of a whole episode, and
+#'   `visited()`, how often each state and action has counted.
+#' @noRd
+new_returns <- function(agent, store) {
+  visited <- agent$visited
+  rate <- if (!is.null(agent$learning_rate)) rate_of(agent$learning_rate)
+  discount <- agent$discount
+  first_only <- agent$visits == "first"
+  list(
+    learn = function(episode, taken) {
+      cell <- store$cells(episode$x, episode$column)
+      returns <- discounted_returns(episode$reward, discount)
+      counted <- if (first_only) which(!duplicated(cell)) else rev(seq_along(cell))
+      for (i in counted) {
+        at <- cell[[i]]
+        visited[[at]] <<- visited[[at]] + 1
+        share <- if (is.null(rate)) 1 / visited[[at]] else rate(taken)
+        store$toward(episode$x[[i]], episode$column[[i]], returns[[i]], share)
+      }
+    },
+    visited = function() visited
+  )
 }
 
 # What followed on each step: its reward, and those after it, discounted.
 discounted_returns <- function(rewards, discount) {
-  rev(Reduce(function(later, reward) reward + discount * later, rev(rewards), accumulate = TRUE))
+  later <- 0
+  for (i in rev(seq_along(rewards))) {
+    rewards[[i]] <- later <- rewards[[i]] + discount * later
+  }
+  rewards
 }
 
 #' @export

@@ -85,79 +85,114 @@ agent_start.gym_agent_q <- function(agent, policy) {
   agent
 }
 
-#' @export
-agent_observe.gym_agent_q <- function(agent, transitions) {
-  column <- action_columns(agent$spaces, transitions$action)
-  present <- seen_by(agent, transitions$observation, column)
-  after <- seen_by(agent, transitions$next_observation, column)
-  agent <- with_known_weights(agent, present)
+#' @exportS3Method
+learner_of.gym_agent_q <- function(agent) {
   if (agent$double) {
-    return(learn_double(agent, present, column, transitions, after))
+    return(double_steps(agent))
   }
-  agent <- learn_from(agent, present, column, transitions, row_max(values_of(agent, after)))
-  if (agent$planning > 0L) {
-    agent <- plan_again(remember(agent, present, column, transitions, after), length(column))
-  }
-  agent
-}
-
-# A coin decides for each transition which of the two tables learns from it.
-learn_double <- function(agent, present, column, transitions, after) {
-  agent$second <- agent$second %||% agent$weights
-  first <- stats::runif(length(column)) < 0.5
-  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
-  learns <- function(own, choosing, valuing) {
-    if (!any(own)) {
-      return(choosing)
-    }
-    n <- sum(own)
-    best <- best_column(values_of(agent, after[own, , drop = FALSE], choosing))
-    ahead <- values_of(agent, after[own, , drop = FALSE], valuing)[cbind(seq_len(n), best)]
-    ahead[transitions$terminated[own]] <- 0
-    there <- present[own, , drop = FALSE]
-    value <- values_of(agent, there, choosing)[cbind(seq_len(n), column[own])]
-    error <- transitions$reward[own] + agent$discount * ahead - value
-    move_weights(agent$basis, choosing, there, column[own], rate, error)
-  }
-  weights <- agent$weights
-  agent$weights <- learns(first, weights, agent$second)
-  agent$second <- learns(!first, agent$second, weights)
-  agent$taken <- agent$taken + length(column)
-  agent
-}
-
-# Keeps the last outcome of each state and action.
-remember <- function(agent, present, column, transitions, after) {
-  count <- nrow(agent$weights)
-  pair <- present[, 1L] + count * (column - 1L)
-  memory <- agent$memory
-  if (is.null(memory$outcome)) {
-    memory$outcome <- matrix(NA_real_, length(agent$weights), 3L)
-  }
-  new <- unique(pair[is.na(memory$outcome[pair, 1L])])
-  memory$pair <- c(memory$pair, new)
-  memory$outcome[pair, ] <- cbind(transitions$reward, after[, 1L], transitions$terminated)
-  agent$memory <- memory
-  agent
-}
-
-# Learns from remembered steps, as many at a time as there were real ones.
-plan_again <- function(agent, n) {
+  learning <- learning_of(agent)
+  row <- learning$store$row
+  choose <- learning$choose
+  learn <- learning$learn
   taken <- agent$taken
-  count <- nrow(agent$weights)
-  for (again in seq_len(agent$planning)) {
-    # No steps of the environment: schedules stay where they are.
-    agent$taken <- taken
-    pair <- agent$memory$pair[sample.int(length(agent$memory$pair), n, replace = TRUE)]
-    outcome <- agent$memory$outcome[pair, , drop = FALSE]
-    ahead <- row_max(values_of(agent, outcome[, 2L, drop = FALSE]))
-    agent <- learn_from(
-      agent, matrix((pair - 1L) %% count + 1L, n, 1L), (pair - 1L) %/% count + 1L,
-      list(reward = outcome[, 1L], terminated = outcome[, 3L] == 1), ahead
-    )
+  memory <- if (agent$planning > 0L) new_memory(agent, learning$store)
+  new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) choose(row(x), taken),
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      ahead <- if (terminated) 0 else max(row(after))
+      learn(x, column, reward, ahead, ended, sub_env, taken)
+      taken <<- taken + 1
+      if (!is.null(memory)) {
+        memory$remember(x, column, reward, after, terminated)
+        # No steps of the environment: schedules stay where they are.
+        memory$plan(taken)
+      }
+      if (ended) NA_integer_ else choose(row(after), taken)
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      if (!is.null(memory)) agent$memory <- memory$get()
+      agent
+    }
+  )
+}
+
+# A coin decides for each step which of the two tables learns from it: it chooses the best action
+# that follows, and the other one says what that is worth.
+double_steps <- function(agent) {
+  learning <- learning_of(agent)
+  first <- learning$store
+  second <- value_store(agent$basis, agent$second, agent$initial, value_columns_of(agent))
+  draw <- learning$uniform$draw
+  choose <- learning$choose
+  rate <- rate_of(agent$learning_rate)
+  discount <- agent$discount
+  taken <- agent$taken
+  both <- function(x) (first$row(x) + second$row(x)) / 2
+  learn <- function(own, other, x, column, reward, after, terminated) {
+    ahead <- if (terminated) 0 else other$value(after, which.max(own$row(after)))
+    own$toward(x, column, reward + discount * ahead, rate(taken))
   }
-  agent$taken <- taken
-  agent
+  new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) choose(both(x), taken),
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      if (draw() < 0.5) {
+        learn(first, second, x, column, reward, after, terminated)
+      } else {
+        learn(second, first, x, column, reward, after, terminated)
+      }
+      taken <<- taken + 1
+      if (ended) NA_integer_ else choose(both(after), taken)
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      agent$second <- second$get()
+      agent
+    },
+    stores = list(first, second)
+  )
+}
+
+#' Remember the last outcome of each state and action, and learn from these again
+#' @return A list of functions: `remember()` a step, `plan(taken)`, and `get()`, the memory as the
+#'   agent keeps it.
+#' @noRd
+new_memory <- function(agent, store) {
+  draw <- NULL
+  rows <- nrow(agent$weights)
+  columns <- ncol(agent$weights)
+  count <- length(agent$memory$pair)
+  pairs <- agent$memory$pair
+  outcome <- agent$memory$outcome
+  if (is.null(outcome)) outcome <- matrix(NA_real_, rows * columns, 3L)
+  reward <- outcome[, 1L]
+  led_to <- outcome[, 2L]
+  over <- outcome[, 3L]
+  discount <- agent$discount
+  rate <- rate_of(agent$learning_rate)
+  list(
+    remember = function(x, column, won, after, terminated) {
+      pair <- x + rows * (column - 1L)
+      if (is.na(reward[[pair]])) {
+        count <<- count + 1L
+        pairs[[count]] <<- pair
+      }
+      reward[[pair]] <<- won
+      led_to[[pair]] <<- after
+      over[[pair]] <<- terminated
+    },
+    plan = function(taken) {
+      rate <- rate(taken)
+      for (pair in pairs[sample.int(count, agent$planning, replace = TRUE)]) {
+        ahead <- if (over[[pair]] == 1) 0 else max(store$row(led_to[[pair]]))
+        x <- (pair - 1L) %% rows + 1L
+        store$toward(x, (pair - 1L) %/% rows + 1L, reward[[pair]] + discount * ahead, rate)
+      }
+    },
+    get = function() list(pair = pairs, outcome = cbind(reward, led_to, over, deparse.level = 0))
+  )
 }
 
 #' @exportS3Method

@@ -50,25 +50,48 @@ check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {
   }
 }
 
-#' @export
-agent_observe.gym_agent_sarsa <- function(agent, transitions) {
-  column <- action_columns(agent$spaces, transitions$action)
-  n <- length(column)
-  present <- seen_by(agent, transitions$observation, column)
-  after <- seen_by(agent, transitions$next_observation, column)
-  agent <- with_known_weights(agent, present)
-  values <- values_of(agent, after)
-  following <- choose_actions(agent, values)
-  ahead <- if (agent$expected) {
-    rowSums(ifelse(values == -Inf, 0, values) * row_probabilities(exploration(agent), values))
-  } else {
-    values[cbind(seq_len(n), following)]
-  }
-  agent <- learn_from(agent, present, column, transitions, ahead)
-  # What was chosen is done, where the episode goes on.
-  ended <- transitions$terminated | transitions$truncated
-  agent$next_action[transitions$sub_env] <- ifelse(ended, NA_integer_, following)
-  agent
+#' @exportS3Method
+learner_of.gym_agent_sarsa <- function(agent) {
+  learning <- learning_of(agent)
+  row <- learning$store$row
+  choose <- learning$choose
+  learn <- learning$learn
+  taken <- agent$taken
+  expects <- agent$expected
+  new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) choose(row(x), taken),
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      ahead <- 0
+      following <- NA_integer_
+      if (!terminated) {
+        values <- row(after)
+        following <- choose(values, taken)
+        ahead <- if (expects) expected_value(agent, values, taken) else values[[following]]
+      }
+      learn(x, column, reward, ahead, ended, sub_env, taken)
+      taken <<- taken + 1
+      # What was chosen is done, where the episode goes on.
+      following
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      agent
+    }
+  )
+}
+
+# The mean of the values over what might be done.
+expected_value <- function(agent, values, taken) {
+  values <- matrix(values, 1L)
+  exploring <- list(
+    epsilon = rate_of(agent$epsilon, "epsilon")(taken),
+    temperature = if (!is.null(agent$temperature)) {
+      scheduled(agent$temperature, taken, "temperature", lowest_temperature, Inf)
+    }
+  )
+  probabilities <- row_probabilities(exploring, values)
+  sum(ifelse(values == -Inf, 0, values) * probabilities)
 }
 
 #' @export

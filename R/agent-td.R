@@ -52,18 +52,68 @@ agent_start.gym_agent_td <- function(agent, policy) {
 #' @exportS3Method
 value_columns_of.gym_agent_td <- function(agent) 1L
 
-#' @export
-agent_act.gym_agent_td <- function(agent, observation, sub_env) {
-  act_batch(agent$plays, observation, length(sub_env), agent$spaces)
+#' @exportS3Method
+learner_of.gym_agent_td <- function(agent) {
+  learning <- learning_of(agent)
+  value <- learning$store$row
+  learn <- learning$learn
+  act <- policy_chooser(agent, learning$uniform$draw)
+  asked <- is.null(chooser_probabilities(agent))
+  taken <- agent$taken
+  new_steps(
+    agent, learning, begin = act,
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      learn(x, 1L, reward, if (terminated) 0 else value(after), ended, sub_env, taken)
+      taken <<- taken + 1
+      if (ended) NA_integer_ else act(after, sub_env, observation)
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      agent
+    },
+    act = if (asked) function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
+  )
 }
 
-#' @export
-agent_observe.gym_agent_td <- function(agent, transitions) {
-  column <- rep(1L, length(transitions$reward))
-  present <- seen_by(agent, transitions$observation, column)
-  agent <- with_known_weights(agent, present)
-  after <- values_of(agent, seen_by(agent, transitions$next_observation, column))
-  learn_from(agent, present, column, transitions, after[, 1L])
+#' Make the function by which a given policy acts, one observation at a time
+#'
+#' Of a table, and of chance, the probabilities of the actions are known beforehand. Any other is
+#' asked; where there are several sub-environments it was asked about all of them together.
+#' @noRd
+policy_chooser <- function(agent, draw) {
+  probabilities <- chooser_probabilities(agent)
+  if (is.null(probabilities)) {
+    policy <- agent$plays
+    first <- agent$spaces$action_space$start - 1L
+    function(x, sub_env, observation) {
+      if (is.null(observation)) {
+        return(NA_integer_)
+      }
+      act_batch(policy, observation, 1L, agent$spaces) - first
+    }
+  } else if (is.matrix(probabilities)) {
+    function(x, sub_env, observation) draw_place(probabilities[x, ], draw())
+  } else {
+    function(x, sub_env, observation) draw_place(probabilities, draw())
+  }
+}
+
+# How likely a policy takes each action: a matrix with a row for each state, a vector where the
+# state makes no difference, `NULL` where that is not known beforehand.
+chooser_probabilities <- function(agent) {
+  policy <- agent$plays
+  if (inherits(policy, "gym_policy_table") && is.null(agent$features)) {
+    q <- policy$q
+    q[row_max(q) == -Inf, ] <- 0
+    row_probabilities(policy, q)
+  } else if (inherits(policy, "gym_policy_random")) {
+    if (is.null(policy$possible)) {
+      numbers <- state_numbers(agent$spaces$action_space)
+      (numbers %in% state_numbers(policy$action_space)) + 0
+    } else if (is.null(agent$features)) {
+      policy$possible + 0
+    }
+  }
 }
 
 #' @export

@@ -1,59 +1,121 @@
-# Learning from several steps at once, for one sub-environment after the other.
+# How far a learner looks ahead: one step, n steps, or over all of them by eligibility traces.
 
-#' Learn by eligibility traces
+#' Make the function that moves a value towards what a step has come to
+#' @return A function of `x` and `column`, whose value is moved; `reward`; `ahead`, the value of
+#'   what the step led to, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so far.
+#' @noRd
+lookahead <- function(agent, store) {
+  rate <- rate_of(agent$learning_rate)
+  if (isTRUE(agent$lambda > 0)) {
+    trace_lookahead(agent, store, rate)
+  } else if (isTRUE(agent[["n"]] > 1L)) {
+    n_step_lookahead(agent, store, rate)
+  } else {
+    toward <- store$toward
+    discount <- agent$discount
+    function(x, column, reward, ahead, ended, sub_env, taken) {
+      toward(x, column, reward + discount * ahead, rate(taken))
+    }
+  }
+}
+
+# Each sub-environment has one of what `make()` makes, which knows what its episode has been.
+for_each_sub_env <- function(make) {
+  made <- list()
+  function(sub_env) {
+    while (length(made) < sub_env) made[[length(made) + 1L]] <<- make()
+    made[[sub_env]]
+  }
+}
+
+# Traces of 1 that have faded to less than this are left out: a hundred millionth of an error.
+least_trace <- 1e-8
+
+#' Remember which weights have been there, and move all of them
 #'
 #' Replacing traces for tables and tiles, accumulating ones for a user's features (Sutton and Barto
 #' 2018, sections 12.2 and 12.7).
+#' @param decay By how much a trace fades with each step.
+#' @return A list of functions: `pass(cells, gradient, by)`, which enters these weights and moves
+#'   all that have a trace by `by` times that, and `clear()`, for the end of an episode.
 #' @noRd
-learn_by_traces <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate") / (agent$basis$each %||% 1L)
-  decay <- agent$discount * agent$lambda
-  for (i in seq_along(column)) {
-    place <- transitions$sub_env[[i]]
-    own <- present[i, , drop = FALSE]
-    value <- values_of(agent, own)[[column[[i]]]]
-    error <- transitions$reward[[i]] + agent$discount * ahead[[i]] - value
-    trace <- if (transitions$first[[i]] || length(agent$traces) < place) {
-      array(0, dim(agent$weights))
-    } else {
-      decay * agent$traces[[place]]
+new_trace <- function(store, decay, replacing) {
+  strength <- numeric()
+  active <- numeric()
+  least <- if (replacing) least_trace else 0
+  list(
+    pass = function(cells, gradient, by) {
+      faded <- decay * strength[active]
+      strong <- abs(faded) > least
+      if (!all(strong)) {
+        strength[active[!strong]] <<- 0
+        active <<- active[strong]
+        faded <- faded[strong]
+      }
+      strength[active] <<- faded
+      before <- strength[cells]
+      before[is.na(before)] <- 0
+      if (length(strength) < max(cells)) {
+        strength <<- c(strength, numeric(length(store$get()) - length(strength)))
+      }
+      active <<- c(active, cells[before == 0])
+      strength[cells] <<- if (replacing) gradient else before + gradient
+      store$add(active, by * strength[active])
+    },
+    clear = function() {
+      strength[active] <<- 0
+      active <<- numeric()
     }
-    if (is.null(agent$basis$each)) {
-      trace[, column[[i]]] <- trace[, column[[i]]] + own[1L, ]
-    } else {
-      trace[own[1L, ] + nrow(trace) * (column[[i]] - 1L)] <- 1
-    }
-    agent$weights <- agent$weights + rate * error * trace
-    agent$traces[[place]] <- trace
-  }
-  agent
+  )
 }
 
-#' Learn from what n steps came to (Sutton and Barto 2018, sections 7.1 and 7.2)
-#' @noRd
-learn_by_steps <- function(agent, present, column, transitions, ahead) {
-  rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
-  ended <- transitions$terminated | transitions$truncated
-  for (i in seq_along(column)) {
-    place <- transitions$sub_env[[i]]
-    steps <- if (!transitions$first[[i]] && length(agent$pending) >= place) agent$pending[[place]]
-    steps <- c(steps, list(list(
-      present = present[i, , drop = FALSE], column = column[[i]], reward = transitions$reward[[i]]
-    )))
-    # At the end of an episode all that are left have come to something.
-    while (length(steps) && (length(steps) == agent$n || ended[[i]])) {
-      rewards <- vapply(steps, function(step) step$reward, 0)
-      powers <- agent$discount^(seq_along(rewards) - 1L)
-      target <- sum(powers * rewards) + agent$discount^length(rewards) * ahead[[i]]
-      first <- steps[[1L]]
-      error <- target - values_of(agent, first$present)[[first$column]]
-      agent$weights <- move_weights(
-        agent$basis, agent$weights, first$present, first$column, rate, error
-      )
-      steps <- steps[-1L]
-      if (!ended[[i]]) break
-    }
-    agent$pending[place] <- list(steps)
+trace_lookahead <- function(agent, store, rate) {
+  discount <- agent$discount
+  decay <- discount * agent$lambda
+  replacing <- !is.null(agent$basis$each)
+  trace_of <- for_each_sub_env(function() new_trace(store, decay, replacing))
+  function(x, column, reward, ahead, ended, sub_env, taken) {
+    trace <- trace_of(sub_env)
+    error <- reward + discount * ahead - store$value(x, column)
+    by <- rate(taken) / store$each * error
+    trace$pass(store$cells(x, column), store$gradient(x), by)
+    if (ended) trace$clear()
   }
-  agent
+}
+
+# Sutton and Barto 2018, sections 7.1 and 7.2.
+n_step_lookahead <- function(agent, store, rate) {
+  recent_of <- for_each_sub_env(function() new_recent_steps(agent, store))
+  function(x, column, reward, ahead, ended, sub_env, taken) {
+    recent_of(sub_env)(x, column, reward, ahead, ended, rate(taken))
+  }
+}
+
+new_recent_steps <- function(agent, store) {
+  n <- agent$n
+  discount <- agent$discount
+  powers <- discount^(seq_len(n) - 1L)
+  seen <- list()
+  columns <- integer()
+  rewards <- numeric()
+  learn_first <- function(ahead, rate) {
+    count <- length(rewards)
+    target <- sum(powers[seq_len(count)] * rewards) + discount^count * ahead
+    store$toward(seen[[1L]], columns[[1L]], target, rate)
+    seen <<- seen[-1L]
+    columns <<- columns[-1L]
+    rewards <<- rewards[-1L]
+  }
+  function(x, column, reward, ahead, ended, rate) {
+    count <- length(rewards) + 1L
+    seen[[count]] <<- x
+    columns[[count]] <<- column
+    rewards[[count]] <<- reward
+    if (ended) {
+      # At the end of an episode all that are left have come to something.
+      while (length(rewards)) learn_first(ahead, rate)
+    } else if (count == n) {
+      learn_first(ahead, rate)
+    }
+  }
 }

@@ -7,9 +7,7 @@
 #' @param settings What the user has chosen, a list, among it `features`, `discount`,
 #'   `learning_rate`, `epsilon`, `temperature` and `initial`, and perhaps `n` and `lambda`.
 #' @return While it learns it has `basis`, see [basis_of()], and `weights`, a matrix with a row for
-#'   each feature and a column for each action; `taken`, how many steps it has observed;
-#'   `next_action`, the actions that were chosen already, by sub-environment; and `traces` or
-#'   `pending` of each sub-environment.
+#'   each feature and a column for each action; and `taken`, how many steps it has observed.
 #' @noRd
 new_learner <- function(class, settings) {
   structure(settings, class = c(class, "gym_value_learner", "gym_learner", "gym_agent"))
@@ -54,10 +52,7 @@ agent_start.gym_value_learner <- function(agent, policy) {
   agent$spaces <- policy[c("observation_space", "action_space")]
   agent$basis <- basis_of(agent$features, policy$observation_space, call)
   agent$taken <- 0
-  agent$next_action <- integer()
   agent["weights"] <- list(first_weights(agent, policy))
-  agent$traces <- list()
-  agent$pending <- list()
   agent
 }
 
@@ -94,63 +89,188 @@ check_first_table <- function(agent, policy) {
   }
 }
 
-with_known_weights <- function(agent, present) {
-  if (is.null(agent$weights)) {
-    agent$weights <- matrix(0, ncol(present), value_columns_of(agent))
-  }
-  agent
-}
+# Learning ----------------------------------------------------------------------------
 
-# Acting ------------------------------------------------------------------------------
-
-#' @export
-agent_act.gym_value_learner <- function(agent, observation, sub_env) {
-  action <- agent$next_action[sub_env]
-  new <- is.na(action)
-  if (any(new)) {
-    values <- values_of(agent, seen_by(agent, observation, sub_env), action_weights(agent))
-    action[new] <- choose_actions(agent, values)[new]
-  }
-  action - 1L + agent$spaces$action_space$start
-}
-
-# The features of observations, of which there is one for each sub-environment.
-seen_by <- function(agent, observation, sub_env) {
-  present <- agent$basis$of(observation, length(sub_env))
-  weights <- agent$weights
-  if (is.null(agent$basis$each) && !is.null(weights) && ncol(present) != nrow(weights)) {
-    gym_abort(
-      paste0("`features` returned ", count_of(nrow(weights), "feature"), " at first, and now ",
-             ncol(present), "."),
-      class = "gym_error_argument", argument = "features", call = NULL
-    )
-  }
-  present
-}
-
-values_of <- function(agent, present, weights = agent$weights) {
-  if (is.null(weights)) {
-    matrix(0, nrow(present), value_columns_of(agent))
-  } else {
-    linear_values(agent$basis, weights, present)
-  }
-}
-
-# How it explores at the moment.
-exploration <- function(agent) {
+#' What the functions of a learner share
+#'
+#' They are closures over plain numbers, for one step at a time: a vector's element is changed in
+#' place, where an agent that is passed on from step to step would be copied.
+#' @return A list: `store`, see [value_store()]; `choose`, see [action_chooser()]; `learn`, see
+#'   [lookahead()]; `uniform`, where all of them draw from, see [uniform_draws()].
+#' @noRd
+learning_of <- function(agent) {
+  uniform <- uniform_draws()
+  store <- value_store(agent$basis, agent$weights, agent$initial, value_columns_of(agent))
   list(
-    epsilon = scheduled(agent$epsilon %||% 0, agent$taken, "epsilon"),
-    temperature = if (!is.null(agent$temperature)) {
-      scheduled(agent$temperature, agent$taken, "temperature", lowest_temperature, Inf)
-    }
+    uniform = uniform, store = store,
+    choose = action_chooser(agent, uniform$draw), learn = lookahead(agent, store)
   )
 }
 
-# The numbers of the actions that are taken, from 1. Of equal values one is drawn, so that a learner
-# which knows nothing yet goes everywhere.
-choose_actions <- function(agent, values) {
-  draw_table_actions(exploration(agent), values, best = any_best_column)
+#' Make a learner of what its steps do
+#' @param learning As [learning_of()] makes it.
+#' @param begin,observe,export Its own, as [learner_of()] describes them; `export` returns the
+#'   agent without what all have.
+#' @param stores All its tables, in which masks are noted.
+#' @noRd
+new_steps <- function(agent, learning, begin, observe, export,
+                      stores = list(learning$store), act = NULL) {
+  list(
+    begin = begin, observe = observe, act = act,
+    export = function() {
+      agent["weights"] <- list(learning$store$get())
+      export(agent)
+    },
+    forbid = function(x, forbidden) {
+      if (any(forbidden)) for (store in stores) store$forbid(x, forbidden)
+      learning$store$row(x)
+    },
+    renew = learning$uniform$renew, uniform = learning$uniform$draw
+  )
 }
+
+#' Keep values that are linear in what is present of an observation
+#'
+#' @param basis As [basis_of()] returns it. In what follows `x` is what its `one()` returns.
+#' @param weights A matrix with a row for each feature and a column for each action; `NULL` where a
+#'   user's function has not told yet how many features there are.
+#' @param initial The first weights where `weights` is `NULL`: a number, or one for each feature.
+#' @return A list of functions: `row(x)`, the values of all actions; `value(x, column)`, that of
+#'   one; `toward(x, column, target, rate)`, which moves it; `cells(x, column)`, the weights that it
+#'   is the sum of, and `gradient(x)`, what each of them counts; `add(cells, by)`; `forbid(x,
+#'   forbidden)`, after which these actions are never taken; `get()`, the weights.
+#' @noRd
+value_store <- function(basis, weights, initial, columns) {
+  if (is.null(basis$each)) {
+    return(feature_store(weights, initial, columns))
+  }
+  rows <- as.double(nrow(weights))
+  offsets <- rows * (seq_len(columns) - 1)
+  each <- basis$each
+  own <- if (each == 1L) {
+    list(
+      row = function(x) weights[x + offsets],
+      value = function(x, column) weights[[x + rows * (column - 1)]],
+      toward = function(x, column, target, rate) {
+        cell <- x + rows * (column - 1)
+        value <- weights[[cell]]
+        weights[[cell]] <<- value + rate * (target - value)
+      },
+      forbid = function(x, forbidden) weights[x + offsets[forbidden]] <<- -Inf
+    )
+  } else {
+    list(
+      row = function(x) .colSums(weights[x, ], each, columns),
+      value = function(x, column) sum(weights[x + rows * (column - 1)]),
+      toward = function(x, column, target, rate) {
+        cells <- x + rows * (column - 1)
+        present <- weights[cells]
+        weights[cells] <<- present + rate / each * (target - sum(present))
+      }
+    )
+  }
+  ones <- rep(1, each)
+  c(own, list(
+    each = each, cells = function(x, column) x + rows * (column - 1), gradient = function(x) ones,
+    add = function(cells, by) weights[cells] <<- weights[cells] + by, get = function() weights
+  ))
+}
+
+feature_store <- function(weights, initial, columns) {
+  known <- function(x) {
+    if (is.null(weights)) {
+      check_first_weights(initial, length(x))
+      weights <<- matrix(as.double(initial), length(x), columns)
+    } else if (length(x) != nrow(weights)) {
+      gym_abort(
+        paste0("`features` returned ", count_of(nrow(weights), "feature"), " at first, and now ",
+               length(x), "."),
+        class = "gym_error_argument", argument = "features", call = NULL
+      )
+    }
+  }
+  list(
+    each = 1, row = function(x) {
+      known(x)
+      as.vector(x %*% weights)
+    },
+    value = function(x, column) {
+      known(x)
+      sum(x * weights[, column])
+    },
+    toward = function(x, column, target, rate) {
+      known(x)
+      error <- target - sum(x * weights[, column])
+      weights[, column] <<- weights[, column] + rate * error * x
+    },
+    cells = function(x, column) which(x != 0) + length(x) * (column - 1),
+    gradient = function(x) x[x != 0],
+    add = function(cells, by) weights[cells] <<- weights[cells] + by, get = function() weights
+  )
+}
+
+check_first_weights <- function(initial, count) {
+  if (!length(initial) %in% c(1L, count)) {
+    must <- paste("one number, or one for each of", count_of(count, "feature"))
+    abort_argument(initial, must, "initial", NULL)
+  }
+}
+
+#' Make the function by which a learner chooses an action
+#'
+#' Of equal values it draws one, so that a learner which knows nothing yet goes everywhere.
+#' @param draw Draws a number from 0 to 1.
+#' @return A function of the values of the actions and the steps so far, which returns the number of
+#'   an action, from 1.
+#' @noRd
+action_chooser <- function(agent, draw) {
+  epsilon <- agent$epsilon %||% 0
+  temperature <- agent$temperature
+  if (!is.null(temperature)) {
+    return(function(values, taken) {
+      heat <- scheduled(temperature, taken, "temperature", lowest_temperature, Inf)
+      weight <- exp((values - max(values)) / heat)
+      draw_place(weight, draw())
+    })
+  }
+  changes <- is.function(epsilon)
+  explores <- if (changes) 0 else epsilon
+  function(values, taken) {
+    if (changes) explores <<- scheduled(epsilon, taken, "epsilon")
+    if (explores > 0 && draw() < explores) {
+      return(draw_place(values > -Inf, draw()))
+    }
+    best <- which.max(values)
+    if (!length(best)) abort_diverged()
+    equal <- values == values[[best]]
+    if (sum(equal) == 1L) best else draw_place(equal, draw())
+  }
+}
+
+abort_diverged <- function() {
+  gym_abort(
+    c("The values that are learned have become infinite.",
+      i = "Take a smaller `learning_rate`, or other `features`."),
+    class = "gym_error_agent", call = NULL
+  )
+}
+
+# The place that a number from 0 to 1 falls on, where each has a share that is proportional to its
+# weight.
+draw_place <- function(weight, u) {
+  until <- cumsum(weight)
+  count <- length(until)
+  place <- sum(until <= u * until[[count]]) + 1L
+  # By rounding the number may lie at the end of all.
+  if (place > count) max(which(weight > 0)) else place
+}
+
+# A function of the steps so far that gives a learner's rate.
+rate_of <- function(rate, name = "learning_rate") {
+  if (is.function(rate)) function(taken) scheduled(rate, taken, name) else function(taken) rate
+}
+
+# Its policy ------------------------------------------------------------------------
 
 #' @export
 agent_policy.gym_value_learner <- function(agent) {
@@ -163,68 +283,6 @@ agent_policy.gym_value_learner <- function(agent) {
     weights <- weights %||% matrix(0, 0L, value_columns_of(agent))
     new_feature_policy(agent$basis, weights, agent$spaces)
   }
-}
-
-# Learning ----------------------------------------------------------------------------
-
-#' Move values towards what a step has come to
-#'
-#' @param present,column The features that were seen, and the columns of the weights whose values
-#'   are moved.
-#' @param transitions As [agent_observe()] gets them.
-#' @param ahead The value of what the step led to, as far as the episode goes on.
-#' @noRd
-learn_from <- function(agent, present, column, transitions, ahead) {
-  n <- length(column)
-  ahead[transitions$terminated] <- 0
-  if (isTRUE(agent$lambda > 0)) {
-    agent <- learn_by_traces(agent, present, column, transitions, ahead)
-  } else if (isTRUE(agent[["n"]] > 1L)) {
-    agent <- learn_by_steps(agent, present, column, transitions, ahead)
-  } else {
-    value <- values_of(agent, present)[cbind(seq_len(n), column)]
-    error <- transitions$reward + agent$discount * ahead - value
-    rate <- scheduled(agent$learning_rate, agent$taken, "learning_rate")
-    agent$weights <- move_weights(agent$basis, agent$weights, present, column, rate, error)
-  }
-  agent$taken <- agent$taken + n
-  agent
-}
-
-#' Change weights so that values move by a share of their errors
-#'
-#' Errors of the same state and action move its value by their mean, as far as if they had come one
-#' after the other: k errors at a rate r by 1 - (1 - r)^k of it.
-#' @noRd
-move_weights <- function(basis, weights, present, column, rate, error) {
-  if (is.null(basis$each)) {
-    return(move_dense_weights(weights, present, column, rate, error))
-  }
-  cell <- as.vector(present + nrow(weights) * (column - 1L))
-  if (length(column) == 1L) {
-    weights[cell] <- weights[cell] + rate / basis$each * error
-    return(weights)
-  }
-  error <- rep(error, basis$each)
-  if (anyDuplicated(cell)) {
-    own <- unique(cell)
-    group <- match(cell, own)
-    count <- tabulate(group, length(own))
-    error <- rowsum(error, group)[, 1L] / count
-    weights[own] <- weights[own] + (1 - (1 - rate)^count) / basis$each * error
-  } else {
-    weights[cell] <- weights[cell] + rate / basis$each * error
-  }
-  weights
-}
-
-move_dense_weights <- function(weights, present, column, rate, error) {
-  for (action in unique(column)) {
-    own <- column == action
-    step <- colMeans(present[own, , drop = FALSE] * error[own])
-    weights[, action] <- weights[, action] + (1 - (1 - rate)^sum(own)) * step
-  }
-  weights
 }
 
 # Results -----------------------------------------------------------------------------

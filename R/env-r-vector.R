@@ -73,13 +73,16 @@ new_r_vector_env <- function(traits, ..., frames, sub_env) {
 #' @noRd
 scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
   traits <- sub_envs[[1L]]$traits
+  alone <- length(sub_envs) == 1L
   all <- seq_along(sub_envs)
   number <- function(i) if (length(sub_envs) > 1L) i
   pick <- action_picker(traits$action_space)
   stack <- result_stacker(traits)
   new_r_vector_env(
     traits, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
-    env = if (length(sub_envs) == 1L) checked_methods(sub_envs[[1L]]),
+    env = if (alone) checked_methods(sub_envs[[1L]]),
+    step_one = if (alone) single_stepper(sub_envs[[1L]]),
+    guard = if (alone) single_guard(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
       call <- rlang::current_env()
       which <- which %||% all
@@ -128,6 +131,73 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
     },
     frames = frames, sub_env = sub_envs[[1L]]
   )
+}
+
+#' Make the function that steps a sub-environment which is alone
+#'
+#' What is nearly always right is looked at quickly; the rest is left to [complete_step()]. An error
+#' of the user's functions gets its place by [single_guard()], which is made once for many steps.
+#' @return A function of an action, which returns a step as [as_vector_env()] has it.
+#' @noRd
+single_stepper <- function(sub_env) {
+  traits <- sub_env$traits
+  space <- traits$observation_space
+  limit <- traits$limit
+  size <- if (inherits(space, "gym_space_box") && length(space$shape) == 1L) space$shape[[1L]]
+  columns <- if (!is.null(space$names)) list(NULL, space$names)
+  session <- globalenv()
+  as_batch <- function(observation) {
+    if (is.null(size)) {
+      return(batch_of(space, list(tidy_value(space, observation, NULL))))
+    }
+    dim(observation) <- c(1L, size)
+    if (!is.null(columns)) dimnames(observation) <- columns
+    observation
+  }
+  function(action) {
+    check_was_reset(sub_env, NULL)
+    own <- session$.Random.seed
+    generator <- sub_env$generator
+    assign(".Random.seed", generator$state, envir = session)
+    sub_env$stepping <- TRUE
+    out <- sub_env$step(action)
+    sub_env$stepping <- FALSE
+    generator$state <- session$.Random.seed
+    assign(".Random.seed", own, envir = session)
+    taken <- sub_env$taken + 1L
+    sub_env$taken <- taken
+    if (!is_right_step(out, traits)) {
+      out <- complete_step(out, sub_env, call = NULL)
+    }
+    list(
+      reward = out$reward, terminated = out$terminated,
+      truncated = isTRUE(out$truncated) || taken >= limit,
+      next_observation = as_batch(out$observation)
+    )
+  }
+}
+
+# Whether a step is surely right.
+is_right_step <- function(out, traits) {
+  reward <- if (is.list(out)) out$reward
+  flag <- out$terminated
+  is.double(reward) && length(reward) == 1L && !is.na(reward) && (isTRUE(flag) || isFALSE(flag)) &&
+    (is.null(out$truncated) || isTRUE(out$truncated) || isFALSE(out$truncated)) &&
+    is.null(out$info) && !is.object(out$observation) &&
+    fits_quickly(traits, out$observation, NULL)
+}
+
+# Says where a step was that has raised an error.
+single_guard <- function(sub_env) {
+  sub_env$stepping <- FALSE
+  function(code) {
+    withCallingHandlers(code, error = function(cnd) {
+      if (sub_env$stepping) {
+        sub_env$stepping <- FALSE
+        abort_raised(cnd, sub_env, NULL, NULL)
+      }
+    })
+  }
 }
 
 #' Make a function that puts together what the steps of several sub-environments returned

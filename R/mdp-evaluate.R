@@ -38,16 +38,13 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   if (!length(policies)) {
     abort_argument(policy, "a policy, or a list of at least one", "policy", call)
   }
-  # What each step counts, in place of the reward.
-  counting <- backup
-  counting$expected <- rep(1, length(backup$expected))
   rows <- lapply(seq_along(policies), function(i) {
     probabilities <- policy_matrix(policies[[i]], env, call)
-    returns <- limited_values(backup, probabilities, limit, discount, call)
-    lengths <- limited_values(counting, probabilities, limit, 1, call)
     data.frame(
-      candidate = i, mean_return = start_mean(env, returns),
-      mean_length = start_mean(env, lengths), max_steps = as.double(limit)
+      candidate = i,
+      mean_return = expected_return(env, backup, probabilities, limit, discount, call),
+      mean_length = expected_length(env, backup, probabilities, limit, call),
+      max_steps = as.double(limit)
     )
   })
   evaluated <- do.call(rbind, rows)
@@ -55,10 +52,37 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   evaluated
 }
 
+expected_return <- function(model, backup, probabilities, limit, discount, call) {
+  start_mean(model, limited_values(backup, probabilities, limit, discount, call))
+}
+
+expected_length <- function(model, backup, probabilities, limit, call) {
+  # What each step counts, in place of the reward.
+  backup$expected <- rep(1, length(backup$expected))
+  expected_return(model, backup, probabilities, limit, 1, call)
+}
+
 limited_values <- function(backup, probabilities, limit, discount, call) {
   if (limit == Inf) {
-    policy_values(backup, probabilities, discount, call)$values
-  } else {
-    horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities))
+    return(policy_values(backup, probabilities, discount, call)$values)
   }
+  used <- which(probabilities > 0)
+  if (length(used) > backup$states || !is.null(backup$flow)) {
+    return(horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities)))
+  }
+  # One action in each state: only its row is looked at.
+  state <- (used - 1L) %% backup$states + 1L
+  weight <- discount * backup$weight[used, , drop = FALSE] * probabilities[used]
+  next_state <- backup$next_state[used, , drop = FALSE]
+  expected <- backup$expected[used] * probabilities[used]
+  values <- numeric(backup$states)
+  for (sweep in seq_len(limit)) {
+    ahead <- expected
+    for (place in seq_len(ncol(weight))) {
+      ahead <- ahead + weight[, place] * values[next_state[, place]]
+    }
+    if (identical(ahead, values[state])) break
+    values[state] <- ahead
+  }
+  values
 }

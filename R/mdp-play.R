@@ -60,6 +60,7 @@ as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   vector_env <- as_vector_env(env, num_envs, frames = frames)
   vector_env$endless <- is.null(x$spec$max_episode_steps) && !can_end(x)
   vector_env$possible <- possible_actions(x)
+  vector_env$model <- x
   vector_env
 }
 

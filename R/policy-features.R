@@ -16,7 +16,8 @@
 #' @param bins How many tiles a grid has for each number of an observation: a whole number of at
 #'   least 1, 8 by default, or one for each number.
 #' @param low,high The range of each number, numeric vectors; `NULL`, the default, is that of the
-#'   observation space, where it has bounds.
+#'   observation space, where it has bounds. Of the numbers of a Discrete each takes up 1: with
+#'   `tilings = 1` the states are put together in `bins` groups (state aggregation).
 #' @return `tile_coding()` an object of class `gym_features`, for the argument `features` of
 #'   [learn_q()] and the others.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be; when it is
@@ -65,21 +66,21 @@ print.gym_features <- function(x, ...) {
 #' are `each`. Of a user's function it returns the features themselves, and `each` is `NULL`.
 #' @param features `NULL` for a table, what [tile_coding()] makes, or a function.
 #' @return A list: `count`, how many features there are, `each`, `of`, a function of a batch of
-#'   observations and how many they are, and `features`, as given. `count` is `NA` for a function
-#'   that was not asked yet.
+#'   observations and how many they are, `one`, a function of a batch of a single one that returns
+#'   its row as a vector, and `features`, as given. `count` is `NA` for a function that was not
+#'   asked yet.
 #' @noRd
 basis_of <- function(features, space, call) {
   if (is.null(features)) {
     index <- table_index(space, "observations", call)
-    of <- function(observation, n) {
-      matrix(rows_of_table(index, space, observation, n, call), n, 1L)
-    }
-    return(list(count = index$count, each = 1L, of = of, features = NULL))
+    row <- function(observation, n = 1L) rows_of_table(index, space, observation, n, call)
+    of <- function(observation, n) matrix(row(observation, n), n, 1L)
+    return(list(count = index$count, each = 1L, of = of, one = row, features = NULL))
   }
   if (is.function(features)) {
-    return(list(count = NA, each = NULL, of = function(observation, n) {
-      check_features(features(observation), n, call)
-    }, features = features))
+    of <- function(observation, n) check_features(features(observation), n, call)
+    one <- function(observation) of(observation, 1L)[1L, ]
+    return(list(count = NA, each = NULL, of = of, one = one, features = features))
   }
   tiles_of(features, space, call)
 }
@@ -99,22 +100,16 @@ check_features <- function(values, n, call) {
 }
 
 tiles_of <- function(features, space, call) {
-  if (!inherits(space, "gym_space_box") || length(space$shape) != 1L) {
-    gym_abort(
-      paste0("Tiles are for observations that are a Box of one dimension, not ", format(space),
-             "."),
-      class = "gym_error_argument", argument = "features", value = features, call = call
-    )
-  }
-  numbers <- space$shape[[1L]]
+  range <- tiled_range(space, features, call)
+  numbers <- length(range$low)
   for (name in c("bins", "low", "high")) {
     if (!length(features[[name]]) %in% c(0L, 1L, numbers)) {
       must <- paste("one number, or one for each of the", numbers, "of an observation")
       abort_argument(features[[name]], must, paste0("tile_coding(", name, " = )"), call)
     }
   }
-  low <- rep_len(features$low %||% as.numeric(space$low), numbers)
-  high <- rep_len(features$high %||% as.numeric(space$high), numbers)
+  low <- rep_len(features$low %||% range$low, numbers)
+  high <- rep_len(features$high %||% range$high, numbers)
   unbounded <- !is.finite(low) | !is.finite(high) | low >= high
   if (any(unbounded)) {
     gym_abort(
@@ -156,7 +151,35 @@ tiles_of <- function(features, space, call) {
     number <- as.vector(weights[seq_len(numbers)] %*% at)
     matrix(as.integer(number + first[of_tiling]), n, tilings)
   }
-  list(count = per_tiling * tilings, each = tilings, of = of, features = features)
+  displaced_first <- t(displaced)
+  own <- rep(weights[seq_len(numbers)], each = tilings)
+  one <- function(observation) {
+    if (length(observation) != numbers) {
+      return(of(observation, 1L)[1L, ])
+    }
+    place <- (as.vector(observation) - low) / width
+    beyond <- place > last
+    if (any(beyond)) place[beyond] <- last[beyond]
+    place[place < 0] <- 0
+    at <- own * floor(rep(place, each = tilings) + displaced_first)
+    .rowSums(at, tilings, numbers) + first
+  }
+  list(count = per_tiling * tilings, each = tilings, of = of, one = one, features = features)
+}
+
+# The range of each number of an observation. A Discrete's numbers take up 1 each.
+tiled_range <- function(space, features, call) {
+  if (inherits(space, "gym_space_discrete")) {
+    return(list(low = as.double(space$start), high = as.double(space$start) + as.double(space$n)))
+  }
+  if (!inherits(space, "gym_space_box") || length(space$shape) != 1L) {
+    gym_abort(
+      paste0("Tiles are for observations that are Discrete or a Box of one dimension, not ",
+             format(space), "."),
+      class = "gym_error_argument", argument = "features", value = features, call = call
+    )
+  }
+  list(low = as.numeric(space$low), high = as.numeric(space$high))
 }
 
 #' The value of each action for some observations

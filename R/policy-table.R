@@ -84,13 +84,12 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   rows
 }
 
-# The numbers, from 1, of the actions that are taken; `best` gives the column of the largest value
-# in each row.
-draw_table_actions <- function(policy, rows, best = best_column) {
+# The numbers, from 1, of the actions that are taken.
+draw_table_actions <- function(policy, rows) {
   if (!is.null(policy$temperature)) {
     return(draw_by_row(row_probabilities(policy, rows)))
   }
-  choice <- best(rows)
+  choice <- best_column(rows)
   if (policy$epsilon > 0) {
     explores <- stats::runif(length(choice)) < policy$epsilon
     if (any(explores)) {
@@ -132,18 +131,12 @@ draw_by_row <- function(p) {
   pmin(choice, last)
 }
 
-# The largest number in each row, and its column, the first of several. A learner asks about one
-# row in each step.
+# The largest number in each row, and its column, the first of several. A single row is asked about
+# in each step of an episode.
 row_max <- function(x) {
   if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
 }
 best_column <- function(x) if (nrow(x) == 1L) which.max(x) else max.col(x, "first")
-
-# The column of the largest number in each row; of several one is drawn.
-any_best_column <- function(x) {
-  best <- x == row_max(x)
-  max.col(best * (1 + stats::runif(length(x))), "first")
-}
 
 #' @exportS3Method
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {

@@ -2,14 +2,14 @@
 #'
 #' A learner is an agent that learns from each step, and not from what whole episodes came to. It is
 #' a plain list with a class of its own before `"gym_learner"` and `"gym_agent"`, made by a function
-#' such as [agent_q()], and plays and learns by two generics instead of [agent_ask()] and
-#' [agent_tell()]: it acts, the environment takes the step, it observes what came of it.
+#' such as `agent_mean()` below, and plays and learns by two generics instead of [agent_ask()] and
+#' [agent_tell()]: it acts, the environment takes the step, it observes what came of it. (The
+#' learners of this package, such as [agent_q()], have quicker ways of their own.)
 #'
 #' One learner can play several sub-environments side by side, all of which feed the same table
-#' (`train_agent(num_envs = )`). Then `agent_observe()` gets several transitions at once. Where they
-#' concern the same state and action the learners of this package move its value towards their mean,
-#' as far as if they had come one after the other. What differs from one sub-environment is that all
-#' actions of a step are chosen before any of them has taught anything.
+#' (`train_agent(num_envs = )`). Then `agent_observe()` gets several transitions at once. The
+#' learners of this package learn from them one after the other. What differs from one
+#' sub-environment is that the environment takes all of these steps before any has taught anything.
 #'
 #' @param agent The learner.
 #' @param observation The observations, a batch as a policy gets it; see [act()].
@@ -100,6 +100,48 @@ format.gym_policy_unknown <- function(x, ...) "the learner's own"
 #' @noRd
 learn_episodes <- function(state, vector_env, settings, call) {
   vector_env <- stepped(vector_env)
+  learner <- state$learner
+  if (is.null(learner)) {
+    learner <- state$learner <- learner_of(state$agent)
+  }
+  if (is.null(learner)) {
+    return(learn_by_methods(state, vector_env, settings, call))
+  }
+  learner$renew()
+  if (!is.null(state$agent$mask)) {
+    note <- function(observation, mask) {
+      forbid_actions(learner, state$agent, observation, mask, call)
+    }
+    vector_env <- with_masks(vector_env, state$agent$mask, note, call)
+  }
+  played <- if (vector_env$num_envs == 1L) {
+    learn_alone(learner, state, vector_env, settings, call)
+  } else {
+    learner_episodes(
+      side_by_side(learner, state$agent, call), state, vector_env, settings
+    )
+  }
+  c(list(agent = learner$export()), played)
+}
+
+# One sub-environment plays one episode after the other.
+learn_alone <- function(learner, state, vector_env, settings, call) {
+  check_has_end(vector_env, settings$max_steps %||% Inf)
+  world <- state$world
+  if (is.null(world) || !is.null(state$agent$mask)) {
+    world <- state$world <- world_of(vector_env, state$agent$basis, learner$uniform)
+  }
+  seeds <- with_generator(state$streams$seeds, draw_training_seeds(settings$episodes))
+  stream <- new_generator(stream = take_stream(state$streams))
+  limit <- min(settings$max_steps %||% Inf, vector_env$model$spec$max_episode_steps %||% Inf)
+  guard <- world$guard %||% identity
+  with_generator(stream, naming_call(
+    guard(play_steps(learner, world, seeds, limit, state$report, call)), vector_env
+  ))
+}
+
+# A learner that somebody else has written.
+learn_by_methods <- function(state, vector_env, settings, call) {
   agent <- state$agent
   learner <- list(
     act = function(observation, sub_env) agent_act(agent, observation, sub_env),
@@ -109,10 +151,12 @@ learn_episodes <- function(state, vector_env, settings, call) {
       check_is_agent(agent, "agent_observe()", call)
     }
   )
-  if (!is.null(agent$mask)) {
-    note <- function(observation, mask) agent <<- bar_actions(agent, observation, mask, call)
-    vector_env <- with_masks(vector_env, agent$mask, note, call)
-  }
+  played <- learner_episodes(learner, state, vector_env, settings)
+  c(list(agent = agent), played)
+}
+
+# The episodes of an iteration in the loop of all that plays.
+learner_episodes <- function(learner, state, vector_env, settings) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
   play_batches(
@@ -121,7 +165,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
     max_steps = settings$max_steps %||% Inf
   )
   each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
-  list(agent = agent, returns = each("return"), lengths = each("length"))
+  list(returns = each("return"), lengths = each("length"))
 }
 
 # A value that has become infinite stays so.
@@ -142,6 +186,13 @@ check_rewards <- function(reward, call) {
 #' Whether an environment that is named by its id has one is asked where it is one of those that do.
 #' @noRd
 judging_model <- function(settings, client) {
+  model <- known_model(settings, client)
+  # Each evaluation needs it.
+  if (!is.null(model)) model$backup <- backup_of(model, NULL)
+  model
+}
+
+known_model <- function(settings, client) {
   env <- settings$env
   if (inherits(env, c("gym_model", "gym_r_env"))) {
     return(model_or_null(env_model(env)))
@@ -173,13 +224,13 @@ model_or_null <- function(code) {
 #' @noRd
 evaluate_exactly <- function(model, policy, max_steps) {
   limit <- min(max_steps %||% Inf, model$spec$max_episode_steps %||% Inf)
-  exact <- tryCatch(
-    evaluate_policy(model, policy, max_steps = limit), gym_error_draws = function(cnd) NULL
+  probabilities <- tryCatch(
+    policy_matrix(policy, model, NULL), gym_error_draws = function(cnd) NULL
   )
-  if (is.null(exact)) {
+  if (is.null(probabilities)) {
     return(NULL)
   }
-  value <- exact$mean_return
+  value <- expected_return(model, model$backup, probabilities, limit, 1, NULL)
   data.frame(
     candidate = 1L, mean_return = value, se = 0, lower = value, upper = value, episodes = 0L,
     steps = 0L

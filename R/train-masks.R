@@ -22,6 +22,7 @@ with_masks <- function(vector_env, name, note, call) {
   vector_env[c("reset", "step")] <- masked(env, vector_env, name, note, call)
   # The info of an episode that an environment begins by itself would take the place of its last.
   vector_env$begins_next <- FALSE
+  vector_env$step_one <- NULL
   vector_env
 }
 
@@ -118,28 +119,21 @@ needed_mask <- function(info, name, n, actions, call) {
   mask
 }
 
-#' Let a learner never again take the actions that a mask bars
+#' Let a learner never again take the actions that a mask forbids
 #'
 #' Their values become -Inf, so that its policy does not take them either.
 #' @param mask As [with_masks()] notes it.
 #' @noRd
-bar_actions <- function(agent, observation, mask, call) {
+forbid_actions <- function(learner, agent, observation, mask, call) {
   row <- agent$basis$of(observation, nrow(mask))[, 1L]
-  barred <- which(!mask, arr.ind = TRUE)
-  at <- cbind(row[barred[, 1L]], barred[, 2L])
-  if (any(agent$weights[at] > -Inf)) {
-    agent$weights[at] <- -Inf
-    if (!is.null(agent$second)) agent$second[at] <- -Inf
+  for (i in seq_along(row)) {
+    forbidden <- !mask[i, ]
+    if (all(learner$forbid(row[[i]], forbidden) == -Inf)) {
+      gym_abort(
+        paste0("The info's `", agent$mask, "` forbids every action at the observation ",
+               describe_value(batch_value(agent$spaces$observation_space, observation, i)), "."),
+        class = "gym_error_argument", argument = "mask", value = mask[i, ], call = call
+      )
+    }
   }
-  empty <- row_max(agent$weights[row, , drop = FALSE]) == -Inf
-  if (any(empty)) {
-    at_first <- which(empty)[[1L]]
-    gym_abort(
-      paste0("The info's `", agent$mask, "` forbids every action at the observation ",
-             describe_value(batch_value(agent$spaces$observation_space, observation, at_first)),
-             "."),
-      class = "gym_error_argument", argument = "mask", value = mask[at_first, ], call = call
-    )
-  }
-  agent
 }

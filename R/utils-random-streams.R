@@ -109,3 +109,29 @@ restore_streams <- function(saved) {
     next_stream = saved$next_stream
   )
 }
+
+# One at a time ---------------------------------------------------------------------------
+
+#' Draw numbers from 0 to 1, one at a time
+#'
+#' R takes as long for a single number as for fifty, so more are drawn than asked for.
+#' @return A list of functions: `draw()`, and `renew()`, after which none that was drawn before is
+#'   used: then what comes depends on R's generator alone.
+#' @noRd
+uniform_draws <- function() {
+  drawn <- numeric()
+  at <- 0L
+  count <- 0L
+  list(
+    draw = function() {
+      if (at == count) {
+        count <<- min(1024L, max(32L, 2L * count))
+        drawn <<- stats::runif(count)
+        at <<- 0L
+      }
+      at <<- at + 1L
+      drawn[[at]]
+    },
+    renew = function() at <<- count <<- 0L
+  )
+}

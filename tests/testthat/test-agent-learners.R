@@ -12,7 +12,7 @@ step_of <- function(state, action, reward, next_state, terminated = FALSE, trunc
                     first = FALSE, sub_env = seq_along(state)) {
   n <- length(state)
   list(
-    observation = as.integer(state), action = as.integer(action), reward = reward,
+    observation = as.integer(state), action = rep_len(as.integer(action), n), reward = reward,
     next_observation = as.integer(next_state), terminated = rep_len(terminated, n),
     truncated = rep_len(truncated, n), first = rep_len(first, n), sub_env = sub_env
   )
@@ -25,9 +25,31 @@ started <- function(agent, table = q) {
   agent_start(agent, policy)
 }
 
+# The agent after some steps. Its learner goes on with it; `chosen` are the actions that it does next.
+observe <- function(agent, steps) {
+  learner <- attr(agent, "learner") %||% learner_of(agent)
+  basis <- agent$basis
+  chosen <- vapply(seq_along(steps$reward), function(i) {
+    terminated <- steps$terminated[[i]]
+    learner$observe(
+      basis$one(steps$observation[i]), steps$action[[i]] + 1L, steps$reward[[i]],
+      basis$one(steps$next_observation[i]), terminated, terminated || steps$truncated[[i]],
+      steps$sub_env[[i]], steps$next_observation[i]
+    )
+  }, 0L) - 1L
+  structure(learner$export(), learner = learner, chosen = chosen)
+}
+
+# What it does first in an episode, so many times.
+begins <- function(agent, state, times = 1) {
+  learner <- attr(agent, "learner") %||% learner_of(agent)
+  x <- agent$basis$one(state)
+  vapply(seq_len(times), function(i) as.integer(learner$begin(x, 1L, state)) - 1L, 0L)
+}
+
 test_that("Q-learning moves a value towards the reward and the best value that follows", {
   agent <- started(agent_q(discount = 0.5, learning_rate = 0.1))
-  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  after <- observe(agent, step_of(0, 1, 10, 1))
   expected <- q
   expected[1, 2] <- 2 + 0.1 * (10 + 0.5 * 5 - 2)
   expect_equal(after$weights, expected)
@@ -42,23 +64,21 @@ test_that("nothing follows on a termination, and what would follow on a truncati
     agent_sarsa(0.5, 0.1, epsilon = 0, lambda = 0.5)
   )) {
     agent <- started(agent)
-    ended <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE, first = TRUE))
+    ended <- observe(agent, step_of(0, 1, 10, 1, terminated = TRUE, first = TRUE))
     expect_equal(ended$weights[1, 2], 2 + 0.1 * (10 - 2))
-    cut <- agent_observe(agent, step_of(0, 1, 10, 1, truncated = TRUE, first = TRUE))
+    cut <- observe(agent, step_of(0, 1, 10, 1, truncated = TRUE, first = TRUE))
     expect_equal(cut$weights[1, 2], 2 + 0.1 * (10 + 0.5 * 5 - 2))
   }
 })
 
-test_that("several steps of one state and action move its value by their mean, as if in turn", {
+test_that("steps of several sub-environments are learned from one after the other", {
   agent <- started(agent_q(discount = 0.5, learning_rate = 0.1))
-  after <- agent_observe(agent, step_of(c(0, 0, 2), c(1, 1, 0), c(10, 4, 1), c(1, 1, 0)))
-  expect_equal(after$weights[1, 2], 2 + (1 - 0.9^2) * (7 + 0.5 * 5 - 2))
-  expect_equal(after$weights[3, 1], 7 + 0.1 * (1 + 0.5 * 2 - 7))
-  # The same step twice is what two in a row come to.
-  twice <- agent_observe(agent, step_of(c(0, 0), c(1, 1), c(10, 10), c(1, 1)))
-  in_turn <- agent_observe(agent_observe(agent, step_of(0, 1, 10, 1)), step_of(0, 1, 10, 1))
-  expect_equal(twice$weights, in_turn$weights)
-  expect_identical(twice$taken, 2)
+  after <- observe(agent, step_of(c(0, 0, 2), c(1, 1, 0), c(10, 4, 1), c(1, 1, 0)))
+  once <- 2 + 0.1 * (10 + 0.5 * 5 - 2)
+  twice <- once + 0.1 * (4 + 0.5 * 5 - once)
+  expect_equal(after$weights[1, 2], twice)
+  expect_equal(after$weights[3, 1], 7 + 0.1 * (1 + 0.5 * twice - 7))
+  expect_identical(after$taken, 3)
 })
 
 test_that("Sarsa does next what it has learned from", {
@@ -66,63 +86,66 @@ test_that("Sarsa does next what it has learned from", {
   agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0.5))
   chosen <- integer()
   for (i in 1:50) {
-    after <- agent_observe(agent, step_of(0, 1, 10, 1))
-    action <- agent_act(after, 1L, 1L)
+    after <- observe(agent, step_of(0, 1, 10, 1))
+    action <- attr(after, "chosen")
     expect_equal(after$weights[1, 2], 2 + 0.1 * (10 + 0.5 * q[2, action + 1] - 2))
     chosen <- c(chosen, action)
   }
   expect_setequal(chosen, 0:1)
   # In a new episode it chooses anew.
-  ended <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
-  expect_identical(ended$next_action, NA_integer_)
+  ended <- observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
+  expect_identical(attr(ended, "chosen"), NA_integer_)
 })
 
 test_that("expected Sarsa takes the mean over what it might do", {
   agent <- started(agent_sarsa(0.5, 0.1, epsilon = 0.2, expected = TRUE))
-  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  after <- observe(agent, step_of(0, 1, 10, 1))
   expect_equal(after$weights[1, 2], 2 + 0.1 * (10 + 0.5 * (0.9 * 5 + 0.1 * 3) - 2))
 })
 
 test_that("n steps are looked ahead, and all that is left at the end", {
   agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0, n = 2))
-  one <- agent_observe(agent, step_of(0, 0, 1, 1, first = TRUE))
+  one <- observe(agent, step_of(0, 0, 1, 1, first = TRUE))
   expect_identical(one$weights, q)
-  two <- agent_observe(one, step_of(1, 1, 3, 2))
+  two <- observe(one, step_of(1, 1, 3, 2))
   expect_equal(two$weights[1, 1], 1 + 0.1 * (1 + 0.5 * 3 + 0.25 * 7 - 1))
-  three <- agent_observe(two, step_of(2, 0, 8, 0, terminated = TRUE))
+  three <- observe(two, step_of(2, 0, 8, 0, terminated = TRUE))
   expect_equal(three$weights[2, 2], 5 + 0.1 * (3 + 0.5 * 8 - 5))
   expect_equal(three$weights[3, 1], 7 + 0.1 * (8 - 7))
-  expect_length(three$pending[[1]], 0)
+  # Nothing is left for the next episode.
+  four <- observe(three, step_of(0, 0, 1, 1, terminated = TRUE))
+  value <- three$weights[1, 1]
+  expect_equal(four$weights[1, 1], value + 0.1 * (1 - value))
 })
 
 test_that("replacing traces fade by the discount and lambda", {
   agent <- started(agent_sarsa(discount = 0.5, learning_rate = 0.1, epsilon = 0, lambda = 0.8))
-  one <- agent_observe(agent, step_of(0, 0, 1, 1, first = TRUE))
+  one <- observe(agent, step_of(0, 0, 1, 1, first = TRUE))
   first_error <- 1 + 0.5 * 5 - 1
   expect_equal(one$weights[1, 1], 1 + 0.1 * first_error)
-  two <- agent_observe(one, step_of(1, 1, 3, 2))
+  two <- observe(one, step_of(1, 1, 3, 2, truncated = TRUE))
   error <- 3 + 0.5 * 7 - 5
   expect_equal(two$weights[1, 1], 1 + 0.1 * first_error + 0.1 * 0.4 * error)
   expect_equal(two$weights[2, 2], 5 + 0.1 * error)
   # A new episode has no trace of the last one.
-  again <- agent_observe(two, step_of(2, 0, 1, 0, first = TRUE))
-  expect_identical(sum(again$traces[[1]] > 0), 1L)
+  again <- observe(two, step_of(2, 0, 1, 0))
+  expect_identical(which(again$weights != two$weights), 3L)
 })
 
 test_that("TD learns a state's value, whatever the action", {
   agent <- agent_td(function(state) state, discount = 0.5, learning_rate = 0.1, initial = 2)
   agent <- agent_start(agent, spaces(states = 3, actions = 3))
-  expect_identical(agent_act(agent, c(1L, 2L), 1:2), c(1L, 2L))
-  after <- agent_observe(agent, step_of(0, 1, 10, 1))
+  expect_identical(c(begins(agent, 1L), begins(agent, 2L)), c(1L, 2L))
+  after <- observe(agent, step_of(0, 1, 10, 1))
   expect_equal(after$weights[, 1], c(2 + 0.1 * (10 + 0.5 * 2 - 2), 2, 2))
   expect_equal(state_values(after), c("0" = 2.9, "1" = 2, "2" = 2))
 })
 
 test_that("Monte Carlo averages the returns of first visits, or of every one", {
   episode <- function(agent) {
-    agent <- agent_observe(agent, step_of(0, 1, 1, 1, first = TRUE))
-    agent <- agent_observe(agent, step_of(1, 0, 2, 0))
-    agent_observe(agent, step_of(0, 1, 4, 2, terminated = TRUE))
+    agent <- observe(agent, step_of(0, 1, 1, 1, first = TRUE))
+    agent <- observe(agent, step_of(1, 0, 2, 0))
+    observe(agent, step_of(0, 1, 4, 2, terminated = TRUE))
   }
   first <- episode(started(agent_monte_carlo(discount = 0.5)))
   expect_equal(first$weights[1, 2], 1 + 0.5 * 2 + 0.25 * 4)
@@ -137,10 +160,9 @@ test_that("Monte Carlo averages the returns of first visits, or of every one", {
 test_that("exploring starts draw the first action of an episode, and only that", {
   agent <- started(agent_monte_carlo(epsilon = 0, exploring_starts = TRUE))
   set.seed(1)
-  first <- replicate(200, agent_act(agent, 2L, 1L))
-  expect_equal(mean(first), 0.5, tolerance = 0.2)
-  agent <- agent_observe(agent, step_of(2, 1, 0, 2, first = TRUE))
-  expect_true(all(replicate(50, agent_act(agent, 2L, 1L)) == 0L))
+  expect_equal(mean(begins(agent, 2L, 200)), 0.5, tolerance = 0.2)
+  agent <- observe(agent, step_of(rep(2, 50), 1, rep(0, 50), rep(2, 50), sub_env = rep(1L, 50)))
+  expect_true(all(attr(agent, "chosen") == 0L))
 })
 
 test_that("double Q-learning chooses by one table and values by the other", {
@@ -148,7 +170,7 @@ test_that("double Q-learning chooses by one table and values by the other", {
   agent$second <- q[, 2:1]
   set.seed(3)
   seen <- replicate(40, {
-    after <- agent_observe(agent, step_of(0, 1, 10, 1))
+    after <- observe(agent, step_of(0, 1, 10, 1))
     first <- after$weights[1, 2]
     if (first != 2) {
       # The first table's best action is 1, which the second values at 3.
@@ -167,7 +189,7 @@ test_that("double Q-learning chooses by one table and values by the other", {
 
 test_that("planning learns again from what is remembered, and counts no steps", {
   agent <- started(agent_q(discount = 0.5, learning_rate = 0.1, planning = 3), 0 * q)
-  after <- agent_observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
+  after <- observe(agent, step_of(0, 1, 10, 1, terminated = TRUE))
   # Four times the same, of which three are remembered.
   expect_equal(after$weights[1, 2], 10 * (1 - 0.9^4))
   expect_identical(after$taken, 1)
@@ -182,19 +204,19 @@ test_that("planning takes no steps of a schedule", {
     0.1
   }
   agent <- started(agent_q(learning_rate = rate, planning = 3))
-  agent_observe(agent, step_of(0, 1, 10, 1))
-  expect_identical(asked, c(0, 1, 1, 1))
+  observe(agent, step_of(0, 1, 10, 1))
+  expect_identical(asked, c(0, 1))
 })
 
 test_that("a schedule changes with the steps", {
   expect_equal(schedule_linear(1, 0, 10)(c(0, 5, 20)), c(1, 0.5, 0))
   expect_equal(schedule_exponential(1, 0.01, 10)(c(0, 5, 20)), c(1, 0.1, 0.01))
   agent <- started(agent_q(discount = 0.5, learning_rate = schedule_linear(0.5, 0.1, 1)))
-  one <- agent_observe(agent, step_of(0, 1, 10, 1))
+  one <- observe(agent, step_of(0, 1, 10, 1))
   expect_equal(one$weights[1, 2], 2 + 0.5 * 10.5)
-  two <- agent_observe(one, step_of(2, 1, 4, 1, terminated = TRUE))
+  two <- observe(one, step_of(2, 1, 4, 1, terminated = TRUE))
   expect_equal(two$weights[3, 2], 4)
-  three <- agent_observe(two, step_of(1, 0, 13, 1, terminated = TRUE))
+  three <- observe(two, step_of(1, 0, 13, 1, terminated = TRUE))
   expect_equal(three$weights[2, 1], 3 + 0.1 * 10)
 })
 
@@ -203,16 +225,16 @@ test_that("a user's features have weights, which move by the features", {
   agent <- agent_start(
     agent_q(discount = 0.5, learning_rate = 0.1, features = features), spaces()
   )
-  one <- agent_observe(agent, step_of(2, 1, 10, 0))
+  one <- observe(agent, step_of(2, 1, 10, 0))
   expect_equal(one$weights, cbind(c(0, 0), c(1, 2)))
-  expect_equal(values_of(one, features(c(0, 1, 2)))[, 2], c(1, 3, 5))
+  expect_equal(predict(agent_policy(one), 0:2, type = "output")[, 2], c(1, 3, 5))
   expect_identical(act(agent_policy(one), 1L), 1L)
   changing <- agent_start(
     agent_q(features = function(x) if (x[[1]] == 2) diag(2)[1, , drop = FALSE] else diag(1)),
     spaces()
   )
-  seen <- agent_observe(changing, step_of(2, 1, 10, 2))
-  expect_error(agent_observe(seen, step_of(1, 1, 10, 1)), "2 features at first, and now 1",
+  seen <- observe(changing, step_of(2, 1, 10, 2))
+  expect_error(observe(seen, step_of(1, 1, 10, 1)), "2 features at first, and now 1",
                class = "gym_error_argument")
 })
 
@@ -228,7 +250,7 @@ test_that("what cannot be learned so is refused", {
   refused(agent_td(3), "`policy` must be a policy")
   refused(agent_q(learning_rate = NULL), "`learning_rate` must be a number from 0 to 1")
   refused(agent_q(temperature = 0), "`temperature` must be a number of at least")
-  refused(agent_act(started(agent_q(epsilon = function(taken) 2)), 0L, 1L),
+  refused(begins(started(agent_q(epsilon = function(taken) 2)), 0L),
           "The function `epsilon` must return a number from 0 to 1, and after 0 steps")
   refused(state_values(agent_q()), "what was learned by a table")
   begin <- policy_table(matrix(0, 4, 2))
@@ -247,13 +269,13 @@ test_that("among actions with equal values a learner draws, but not among forbid
   policy$q <- equal
   for (learner in list(agent_q(epsilon = 0), agent_sarsa(epsilon = 0))) {
     agent <- agent_start(learner, policy)
-    chosen <- withr::with_seed(1, replicate(200, agent_act(agent, 0:2, 1:3)))
-    shares <- apply(chosen, 1, function(actions) table(factor(actions, 0:2)) / 200)
+    chosen <- withr::with_seed(1, sapply(0:2, function(state) begins(agent, state, 200)))
+    shares <- apply(chosen, 2, function(actions) table(factor(actions, 0:2)) / 200)
     expect_true(all(abs(shares - t(equal > -Inf) %*% diag(c(1 / 2, 1 / 2, 1 / 3))) < 0.12))
   }
 })
 
 test_that("the best action is taken where it is alone", {
   agent <- started(agent_q(epsilon = 0))
-  expect_identical(withr::with_seed(1, agent_act(agent, 0:2, 1:3)), c(1L, 1L, 0L))
+  expect_identical(vapply(0:2, begins, 0L, agent = agent), c(1L, 1L, 0L))
 })

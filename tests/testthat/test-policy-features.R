@@ -13,6 +13,18 @@ test_that("an observation lies in one tile of each tiling", {
   }
 })
 
+test_that("a single observation lies in the same tiles as one of many", {
+  basis <- tiles(tilings = 4, bins = c(5, 3))
+  points <- cbind(c(-9, 9, 1, stats::runif(50)), c(9, -9, 2, stats::runif(50, 0, 2)))
+  alone <- t(apply(points, 1, function(point) basis$one(rbind(point))))
+  expect_equal(alone, basis$of(points, 53))
+})
+
+test_that("the states of a Discrete are put together in groups", {
+  basis <- basis_of(tile_coding(tilings = 1, bins = 4), space_discrete(8, 1), NULL)
+  expect_identical(basis$of(1:8, 8)[, 1], rep(1:4, each = 2))
+})
+
 test_that("near points share tiles, and the nearer the more", {
   basis <- tiles(tilings = 8, bins = 4)
   shared <- function(a, b) sum(basis$of(rbind(a), 1) == basis$of(rbind(b), 1))
@@ -36,7 +48,7 @@ test_that("ranges without bounds must be given", {
   space <- box_space(c(0, -Inf), c(1, Inf))
   basis <- basis_of(tile_coding(low = c(0, -3), high = c(1, 3)), space, NULL)
   expect_identical(basis$count, 8 * 81)
-  expect_error(basis_of(tile_coding(), space_discrete(3), NULL), "a Box of one dimension",
+  expect_error(basis_of(tile_coding(), space_multi_binary(3), NULL), "a Box of one dimension",
                class = "gym_error_argument")
   expect_error(tile_coding(bins = 0), class = "gym_error_argument")
   expect_error(tile_coding(bins = integer()), class = "gym_error_argument")
@@ -53,13 +65,11 @@ test_that("a learner with tiles learns a value for each place", {
     agent_q(discount = 1, learning_rate = 0.5, features = tile_coding(4, 4)),
     list(observation_space = box_space(c(0, 0), c(1, 1)), action_space = space_discrete(2))
   )
-  there <- list(
-    observation = rbind(c(0.2, 0.2)), action = 1L, reward = 8,
-    next_observation = rbind(c(0.9, 0.9)), terminated = TRUE, truncated = FALSE, first = TRUE,
-    sub_env = 1L
-  )
-  agent <- agent_observe(agent, there)
-  value <- function(at) values_of(agent, agent$basis$of(at, nrow(at)))[, 2]
+  learner <- learner_of(agent)
+  x <- agent$basis$one(c(0.2, 0.2))
+  learner$observe(x, 2L, 8, agent$basis$one(c(0.9, 0.9)), TRUE, TRUE, 1L, NULL)
+  agent <- learner$export()
+  value <- function(at) predict(agent_policy(agent), at, type = "output")[, 2]
   expect_equal(value(rbind(c(0.2, 0.2), c(0.9, 0.9))), c(4, 0))
   expect_identical(act(agent_policy(agent), c(0.2, 0.2)), 1L)
 })

@@ -1,0 +1,185 @@
+# One step at a time: the loop in which a learner of ours plays a single sub-environment, which is a
+# model, an environment in R, or one of a server's; and the same learner in several of them.
+
+#' Make the functions by which a learner of values learns
+#'
+#' They are made once for a training, and change what they keep in place. What an observation is to
+#' the learner, `x`, is what `one()` of its basis returns; actions are numbered from 1.
+#' @return A list of functions: `begin(x, sub_env, observation)`, the first action of an episode;
+#'   `observe(x, column, reward, after, terminated, ended, sub_env, observation)`, which learns from
+#'   a step and returns the next action, `NA` at the end of the episode; `act(observation, n)`,
+#'   where a policy acts that must be asked about all sub-environments together, else `NULL`;
+#'   `export()`, the agent as it is now; `forbid(x, forbidden)`, after which these actions are never
+#'   taken, and which returns the values; `renew()`, before an iteration, as [uniform_draws()] has
+#'   it, and `uniform()`, which draws.
+#' @noRd
+learner_of <- function(agent) UseMethod("learner_of")
+
+#' @exportS3Method
+learner_of.default <- function(agent) NULL
+
+#' Let a learner play the episodes of an iteration in a single sub-environment
+#' @param world As [world_of()] makes it.
+#' @param limit After how many steps an episode is cut off.
+#' @return A list: `returns` and `lengths` of the episodes.
+#' @noRd
+play_steps <- function(learner, world, seeds, limit, report, call) {
+  begin <- learner$begin
+  observe <- learner$observe
+  step <- world$step
+  returns <- numeric(length(seeds))
+  lengths <- integer(length(seeds))
+  for (episode in seq_along(seeds)) {
+    first <- world$reset(seeds[[episode]])
+    x <- first[[1L]]
+    column <- begin(x, 1L, first[[2L]])
+    taken <- 0L
+    total <- 0
+    repeat {
+      out <- step(x, column)
+      after <- out[[1L]]
+      reward <- out[[2L]]
+      if (!is.finite(reward)) check_rewards(reward, call)
+      terminated <- out[[3L]]
+      taken <- taken + 1L
+      total <- total + reward
+      ended <- terminated || out[[4L]] || taken >= limit
+      column <- observe(x, column, reward, after, terminated, ended, 1L, out[[5L]])
+      if (ended) break
+      x <- after
+    }
+    returns[[episode]] <- total
+    lengths[[episode]] <- taken
+    report(episode)
+  }
+  list(returns = returns, lengths = lengths)
+}
+
+# Worlds ------------------------------------------------------------------------------
+
+#' See a single sub-environment as a learner does
+#'
+#' @param basis That of the learner, see [basis_of()].
+#' @param draw Draws a number from 0 to 1.
+#' @return A list of functions: `reset(seed)`, which returns a list of `x` and the observation, a
+#'   batch of one; and `step(x, column)`, which returns a list of the next `x`, the reward, whether
+#'   the episode was terminated, whether it was truncated, and the observation. `guard` is a
+#'   function of code that steps, or `NULL`.
+#' @noRd
+world_of <- function(vector_env, basis, draw) {
+  if (!is.null(vector_env$model)) {
+    model_world(vector_env$model, basis, draw)
+  } else {
+    stepped_world(vector_env, basis)
+  }
+}
+
+# Any that is reset and stepped by functions.
+stepped_world <- function(vector_env, basis) {
+  first <- as.integer(vector_env$action_space$start) - 1L
+  reset <- vector_env$reset
+  step <- vector_env$step_one %||% function(action) vector_env$step(action, 1L)
+  one <- basis$one
+  list(
+    guard = vector_env$guard,
+    reset = function(seed) {
+      observation <- reset(seed, 1L)
+      list(one(observation), observation)
+    },
+    step = function(x, column) {
+      out <- step(column + first)
+      observation <- out$next_observation
+      list(one(observation), out$reward, out$terminated, out$truncated, observation)
+    }
+  )
+}
+
+# A model is played in its own numbers of states. Its limit of steps is the loop's.
+model_world <- function(model, basis, draw) {
+  moves <- moves_of(model)
+  states <- moves$states
+  count <- as.double(length(states))
+  first <- moves$first
+  last <- moves$last
+  from <- moves$from
+  width <- moves$width
+  until <- moves$until
+  next_row <- moves$next_row
+  reward <- moves$reward
+  terminated <- moves$terminated
+  own <- is.null(basis$features)
+  seen <- if (own) NULL else lapply(states, basis$one)
+  row <- 0L
+  x_of <- function(row) if (own) row else seen[[row]]
+  list(
+    reset = function(seed) {
+      row <<- min(sum(moves$start <= draw()) + 1L, moves$last_start)
+      list(x_of(row), states[[row]])
+    },
+    step = function(x, column) {
+      pair <- row + count * (column - 1)
+      move <- first[[pair]]
+      end <- last[[pair]]
+      if (is.na(move)) {
+        action <- state_numbers(model$action_space)[[column]]
+        check_possible(moves, model, row, action, pair, FALSE)
+      }
+      if (move < end) {
+        at <- from[[pair]] + draw() * width[[pair]]
+        while (move < end) {
+          middle <- (move + end) %/% 2L
+          if (until[[middle]] > at) end <- middle else move <- middle + 1L
+        }
+      }
+      row <<- next_row[[move]]
+      list(if (own) row else seen[[row]], reward[[move]], terminated[[move]], FALSE, states[[row]])
+    }
+  )
+}
+
+# Several sub-environments --------------------------------------------------------------
+
+#' Let a learner play several sub-environments, one after the other in each step
+#' @return A list of `act` and `observe`, as [play_batch()] takes it.
+#' @noRd
+side_by_side <- function(learner, agent, call) {
+  basis <- agent$basis
+  first <- as.integer(agent$spaces$action_space$start) - 1L
+  pick <- if (identical(basis$each, 1L)) {
+    function(present, i) present[[i]]
+  } else {
+    function(present, i) present[i, ]
+  }
+  next_column <- integer()
+  present <- column <- NULL
+  list(
+    act = function(observation, sub_env) {
+      n <- length(sub_env)
+      present <<- basis$of(observation, n)
+      column <<- if (is.null(learner$act)) {
+        next_column[sub_env]
+      } else {
+        learner$act(observation, n) - first
+      }
+      for (i in which(is.na(column))) {
+        column[[i]] <<- learner$begin(pick(present, i), sub_env[[i]], NULL)
+      }
+      column + first
+    },
+    observe = function(transitions) {
+      reward <- transitions$reward
+      check_rewards(reward, call)
+      sub_env <- transitions$sub_env
+      after <- basis$of(transitions$next_observation, length(reward))
+      terminated <- transitions$terminated
+      ended <- terminated | transitions$truncated
+      for (i in seq_along(reward)) {
+        following <- learner$observe(
+          pick(present, i), column[[i]], reward[[i]], pick(after, i), terminated[[i]], ended[[i]],
+          sub_env[[i]], NULL
+        )
+        next_column[[sub_env[[i]]]] <<- if (ended[[i]]) NA_integer_ else following
+      }
+    }
+  )
+}
