@@ -159,3 +159,9 @@ print.gym_bandit_learning <- function(x, ...) {
 
 #' @export
 as.data.frame.gym_bandit_learning <- function(x, row.names = NULL, optional = FALSE, ...) x$curve
+
+# The column of the largest number in each row; of several one is drawn.
+any_best_column <- function(x) {
+  best <- x == row_max(x)
+  max.col(best * (1 + stats::runif(length(x))), "first")
+}

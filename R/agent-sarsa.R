@@ -24,7 +24,8 @@
 #' @examples
 #' agent_sarsa(lambda = 0.9, features = tile_coding(8, 8))
 #' @examplesIf gym:::can_start_server()
-#' learn_sarsa("CliffWalking-v1", iterations = 5, learning_rate = 0.5, discount = 1, seed = 1)
+#' learn_sarsa("CliffWalking-v1", iterations = 5, max_steps = 1000, learning_rate = 0.5,
+#'             discount = 1, seed = 1)
 agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
                         initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0,
                         mask = NULL) {

@@ -13,7 +13,7 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
       LAPACK = La_library(),
       server = played_versions(vector_env),
       processor = vector_env$description$processor,
-      way = if (is.null(vector_env$description)) "step by step" else "beside the environment",
+      way = way_of_playing(vector_env),
       env_id = environment_label(vector_env),
       kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
       wrappers = as.character(vector_env$spec$wrappers),
@@ -27,9 +27,19 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
   )
 }
 
+way_of_playing <- function(vector_env) {
+  if (!is.null(vector_env$model)) {
+    "from the model in R"
+  } else if (is.null(vector_env$description)) {
+    "step by step"
+  } else {
+    "beside the environment"
+  }
+}
+
 # The server's versions; NumPy calculates what policies do that play there.
 played_versions <- function(vector_env) {
-  versions <- server_versions(vector_env$client)
+  versions <- server_versions(vector_env$client) %||% vector_env$model$versions
   described <- vector_env$description$versions
   c(versions, described[setdiff(names(described), names(versions))])
 }

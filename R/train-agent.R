@@ -17,6 +17,15 @@
 #' A learner's policy is calculated instead of played where the model of the environment is known
 #' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
 #'
+#' # Sampling from a model
+#'
+#' FrozenLake, CliffWalking and Taxi have a model. A learner that names one of them by its id gets
+#' the model from the server once and samples from it in R, with the same distribution and many
+#' times as fast, and a message says so. It plays on the server with `model = FALSE`, and wherever
+#' the environment itself is needed: with `mask`, `callback` or `num_workers`, with wrappers or a
+#' `render_mode`, on a lake whose map is drawn, and in a Taxi with a fickle passenger. A model
+#' without a limit of steps, such as that of CliffWalking, needs `max_steps`.
+#'
 #' # Going on
 #'
 #' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
@@ -80,6 +89,8 @@
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_envs,num_workers How many sub-environments to play in, and how many processes run
 #'   them, as for [rollout()]. A learner plays in one unless more are given, see [agent_observe()].
+#' @param model Let a learner sample from the model in R where the environment, named by its id, has
+#'   one? `TRUE`, the default, or `FALSE`, which plays on the server. See below.
 #' @param client The client of the server where an environment named by its id is made; the default
 #'   is the session's own, [gym_client()].
 #' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()],
@@ -129,7 +140,8 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
                         seeds = NULL, ...,
                         solved_by = c("evaluation", "candidate"), callback = NULL, log = NULL,
                         checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
-                        num_envs = NULL, num_workers = NULL, client = gym_client()) {
+                        num_envs = NULL, num_workers = NULL, model = TRUE,
+                        client = gym_client()) {
   call <- rlang::current_env()
   check_agent(agent, call)
   check_no_steps(...names(), call)
@@ -145,11 +157,13 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
     evaluate = check_choice(evaluate[1L], c("greedy", "draw"), arg = "evaluate"), seed = seed,
     callback = callback,
     # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
-    search = solved_by == "candidate"
+    search = solved_by == "candidate",
+    may_sample = online && model
   )
   check_training(settings, call)
   check_flag(progress)
   check_flag(resume)
+  check_flag(model)
   check_string(log, allow_null = TRUE)
   check_string(checkpoint, allow_null = TRUE)
   seeds <- plain_numbers(seeds)
@@ -167,6 +181,10 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   settings$seed <- run$settings$seed
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
   settings$model <- if (online) judging_model(settings, client)
+  if (samples_model(settings, wants_random_map(env, kwargs))) {
+    settings$sampled <- model_to_sample(settings, call)
+  }
+  settings$from_model <- !is.null(settings$sampled)
   in_env <- function(use, max_steps = NULL) {
     with_training_env(settings, use, max_steps, client, call)
   }
@@ -188,9 +206,11 @@ with_training_env <- function(settings, use, max_steps, client, call) {
     candidates <- iteration_candidates(settings$agent)
     max(settings$eval_episodes, candidates * settings$episodes, least_sub_envs)
   }
+  played <- settings$sampled %||% settings$env
+  kwargs <- if (is.null(settings$sampled)) settings$kwargs
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    settings$env, episodes, use, max_steps, !!!settings$kwargs, num_envs = settings$num_envs,
+    played, episodes, use, max_steps, !!!kwargs, num_envs = settings$num_envs,
     num_workers = settings$num_workers, client = client, call = call
   ))
 }

@@ -42,7 +42,7 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
 #' @noRd
 training_checkpoint <- function(state, file, settings, call) {
   # What the server decides, beside the arguments.
-  server <- settings[c("target", "env_id", "num_envs", "batch_size")]
+  server <- settings[c("target", "env_id", "num_envs", "batch_size", "from_model")]
   if (!is.null(file$saved)) {
     check_same_server(file$path, file$saved$server, server, call)
     resume_training(state, file$saved)
@@ -189,7 +189,8 @@ argument_text <- function(name, value) {
 check_same_server <- function(path, there, now, call) {
   names <- c(
     target = "the environment's reward threshold", env_id = "the environment",
-    batch_size = "how many episodes make a batch", num_envs = "how many sub-environments there are"
+    batch_size = "how many episodes make a batch", num_envs = "how many sub-environments there are",
+    from_model = "whether it learns from the model"
   )
   differ <- Filter(function(name) !is_same(there[[name]], now[[name]]), names(now))
   if (length(differ)) {

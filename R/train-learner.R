@@ -203,7 +203,14 @@ known_model <- function(settings, client) {
   if (is_registered(env)) {
     model_or_null(rlang::exec("env_model", env, !!!settings$kwargs))
   } else if (grepl(modelled_ids, env)) {
-    model_or_null(rlang::exec("env_model", env, !!!settings$kwargs, client = client))
+    # A server's environment is asked once.
+    known <- known_of_env(client, env, settings$kwargs)
+    known$model <- known$model %||% list(model_or_null(
+      rlang::exec("env_model", env, !!!settings$kwargs, client = client)
+    ))
+    model <- known$model[[1L]]
+    if (!is.null(model)) model$versions <- server_versions(client)
+    model
   }
 }
 
@@ -217,6 +224,38 @@ model_or_null <- function(code) {
       if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
     }
   )
+}
+
+# Sampling from a model ---------------------------------------------------------------
+
+#' Does a learner sample from the model instead of playing on the server?
+#' @param draws_map Whether the environment draws a map when it is made.
+#' @noRd
+samples_model <- function(settings, draws_map) {
+  env <- settings$env
+  needs_server <- c(
+    settings$agent$mask, settings$num_workers,
+    intersect(setdiff(how_made(), "max_episode_steps"), names(settings$kwargs))
+  )
+  settings$may_sample && !is.null(settings$model) && rlang::is_string(env) &&
+    !is_registered(env) && !draws_map && is.null(settings$callback) && !length(needs_server)
+}
+
+model_to_sample <- function(settings, call) {
+  model <- settings$model
+  id <- model$spec$id
+  if (is.null(settings$max_steps) && is.null(model$spec$max_episode_steps)) {
+    gym_abort(
+      c(paste0(id, " has no limit of steps, so that an episode may never end."),
+        i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."),
+      class = "gym_error_argument", argument = "max_steps", call = call
+    )
+  }
+  cli::cli_inform(
+    c(i = "Learning from the model of {id} in R; {.code model = FALSE} plays on the server."),
+    class = "gym_message_model"
+  )
+  model
 }
 
 #' Evaluate a policy by a model, exactly

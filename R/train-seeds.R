@@ -131,7 +131,10 @@ seeds_go_to_workers <- function(vector_env, settings) {
 # training.
 training_recipe <- function(vector_env, settings) {
   vector_env$remembers <- NULL
-  environment_recipe(settings$env, vector_env, settings$kwargs)
+  sampled <- settings$sampled
+  environment_recipe(
+    sampled %||% settings$env, vector_env, if (is.null(sampled)) settings$kwargs else list()
+  )
 }
 
 # Where trainings side by side have workers of their own on this machine, too.
