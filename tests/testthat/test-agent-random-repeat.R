@@ -141,6 +141,7 @@ test_that("a progress bar is shown when asked for and nothing is said otherwise"
 })
 
 test_that("CartPole: each seed's row is the search with that seed, and nothing stays open", {
+  skip_unless_all()
   client <- local_server()
   searches <- search_repeat(seeds = c(1, 4, 2), client = client)
   expect_length(env_list_all(client), 0)
@@ -155,6 +156,7 @@ test_that("CartPole: each seed's row is the search with that seed, and nothing s
 })
 
 test_that("an environment that remembers earlier episodes is made anew for each seed", {
+  skip_unless_all()
   client <- local_server()
   wrapped <- gym_wrap("CartPole-v0", "NormalizeObservation")
   play <- function(seeds) {

@@ -265,6 +265,7 @@ test_that("CartPole: the default search solves it, and the same seed gives the s
 })
 
 test_that("no instance stays open on the server, whatever ends a search", {
+  skip_unless_all()
   client <- local_server()
   open <- function() length(env_list_all(client))
   search_random(rounds = 1, client = client)
@@ -275,6 +276,7 @@ test_that("no instance stays open on the server, whatever ends a search", {
 })
 
 test_that("a server that stops in the middle ends the search with what was played", {
+  skip_unless_all()
   server <- local_server()
   env <- gym_make("CartPole-v1", client = server)
   fragile <- list(

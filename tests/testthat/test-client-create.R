@@ -30,6 +30,7 @@ test_that("with no server there the error names the address and the hint", {
 })
 
 test_that("a server that stops in the middle is an error, one that is back is used again", {
+  skip_unless_all()
   server <- local_server()
   port <- as.integer(sub(".*:", "", server$remote_base))
   id <- env_create(server, "CartPole-v1")
@@ -43,6 +44,7 @@ test_that("a server that stops in the middle is an error, one that is back is us
 })
 
 test_that("an answer that does not come within the timeout is an error", {
+  skip_unless_all()
   server <- local_odd_server()
   patient <- make_odd("Slow", server)
   patient$reset()
@@ -84,6 +86,7 @@ test_that("a server that is killed or stopped in a call is noticed", {
 })
 
 test_that("a timeout of httr's goes before the client's, after a repeat too", {
+  skip_unless_all()
   server <- local_server()
   client <- local_cut_client(server, "answered", "GET /v1/envs/ ")
   client$config <- httr::timeout(3)
@@ -124,6 +127,7 @@ test_that("a step whose answer was lost is not taken twice", {
 })
 
 test_that("creating is not done twice, nor is closing", {
+  skip_unless_all()
   server <- local_server()
   client <- local_cut_client(server, "answered", "POST /v1/envs/ ")
   id <- env_create(client, "CartPole-v1")
@@ -134,6 +138,7 @@ test_that("creating is not done twice, nor is closing", {
 })
 
 test_that("a call that was cut before it was sent is made", {
+  skip_unless_all()
   server <- local_server()
   client <- local_cut_client(server, "unsent", "/step", times = 2)
   id <- env_create(client, "CartPole-v1", seed = 1)
@@ -143,6 +148,7 @@ test_that("a call that was cut before it was sent is made", {
 })
 
 test_that("a connection that breaks each time is an error in the end", {
+  skip_unless_all()
   server <- local_server()
   client <- local_cut_client(server, "answered", "/step", times = 100)
   id <- env_create(client, "CartPole-v1")
@@ -152,6 +158,7 @@ test_that("a connection that breaks each time is an error in the end", {
 })
 
 test_that("a call without a number is not repeated", {
+  skip_unless_all()
   server <- local_server()
   id <- env_create(server, "CartPole-v1")
   env_reset(server, id)
@@ -180,6 +187,7 @@ test_that("a client survives saveRDS() and makes calls of its own", {
 })
 
 test_that("a script may make a client for each call", {
+  skip_unless_all()
   base <- test_client()$remote_base
   id <- env_create(create_GymClient(base), "CartPole-v1", seed = 3)
   for (i in 1:300) env_reset(create_GymClient(base), id)
@@ -212,6 +220,7 @@ test_that("a client works in forked workers", {
 })
 
 test_that("a client works in spawned workers", {
+  skip_unless_all()
   client <- test_client()
   cluster <- parallel::makePSOCKcluster(1)
   withr::defer(parallel::stopCluster(cluster))
@@ -227,6 +236,7 @@ test_that("a client works in spawned workers", {
 })
 
 test_that("a forked worker closes nothing of its parent's", {
+  skip_unless_all()
   skip_on_os("windows")
   client <- test_client()
   env <- gym_make("CartPole-v1", client = client)
@@ -242,6 +252,7 @@ test_that("a forked worker closes nothing of its parent's", {
 })
 
 test_that("a call inside another call disturbs neither", {
+  skip_unless_all()
   server <- local_server()
   id <- env_create(server, "CartPole-v1", seed = 1)
   twin <- env_create(server, "CartPole-v1", seed = 1)
@@ -268,6 +279,7 @@ test_that("a call inside another call disturbs neither", {
 })
 
 test_that("a call of one client inside another's disturbs neither", {
+  skip_unless_all()
   server <- local_server()
   other <- create_GymClient(server$remote_base)
   id <- env_create(server, "CartPole-v1", seed = 1)
@@ -391,6 +403,7 @@ test_that("another kind of server is distinguished from a Gym server", {
 })
 
 test_that("a large body arrives, one that is too large is an error", {
+  skip_unless_all()
   env <- local_env()
   # CartPole looks at two of its options and lets the others be.
   expect_length(env$reset(options = list(x = as.numeric(1:1e5))), 4)
@@ -407,6 +420,7 @@ test_that("classic requests go to any route", {
 })
 
 test_that("an answer of httr's is read or raised", {
+  skip_unless_all()
   base <- local_server(token = FALSE)$remote_base
   answer <- parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/health/")))
   expect_equal(answer$status, "ok")

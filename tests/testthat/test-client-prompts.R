@@ -23,6 +23,7 @@ local_bare_session <- function(answers, interactive = TRUE, frame = parent.frame
 }
 
 test_that("an interactive session without a Python installs when asked, and goes on", {
+  skip_unless_all()
   python <- working_python()
   calls <- local_bare_session(list(python))
   set.seed(1)
@@ -117,6 +118,7 @@ local_answers <- function(answers, frame = parent.frame()) {
 }
 
 test_that("where nothing listens the first call asks for a server, and the script goes on", {
+  skip_unless_all()
   skip_if_no_server()
   for (host in c("127.0.0.1", "localhost")) {
     base <- paste0("http://", host, ":", free_port())
@@ -171,6 +173,7 @@ test_that("there is no question in a script, elsewhere, or where something liste
 })
 
 test_that("asking for a server leaves R's generator alone", {
+  skip_unless_all()
   skip_if_no_server()
   local_answers(list(TRUE))
   base <- paste0("http://127.0.0.1:", free_port())
@@ -183,6 +186,7 @@ test_that("asking for a server leaves R's generator alone", {
 })
 
 test_that("an address of the other kind gets its server, too", {
+  skip_unless_all()
   skip_if_no_server()
   base <- paste0("http://[::1]:", free_port())
   local_answers(list(TRUE))

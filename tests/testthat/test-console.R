@@ -1,6 +1,7 @@
 # What a user sees and answers, in a real interactive session.
 
 test_that("a script that names a server that is not there gets one, and goes on", {
+  skip_unless_all()
   skip_if_no_server()
   python <- working_python()
   console <- local_console(c(GYM_PYTHON = python))

@@ -36,6 +36,7 @@ local_cutter <- function(server, frame = parent.frame()) {
 }
 
 test_that("a step that was cut at any byte is taken once, as JSON and as tensors", {
+  skip_unless_all()
   server <- local_server(allow_module = "odd_environments")
   cutter <- local_cutter(server)
   places <- c(request = 0, answer = 0)

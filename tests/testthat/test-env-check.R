@@ -348,6 +348,7 @@ modelled <- function(model, reset = function(self) self$at <- 1, slips = 0, ends
 }
 
 test_that("a model that says what is played is found to be right", {
+  skip_unless_all()
   expect_identical(nrow(check_env(modelled(walk_table()))), 0L)
   slippery <- merge(walk_table(), data.frame(slip = c(FALSE, TRUE), probability = c(0.7, 0.3)))
   slippery$next_state <- with(slippery, ifelse(xor(action == 1, slip), state + 1, state - 1))
@@ -363,6 +364,7 @@ test_that("a model that says what is played is found to be right", {
 })
 
 test_that("starts, rewards and ends that a model does not have are found", {
+  skip_unless_all()
   table <- walk_table()
   expect_finding(modelled(gym_model(table, start = 2)), "model", "started in state 1")
   anywhere <- check_env(modelled(gym_model(table)))

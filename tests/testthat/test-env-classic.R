@@ -178,6 +178,7 @@ test_that("a step after the end warns once an episode", {
 })
 
 test_that("an exception inside an environment is an error that leaves the others alone", {
+  skip_unless_all()
   server <- local_odd_server()
   env <- make_odd("Failing", server)
   other <- make_odd("Image", server)
@@ -216,6 +217,7 @@ test_that("uploading fails with the reason", {
 })
 
 test_that("an interrupt during a call arrives as an interrupt", {
+  skip_unless_all()
   skip_on_os("windows")
   env <- make_odd("Slow", local_odd_server())
   env$reset()
@@ -234,6 +236,7 @@ test_that("an interrupt during a call arrives as an interrupt", {
 })
 
 test_that("what an environment prints does not hold it up", {
+  skip_unless_all()
   env <- make_odd("Chatty", local_odd_server())
   env$reset()
   for (i in 1:10) expect_equal(env$step(0)$reward, 1)

@@ -22,6 +22,7 @@ test_that("the frames are what the environment draws when the episode is played 
 })
 
 test_that("frames change nothing of what a single environment plays, nor what is drawn", {
+  skip_unless_all()
   env <- local_env("CartPole-v1")
   without <- rollout(env, policy_random(), episodes = 3, seed = 1, steps = TRUE)
   with <- rollout(env, policy_random(), episodes = 3, seed = 1, steps = TRUE, frames = TRUE)
@@ -51,6 +52,7 @@ test_that("frames print, and unpack when they are taken out", {
 })
 
 test_that("grey and half transparent frames are kept as they are", {
+  skip_unless_all()
   skip_if_not_installed("png")
   server <- local_odd_server()
   for (channels in c(1, 3, 4)) {
@@ -64,6 +66,7 @@ test_that("grey and half transparent frames are kept as they are", {
 })
 
 test_that("an environment that cannot be drawn is refused before anything is played", {
+  skip_unless_all()
   env <- make_odd("Image", local_odd_server())
   error <- expect_error(rollout(env, policy_random(), frames = TRUE), "Image-v0 cannot be drawn",
                         class = "gym_error_argument")
@@ -105,6 +108,7 @@ test_that("several sub-environments whose frames are wanted are refused, however
 })
 
 test_that("an environment has its number of frames a second", {
+  skip_unless_all()
   expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
   expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)
   expect_null(make_odd("Image", local_odd_server())$spec$render_fps)

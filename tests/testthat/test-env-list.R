@@ -1,4 +1,5 @@
 test_that("who has which environment is a data frame, the oldest first", {
+  skip_unless_all()
   server <- local_server()
   none <- env_list(server)
   expect_identical(
@@ -38,6 +39,7 @@ test_that("a name is a short string", {
 })
 
 test_that("a server's limits say what to do about them", {
+  skip_unless_all()
   server <- local_server(max_instances = 2, max_num_envs = 4, max_total_sub_envs = 5)
   env <- gym_make("CartPole-v1", num_envs = 4, client = server)
   error <- expect_error(gym_make("CartPole-v1", num_envs = 2, client = server),
@@ -67,6 +69,7 @@ test_that("a rollout takes one environment where the memory is too little for su
 })
 
 test_that("an environment that was thrown away is not in the list", {
+  skip_unless_all()
   server <- local_server()
   local({
     gym_make("CartPole-v1", client = server)
@@ -77,6 +80,7 @@ test_that("an environment that was thrown away is not in the list", {
 })
 
 test_that("an environment that nobody uses is closed, which its calls say, and close() takes", {
+  skip_unless_all()
   server <- local_server(idle_minutes = 0.01)
   env <- gym_make("CartPole-v1", client = server)
   deadline <- Sys.time() + 20

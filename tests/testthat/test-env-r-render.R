@@ -58,6 +58,7 @@ test_that("a picture that is returned is the frame, enlarged where it is small",
 })
 
 test_that("rollout() keeps frames, which filmstrip and animation show", {
+  skip_unless_all()
   skip_if_not_installed("png")
   for (render in list(plots, function(self) matrix(self$at / 9, 2, 2))) {
     env <- local_drawn(render, render_fps = 4)

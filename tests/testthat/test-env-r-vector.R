@@ -9,6 +9,7 @@ float32_bound <- 2^-23
 difference <- function(ours, its) max(abs(ours - its) / pmax(abs(its), 0.1))
 
 test_that("CartPole in R, scalar and vectorised, is Gymnasium's to the last bit of float32", {
+  skip_unless_all()
   n <- 6L
   server <- local_env("CartPole-v1", num_envs = n, vectorization_mode = "sync",
                       autoreset_mode = "Disabled")
@@ -165,6 +166,7 @@ test_that("the time limit cuts off every episode of a batch, and max_steps plays
 })
 
 test_that("every kind of space is played", {
+  skip_unless_all()
   spaces <- list(
     space_box(0, 255, shape = c(4L, 3L, 2L), dtype = "uint8"), space_box(-1, 1),
     space_box(-1, 1, shape = integer()), space_multi_discrete(c(2, 3)),

@@ -51,6 +51,7 @@ expect_as_gymnasium <- function(id, wrapper, actions, ...) {
 }
 
 test_that("observations and rewards are changed as Gymnasium changes them", {
+  skip_unless_all()
   test_client()
   right <- as.list(rep(1L, 30))
   expect_as_gymnasium("CartPole-v1", "NormalizeObservation", right)
@@ -170,6 +171,7 @@ test_that("the running moments are Gymnasium's", {
 })
 
 test_that("a number within its bounds stays within them, whatever the rounding", {
+  skip_unless_all()
   withr::local_seed(3)
   for (i in 1:200) {
     bounds <- lapply(1:4, function(j) runif(1, -10, 10))

@@ -56,6 +56,7 @@ test_that("a frame knows plot() and as.raster()", {
 })
 
 test_that("grey and half transparent frames are shown, too", {
+  skip_unless_all()
   server <- local_odd_server()
   shades <- c("1" = "#0A0A0A", "3" = "#0A141E", "4" = "#0A141EFF")
   grounds <- c("1" = "#646464", "3" = "#646464", "4" = "#64646464")
@@ -81,6 +82,7 @@ test_that("an environment that was not reset has no frame", {
 })
 
 test_that("an environment that cannot be drawn says so", {
+  skip_unless_all()
   env <- make_odd("Image", local_odd_server())
   env$reset()
   error <- expect_error(env$render(), class = "gym_error_http_400")

@@ -1,6 +1,7 @@
 # Vector environments through a real server.
 
 test_that("sub-environments play the same in R as in Python, in every vectorization mode", {
+  skip_unless_all()
   client <- test_client()
   python <- the_session$servers[[client$remote_base]]$python
   cases <- list(

@@ -9,6 +9,7 @@ run_example <- function(name) {
 }
 
 test_that("the bandit shows that it pays to explore", {
+  skip_unless_all()
   run <- run_example("bandit.R")
   reward <- vapply(run$env$played, function(played) mean(played$rewards[901:1000]), 0)
   expect_identical(order(reward), 1:3)

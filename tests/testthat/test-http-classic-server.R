@@ -82,6 +82,7 @@ test_that("environment objects are refused there, and nothing is left", {
 })
 
 test_that("the post's script plays on that server", {
+  skip_unless_all()
   client <- local_classic_client()
   id <- env_create(client, "CartPole-v0")
   for (episode in 1:2) {

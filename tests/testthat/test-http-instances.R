@@ -15,6 +15,7 @@ expect_quick_end <- function(run, begun) {
 }
 
 test_that("what a session created on another's server is closed with it, classic ids too", {
+  skip_unless_all()
   server <- local_server()
   kept <- env_create(server, "CartPole-v1")
   run <- run_session(
@@ -31,6 +32,7 @@ test_that("what a session created on another's server is closed with it, classic
 })
 
 test_that("a session ends at once whatever has become of the servers where it created something", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_server()
   pid <- the_session$servers[[server$remote_base]]$pid
@@ -107,6 +109,7 @@ test_that("an object that was thrown away is closed when the server is next spok
 })
 
 test_that("an environment that was closed is not closed again", {
+  skip_unless_all()
   server <- local_server()
   env <- gym_make("CartPole-v1", client = server)
   id <- env$instance_id

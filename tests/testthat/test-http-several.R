@@ -74,6 +74,7 @@ test_that("a server that has too much to do is asked again when it says so", {
 })
 
 test_that("a request whose connection broke is sent again, a few times", {
+  skip_unless_all()
   server <- local_server()
   for (when in c("answered", "unsent")) {
     cut <- local_cut_client(server, when, "rollouts", times = 3)

@@ -82,6 +82,7 @@ test_that("tensors fill the data, one after the other", {
 })
 
 test_that("neither many tensors nor much metadata take the session's time and memory", {
+  skip_unless_all()
   many <- function(n) file_of(bytes_at(seq_len(n) - 1L), raw(n))
   # Ten seconds, where each is looked for by its name.
   expect_lt(system.time(read_tensors(many(15000L)))[["user.self"]], 4)

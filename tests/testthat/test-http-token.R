@@ -107,6 +107,7 @@ test_that("the variable is the token of every client", {
 })
 
 test_that("a server that is started sees the variable, and its client has it", {
+  skip_unless_all()
   withr::local_envvar(GYM_SERVER_TOKEN = token_text)
   server <- local_server()
   expect_length(env_list_all(server), 0)
@@ -130,6 +131,7 @@ test_that("a client never shows its token", {
 })
 
 test_that("the report of how things stand does not show the token", {
+  skip_unless_all()
   withr::local_envvar(
     GYM_SERVER_TOKEN = token_text, GYM_SERVER_URL = paste0("http://127.0.0.1:", free_port())
   )
@@ -139,6 +141,7 @@ test_that("the report of how things stand does not show the token", {
 })
 
 test_that("no error shows the token, also where the call was written with it", {
+  skip_unless_all()
   server <- local_locked_server()
   errors <- list(
     tryCatch(create_GymClient("nowhere", token = "correct-horse-battery-staple"),
@@ -174,6 +177,7 @@ test_that("what cannot stand in a header is no token", {
 })
 
 test_that("the server's log does not show the token", {
+  skip_unless_all()
   server <- local_locked_server(log_level = "debug")
   env <- local_env(client = server)
   env$reset()
@@ -186,6 +190,7 @@ test_that("the server's log does not show the token", {
 })
 
 test_that("a token that is none ends the start, and is not shown", {
+  skip_unless_all()
   skip_if_no_server()
   file <- local_token_file("short-token")
   error <- expect_error(gym_server_start(token_file = file), class = "gym_error_server_start")
@@ -221,6 +226,7 @@ test_that("a watch page is opened by a key of its own", {
 })
 
 test_that("clients stop a server only where they may", {
+  skip_unless_all()
   server <- local_server(no_shutdown = TRUE)
   error <- expect_error(shutdown_server(server), class = "gym_error_http_403")
   expect_identical(error$code, "shutdown_disabled")

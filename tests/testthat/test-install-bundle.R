@@ -79,6 +79,7 @@ test_that("a folder that only looks like a bundle stays as it is", {
 })
 
 test_that("an earlier bundle stays until the new one is complete", {
+  skip_unless_all()
   local_cache()
   dir <- fake_bundle()
   dir.create(file.path(dir, "cache"))

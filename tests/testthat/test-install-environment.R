@@ -24,6 +24,7 @@ test_that("uv installs a Python, or takes one of this machine's", {
 })
 
 test_that("UV_PYTHON names the Python of an environment", {
+  skip_unless_all()
   local_cache()
   dir.create(install_root(), recursive = TRUE)
   withr::local_envvar(UV_PYTHON = "/my/python")

@@ -16,6 +16,7 @@ cases <- list(
 )
 
 test_that("values are those that Python finds in Gymnasium's own tables", {
+  skip_unless_all()
   for (case in cases) {
     model <- rlang::exec(model_from, !!!case)
     theirs <- rlang::exec(solved_by_python, !!!case)
@@ -28,6 +29,7 @@ test_that("values are those that Python finds in Gymnasium's own tables", {
 })
 
 test_that("values within the limit are those that Python finds", {
+  skip_unless_all()
   for (case in list(list("FrozenLake-v1", 100), list("FrozenLake8x8-v1", 200),
                     list("Taxi-v4", 200))) {
     theirs <- solved_by_python(case[[1]], horizon = case[[2]])

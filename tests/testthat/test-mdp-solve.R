@@ -33,6 +33,7 @@ test_that("rewards that go on for ever have no finite value, and are told apart"
 })
 
 test_that("values without an end are refused, with what to give", {
+  skip_unless_all()
   circle <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = 1))
   expect_error(solve_mdp(circle), "rewards go on.*`discount` below 1, or a `horizon`",
                class = "gym_error_argument")
@@ -240,6 +241,7 @@ test_that("a small difference between rewards is none of rounding, whatever thei
 })
 
 test_that("a rare event counts", {
+  skip_unless_all()
   # Ten steps, each of which succeeds in one case of ten, or nothing.
   steps <- data.frame(
     state = rep(0:9, each = 3), action = c(0, 1, 1), probability = c(1, 0.1, 0.9),
@@ -287,6 +289,7 @@ test_that("rewards of another size have values of that size, and the same best p
 })
 
 test_that("an end that costs more than many sweeps is found", {
+  skip_unless_all()
   expect_solved(model_of(
     state = 0, action = c(0, 1), next_state = c(0, 1), reward = c(-1, -30000)
   ), c(-30000, 0))
@@ -319,6 +322,7 @@ test_that("many states are solved as exactly as few", {
 })
 
 test_that("a policy that never ends is told apart in a large model, too", {
+  skip_unless_all()
   ring <- 601:1200
   model <- gym_model(data.frame(
     state = c(0, 0, 1:600, ring), action = 0, probability = c(0.5, 0.5, rep(1, 1200)),

@@ -4,6 +4,7 @@ short_envs <- function(n, ...) {
 }
 
 test_that("arrays have the steps of the table, in time and by sub-environment", {
+  skip_unless_all()
   for (env in list(short_envs(3L), short_envs(4L, "vector_entry_point"), fake_environment())) {
     keep <- function(steps) {
       rollout(env, policy_random(), 7, seed = 1, steps = steps, next_observation = TRUE)

@@ -212,6 +212,7 @@ test_that("what is named by its id and played by data is played beside the envir
 })
 
 test_that("no instance is made for what is played beside the environment", {
+  skip_unless_all()
   client <- local_server()
   local_functions(create_instance = function(...) stop("an instance was made"))
   rollout("Acrobot-v1", policy_random(), 3, max_steps = 5, client = client)
@@ -219,6 +220,7 @@ test_that("no instance is made for what is played beside the environment", {
 })
 
 test_that("the server is asked for a description once", {
+  skip_unless_all()
   client <- local_server()
   asked <- 0L
   local_functions(ask_description = local({
@@ -260,6 +262,7 @@ test_that("results are the same however many episodes a request has, and how man
 })
 
 test_that("a training is the same with any number of processes, through broken connections, too", {
+  skip_unless_all()
   train <- function(client) {
     what_counts(train_agent(
       agent_ars(directions = 4, top = 2), "Acrobot-v1", policy_linear(normalize = TRUE),
@@ -279,6 +282,7 @@ last_processes <- function(pid) {
 }
 
 test_that("processes that are killed in the middle change nothing", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_server()
   server_pid <- the_session$servers[[server$remote_base]]$pid
@@ -303,6 +307,7 @@ test_that("processes that are killed in the middle change nothing", {
 })
 
 test_that("connections that are lost in the middle change nothing", {
+  skip_unless_all()
   server <- local_server()
   play <- function(client) {
     local_pieces(4L)
@@ -314,6 +319,7 @@ test_that("connections that are lost in the middle change nothing", {
 })
 
 test_that("steps are those of the same policy by hand, from the same seed", {
+  skip_unless_all()
   client <- test_client()
   policy <- policy_linear(weights = rbind(c(3, -2), c(-1, 4), c(0, 50)))
   rolled <- rollout("MountainCar-v0", policy, 3, seed = 5, steps = TRUE, next_observation = TRUE,
@@ -408,6 +414,7 @@ test_that("a search ends with the first round that reaches the target, and shows
 })
 
 test_that("an environment that fails in the middle keeps the episodes that were finished", {
+  skip_unless_all()
   server <- local_odd_server()
   cnd <- expect_error(
     rollout("odd_environments:FailsLater-v0", policy_random(), 50, seed = 1, max_steps = 10,

@@ -56,12 +56,14 @@ worker_pids <- function() {
 }
 
 test_that("results are the same with none and with two workers", {
+  skip_unless_all()
   alone <- everything()
   local_plan(future::multisession, workers = 2)
   expect_identical(everything(), alone)
 })
 
 test_that("a worker's server plays in as many processes as future gives the worker, one", {
+  skip_unless_all()
   local_plan(future::multisession, workers = 2)
   rollout("Acrobot-v1", policy_random(), 40, seed = 1, max_steps = 20)
   asked <- lapply(1:2, function(i) {
@@ -146,6 +148,7 @@ test_that("without a plan nothing is loaded or said", {
 })
 
 test_that("a worker that is killed in a training is done without", {
+  skip_unless_all()
   alone <- what_counts(train())
   local_plan(future::multisession, workers = 2)
   killed <- FALSE
@@ -340,6 +343,7 @@ test_that("progressr is told where it listens", {
 })
 
 test_that("no worker and no server of a worker is left", {
+  skip_unless_all()
   skip_on_os("windows")
   local_plan(future::multisession, workers = 2)
   rollout("Acrobot-v1", drawing, 30, max_steps = 20, seed = 1)

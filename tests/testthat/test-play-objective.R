@@ -31,6 +31,7 @@ test_that("candidates play the same episodes side by side as each by itself", {
 })
 
 test_that("simulated annealing draws its own numbers around an objective", {
+  skip_unless_all()
   objective <- gym_objective(fake_environment(reward = first_action), episodes = 4, seed = 1)
   start <- coef(attr(objective, "policy"))
   asked <- list()

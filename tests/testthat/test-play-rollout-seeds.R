@@ -193,6 +193,7 @@ test_that("CartPole: a seed begins an episode again, in a vector environment wit
 })
 
 test_that("where each sub-environment has a seed, a single environment plays an episode again", {
+  skip_unless_all()
   client <- test_client()
   skip_if_not(env_registry(client, "LunarLander-v3")$available, "the extra box2d")
   set.seed(1)

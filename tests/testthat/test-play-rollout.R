@@ -222,6 +222,7 @@ test_that("a vector implementation that plays another game is not taken for an i
 })
 
 test_that("an environment that was made is closed, a given one is not, also after an error", {
+  skip_unless_all()
   client <- local_server()
   open <- function() names(env_list_all(client))
   rollout("CartPole-v1", policy_random(), client = client)
@@ -288,6 +289,7 @@ test_that("a server that allows fewer sub-environments plays the same in a quart
 })
 
 test_that("an environment of one's own whose step lacks something is refused at its first step", {
+  skip_unless_all()
   making <- function(change) {
     env <- fake_environment()
     step <- env$step

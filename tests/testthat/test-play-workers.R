@@ -6,6 +6,7 @@ still <- function(observation) rep(0L, length(observation))
 wandering <- function(observation) sample.int(4L, length(observation), replace = TRUE) - 1L
 
 test_that("a rollout is the same for any number of workers, also where the policy draws", {
+  skip_unless_all()
   client <- test_client()
   networks <- policy_candidates(policy_network(c(16, 4)), rbind(sin(1:64), cos(1:64)))
   for (policy in list(wandering, still, list(wandering, networks$policy))) {
@@ -64,6 +65,7 @@ test_that("what is no number of workers, or for no sub-environments, is refused"
 })
 
 test_that("more workers than the server allows are the server's error", {
+  skip_unless_all()
   few <- local_server(max_processes = 1)
   cnd <- expect_error(
     rollout("FrozenLake-v1", still, 40, num_workers = 2, client = few),
@@ -85,6 +87,7 @@ count_instances <- function(frame = parent.frame()) {
 }
 
 test_that("a server that describes environments makes no instance to look at", {
+  skip_unless_all()
   client <- local_server()
   made <- count_instances()
   for (id in c("FrozenLake-v1", "FrozenLake-v1", "FrozenLake8x8-v1")) {
@@ -119,6 +122,7 @@ test_that("there are as many sub-environments as fit a mebibyte of observations,
 })
 
 test_that("a worker killed in the middle ends a rollout with the batches before it", {
+  skip_unless_all()
   skip_on_os("windows")
   server <- local_server()
   server_pid <- the_session$servers[[server$remote_base]]$process$get_pid()

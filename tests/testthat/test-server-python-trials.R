@@ -1,4 +1,5 @@
 test_that("each Python is tried, and what it lacks is reported", {
+  skip_unless_all()
   skip_on_os("windows")
   working <- working_python()
   folder <- withr::local_tempdir()

@@ -43,6 +43,7 @@ test_that("shutdown_server() stops any server", {
 })
 
 test_that("a port that is taken is an error with the server's words", {
+  skip_unless_all()
   server <- local_server()
   port <- as.integer(sub(".*:", "", server$remote_base))
   error <- expect_error(gym_server_start(port = port), class = "gym_error_server_start")
@@ -59,6 +60,7 @@ test_that("a Python that cannot run the server is named, with the hint", {
 })
 
 test_that("the first Python that can run the server is taken", {
+  skip_unless_all()
   skip_on_os("windows")
   working <- working_python()
   folder <- withr::local_tempdir()
@@ -130,6 +132,7 @@ test_that("what cannot be a server of this session is refused with the reason", 
 })
 
 test_that("options reach the server by name", {
+  skip_unless_all()
   directory <- withr::local_tempdir()
   server <- local_server(monitor_dir = directory)
   env <- gym_make("CartPole-v1", client = server)

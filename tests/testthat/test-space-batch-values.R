@@ -56,6 +56,7 @@ test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
 })
 
 test_that("values are put in the place of some of a batch, whatever the space", {
+  skip_unless_all()
   withr::local_seed(8)
   for (number in 1:100) {
     space <- new_space(random_description())

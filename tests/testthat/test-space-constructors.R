@@ -96,6 +96,7 @@ test_that("the names of the bounds are those of the numbers", {
 })
 
 test_that("a space from other arguments is an error that names them", {
+  skip_unless_all()
   wrong <- function(object, message) {
     expect_error(object, message, fixed = TRUE, class = "gym_error_argument")
   }

@@ -18,6 +18,7 @@ test_that("values that are drawn belong to their space and come back through JSO
 })
 
 test_that("values that are drawn come back through tensors", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   withr::local_seed(5)
   tried <- 0L

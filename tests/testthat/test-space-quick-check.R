@@ -20,6 +20,7 @@ cases <- function() {
 }
 
 test_that("the quick check agrees with the slow one", {
+  skip_unless_all()
   slow <- function(space, batch) {
     tryCatch(
       {

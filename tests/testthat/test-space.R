@@ -104,6 +104,7 @@ test_that("without bit64 an integer beyond 2^53 is an error that names bit64", {
 })
 
 test_that("drawing a value stays inside the bounds and follows R's generator", {
+  skip_unless_all()
   spaces <- list(
     discrete(3, -1L), box(3), box(c(2, 3), "uint8", 0, 255), box(2, low = 5, high = 1e100),
     box(2, low = -1e100, high = -5), box(2, low = -1e100, high = 1e100)
@@ -149,6 +150,7 @@ test_that("values of every sort arrive from a real server as Python had them", {
 })
 
 test_that("int64 beyond 2^53 arrives exactly from a real server", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   value <- make_odd("LargeIntegers", local_odd_server())$reset()
   expect_s3_class(value, "integer64")
@@ -156,6 +158,7 @@ test_that("int64 beyond 2^53 arrives exactly from a real server", {
 })
 
 test_that("the smallest int64 and large uint64 are errors that name them, not NA", {
+  skip_unless_all()
   server <- local_odd_server()
   expect_error(
     make_odd("SmallestInteger", server)$reset(), "-9223372036854775808", class = "gym_error_space"
@@ -176,6 +179,7 @@ test_that("an action comes back from a real server as it was sent", {
 })
 
 test_that("a bare number is an action of a Box of one number", {
+  skip_unless_all()
   env <- make_odd("OneNumber", local_odd_server())
   env$reset()
   expect_equal(env$step(0.5)$reward, 1)
@@ -185,6 +189,7 @@ test_that("a bare number is an action of a Box of one number", {
 })
 
 test_that("a space that is not known is refused at creation and named", {
+  skip_unless_all()
   expect_error(make_odd("Riddle", local_odd_server()), "Riddle", class = "gym_error_http_400")
 })
 
@@ -229,6 +234,7 @@ test_that("nested spaces print in one line, shortened when they are long", {
 })
 
 test_that("a value that does not fit is refused with its place, the space there, and itself", {
+  skip_unless_all()
   space <- nested()
   expect_true(space_contains(space, member()))
   refused <- function(change, place, part) {
@@ -272,6 +278,7 @@ test_that("keys that are missing or strange are named", {
 })
 
 test_that("a value outside of a nested space is named by a real server, too", {
+  skip_unless_all()
   env <- make_odd("Nested", local_odd_server())
   env$reset()
   good <- list(position = c(0, 0, 0), "a.b" = 1)

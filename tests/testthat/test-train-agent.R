@@ -88,6 +88,7 @@ test_that("a training ends when its steps are used up, or its callback says so",
 })
 
 test_that("a training goes on from the file of any iteration to an undisturbed one's result", {
+  skip_unless_all()
   make <- list(
     function() fake_environment(reward = first_action),
     function() fake_vector_env(2, "sync", reward = first_action),
@@ -196,6 +197,7 @@ test_that("an agent that returns nonsense is refused, and what it returned shown
 })
 
 test_that("an agent of one's own trains, and goes on from its file", {
+  skip_unless_all()
   .S3method("agent_ask", "walk", function(agent) {
     w <- coef(agent_policy(agent))
     rbind(w + rnorm(length(w), sd = agent$size))
@@ -385,6 +387,7 @@ test_that("a training that had ended keeps where it came from", {
 })
 
 test_that("an agent that was trained before begins anew", {
+  skip_unless_all()
   for (agent in c(some_agents(), list(agent_random(4)))) {
     first <- quiet_training(agent, iterations = 5, target = Inf)
     again <- quiet_training(first$agent, iterations = 5, target = Inf)
@@ -440,6 +443,7 @@ test_that("an agent is told the trajectories that it needs, step by step", {
 })
 
 test_that("arguments that are wrong are refused before anything is made", {
+  skip_unless_all()
   refused <- function(..., name) {
     cnd <- expect_error(train_agent(..., env = "CartPole-v1", client = no_client()),
                         class = "gym_error_argument")

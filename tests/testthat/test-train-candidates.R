@@ -70,6 +70,7 @@ test_that("without a target all rounds are played", {
 })
 
 test_that("a shorter search is the beginning of a longer one, with the same policies", {
+  skip_unless_all()
   for (mode in modes) {
     play <- function(rounds) {
       env <- fake_vector_env(16, mode, reward = first_action)

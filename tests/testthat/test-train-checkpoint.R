@@ -344,6 +344,7 @@ test_that("of two searches on one file the one that is further is kept, with a w
 })
 
 test_that("files that cannot be written leave no connection behind", {
+  skip_unless_all()
   connections <- function() nrow(showConnections(all = TRUE))
   before <- connections()
   nowhere <- file.path(withr::local_tempdir(), "no", "file")

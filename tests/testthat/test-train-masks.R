@@ -33,6 +33,7 @@ test_that("what the info forbids is never taken, with one sub-environment and wi
 })
 
 test_that("a learner without a mask takes what is forbidden", {
+  skip_unless_all()
   learned <- learn_q("Taxi-v4", iterations = 2, episodes = 4, epsilon = 1, seed = 1, target = Inf)
   expect_lt(min(learned$history$mean_return), -200)
 })
@@ -58,6 +59,7 @@ test_that("the mask of an environment in R is taken", {
 })
 
 test_that("masks that forbid everything, do not fit or are not there are refused by name", {
+  skip_unless_all()
   learn <- function(env, mask = "action_mask", ...) {
     learn_q(env, iterations = 1, seed = 1, mask = mask, eval_episodes = 2, target = Inf, ...)
   }

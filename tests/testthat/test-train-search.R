@@ -41,6 +41,7 @@ test_that("predicting finds the observations among the columns of played steps",
 })
 
 test_that("a summary plays the policy found in fresh episodes", {
+  skip_unless_all()
   env <- fake_environment(reward = first_action)
   search <- search_random(env, rounds = 3, episodes = 2, target = 12, seed = 1)
   summary <- summary(search, episodes = 50, seed = 2)

@@ -7,6 +7,7 @@ quiet_trainings <- function(..., env = fake_environment(reward = first_action), 
 }
 
 test_that("the training of each seed is the one that the seed makes alone", {
+  skip_unless_all()
   trained <- quiet_trainings(seeds = c(5, 2, 1e5))
   expect_s3_class(trained, "gym_trainings")
   expect_named(trained$trainings, c("5", "2", "100000"))
@@ -22,6 +23,7 @@ test_that("the training of each seed is the one that the seed makes alone", {
 })
 
 test_that("a row for each seed says whether its final evaluation has reached the target", {
+  skip_unless_all()
   # The final evaluation has the seeds above this.
   lucky <- function(seed, step, action) if (seed <= 2^30 + 2^29) 10 else 1
   trained <- train_agent(agent_hill_climb(), fake_environment(reward = lucky), iterations = 2,
@@ -53,6 +55,7 @@ test_that("the interval of a share is Wilson's", {
 })
 
 test_that("each seed has its own checkpoint and log, and all go on from there", {
+  skip_unless_all()
   folder <- withr::local_tempdir()
   path <- file.path(folder, "my.training.rds")
   first <- quiet_trainings(checkpoint = path, log = file.path(folder, "log"))
@@ -90,6 +93,7 @@ test_that("relative files of all seeds lie in the folder at the start, whatever 
 })
 
 test_that("an interrupt and an error keep the trainings before them, and the one that they met", {
+  skip_unless_all()
   stopping <- function(stop_it) {
     env <- fake_environment(reward = first_action)
     step <- env$step

@@ -27,6 +27,7 @@ test_that("finding out what there is leaves R's generator as it was", {
 })
 
 test_that("the end of one process is not that of others", {
+  skip_unless_all()
   skip_on_os("windows")
   folder <- withr::local_tempdir()
   trials <- lapply(1:2, function(i) {

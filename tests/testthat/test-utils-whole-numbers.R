@@ -30,6 +30,7 @@ test_that("an integer64 beyond 2^53 is refused where numbers are calculated with
 })
 
 test_that("a setting that is an integer64 is refused with what to do", {
+  skip_unless_all()
   step <- function(self, action) NULL
   unit <- space_discrete(1)
   expect_refused <- function(code) {

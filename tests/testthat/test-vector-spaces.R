@@ -120,6 +120,7 @@ test_that("the last observation of a sub-environment is kept for every kind of s
 })
 
 test_that("infos have an entry for each sub-environment, and pictures one dimension more", {
+  skip_unless_all()
   server <- local_odd_server()
   env <- gym_make("odd_environments:Telling-v0", num_envs = 2, client = server)
   env$reset()
@@ -139,6 +140,7 @@ test_that("infos have an entry for each sub-environment, and pictures one dimens
 })
 
 test_that("numbers of sub-environments keep their types, and what R cannot hold is an error", {
+  skip_unless_all()
   skip_if_not_installed("bit64")
   server <- local_odd_server()
   make <- function(name) {
@@ -157,6 +159,7 @@ test_that("numbers of sub-environments keep their types, and what R cannot hold 
 })
 
 test_that("the server draws actions of a vector environment in the form in which it takes them", {
+  skip_unless_all()
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -170,6 +173,7 @@ test_that("the server draws actions of a vector environment in the form in which
 })
 
 test_that("an error about a nested action names the sub-environment", {
+  skip_unless_all()
   server <- local_odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
@@ -185,6 +189,7 @@ test_that("an error about a nested action names the sub-environment", {
 })
 
 test_that("an exception in one sub-environment is an error, and the server goes on", {
+  skip_unless_all()
   server <- local_odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()
