@@ -23,7 +23,7 @@ test_that("a random map follows from the seed, whatever plays", {
 
 test_that("what is learned on a random map is judged on the same", {
   skip_unless_all()
-  learned <- random_lake(learn_q, total_steps = 2000, seed = 1, is_slippery = FALSE,
+  learned <- random_lake(learn_q, total_steps = 500, seed = 1, is_slippery = FALSE,
                          max_steps = 100)
   lake <- env_model(
     "FrozenLake-v1", desc = provenance(learned)$kwargs$desc, is_slippery = FALSE,
