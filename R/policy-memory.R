@@ -201,22 +201,25 @@ watch_variables <- function(policy) {
     where <- parent.env(where)
   }
   state <- function() {
-    unlist(lapply(places, function(place) {
-      names <- intersect(used, names(place))
-      names <- names[!vapply(names, bindingIsActive, NA, env = place)]
-      vapply(Filter(may_remember, mget(names, place)), rlang::hash, "")
-    }))
+    unlist(lapply(places, variables_now, used), recursive = FALSE)
   }
   before <- state()
   function() {
     after <- state()
-    setdiff(paste(names(after), after), paste(names(before), before)) |>
-      sub(pattern = " [^ ]*$", replacement = "")
+    same <- vapply(names(after), function(name) identical(after[[name]], before[[name]]), NA)
+    names(after)[!same]
   }
 }
 
-# Objects that stand for something outside of R change for reasons of their own.
-may_remember <- function(x) !is.function(x) && !(is.environment(x) && is.object(x))
+# Objects that are environments stand for something outside of R, and change for reasons of their
+# own. Of other environments the contents count.
+variables_now <- function(place, names) {
+  names <- intersect(names, names(place))
+  names <- names[!vapply(names, bindingIsActive, NA, env = place)]
+  values <- Filter(function(x) !is.function(x) && !(is.environment(x) && is.object(x)),
+                   mget(names, place))
+  lapply(values, function(x) if (is.environment(x)) as.list(x, sorted = TRUE) else x)
+}
 
 warn_of_memory <- function(changed, call) {
   rlang::warn(

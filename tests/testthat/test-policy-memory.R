@@ -112,4 +112,10 @@ test_that("a function that remembers by itself is warned of once, one that does 
   expect_no_warning(play(function(observation) scale * observation[, 1]))
   expect_warning(play(leaks), "changes `total`.*policy_memory", class = "gym_warning_memory")
   expect_no_warning(play(leaks))
+  rlang::reset_warning_verbosity("gym_policy_changes_variables")
+  kept <- new.env()
+  expect_warning(
+    play(function(observation) kept$last <- observation[, 1]), "changes `kept`",
+    class = "gym_warning_memory"
+  )
 })
