@@ -23,5 +23,5 @@ adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
 # Makes a gradient that is longer than `longest` as long as that.
 clip_norm <- function(gradient, longest) {
   norm <- sqrt(sum(gradient * gradient))
-  if (norm > longest) gradient * (longest / (norm + 1e-6)) else gradient
+  if (isTRUE(norm > longest)) gradient * (longest / (norm + 1e-6)) else gradient
 }

@@ -16,7 +16,7 @@
 #' of its last state counts; after one that was terminated nothing is to come. With a policy that
 #' has `normalize = TRUE` the first iteration is random episodes, as of [agent_ppo()].
 #'
-#' A checkpoint keeps the memory in a file beside its own, `training.rds.memory` for
+#' A checkpoint keeps the memory in files beside its own, such as `training.rds.memory-0` for
 #' `training.rds`, to which only what is new is appended.
 #'
 #' @param memory How many steps the memory has at most, a whole number; the oldest are forgotten.
@@ -90,7 +90,7 @@ agent_start.gym_agent_dqn <- function(agent, policy) {
   agent$target <- weight_vector(policy)
   agent$adam <- new_adam(count_weights(policy))
   agent$updates <- 0
-  agent$memory <- new_memory()
+  agent$memory <- new_memory(agent$memory_size)
   agent
 }
 
@@ -119,7 +119,7 @@ agent_tell.gym_agent_dqn <- function(agent, results) {
   # Taken out of the agent, so that R writes into it without another copy.
   memory <- agent$memory
   agent$memory <- NULL
-  memory <- remember_steps(memory, agent$policy, results$trajectories, agent$memory_size)
+  memory <- add_to_memory(memory, remembered(agent$policy, results$trajectories))
   if (!is_warming_up(agent) && memory$count >= agent$learning_starts) {
     due <- agent$carried + steps * agent$updates_per_step
     agent$carried <- due - floor(due)
@@ -196,29 +196,13 @@ dqn_update <- function(policy, state, rows, settings) {
 
 # The memory ---------------------------------------------------------------------------------
 
-# A step in each column, the oldest overwritten when it is full: `steps` has the numbers of the
-# observation, those of the next one, then action, reward and whether it terminated. `count` is how
-# many there were in all.
-new_memory <- function() list(steps = NULL, count = 0)
-
-remember_steps <- function(memory, policy, trajectories, size) {
-  new <- rbind(
+# A step has the numbers of the observation, those of the next one, then action, reward and whether
+# it terminated.
+remembered <- function(policy, trajectories) {
+  rbind(
     t(number_rows(trajectories$observation)), t(number_rows(trajectories$next_observation)),
     network_actions(policy, trajectories$action), trajectories$reward, trajectories$terminated
   )
-  n <- ncol(new)
-  # One whose episodes are longer than the memory keeps their ends.
-  keep <- seq.int(max(1L, n - size + 1L), n)
-  at <- (memory$count + keep - 1) %% size + 1
-  room <- max(0L, ncol(memory$steps))
-  if (max(at) > room) {
-    grown <- matrix(0, nrow(new), min(size, max(2 * room, at, 1024)))
-    if (room) grown[, seq_len(room)] <- memory$steps
-    memory$steps <- grown
-  }
-  memory$steps[, at] <- new[, keep]
-  memory$count <- memory$count + n
-  memory
 }
 
 recalled <- function(memory, policy, at) {
@@ -227,8 +211,9 @@ recalled <- function(memory, policy, at) {
   own <- seq_len(width)
   seen <- function(rows) network_columns(policy, t(steps[rows, , drop = FALSE]))
   list(
-    inputs = seen(own), next_inputs = seen(width + own), action = as.integer(steps[2L * width + 1L, ]),
-    reward = steps[2L * width + 2L, ], terminated = steps[2L * width + 3L, ] == 1
+    inputs = seen(own), next_inputs = seen(width + own),
+    action = as.integer(steps[2L * width + 1L, ]), reward = steps[2L * width + 2L, ],
+    terminated = steps[2L * width + 3L, ] == 1
   )
 }
 

@@ -101,7 +101,7 @@ check_finite_weights <- function(weights, agent) {
   if (!all(is.finite(weights))) {
     gym_abort(
       c(paste0("The weights became NaN or infinite in iteration ", agent$iteration + 1L, "."),
-        i = "A smaller `learning_rate`, or normalized observations and rewards, may keep them finite."),
+        i = "A smaller `learning_rate`, or observations that are normalized, may help."),
       class = "gym_error_agent", iteration = agent$iteration + 1L, call = NULL
     )
   }
@@ -162,7 +162,7 @@ check_has_log_prob <- function(policy, name) {
     gym_abort(
       c(paste0(name, " needs a policy that draws its actions",
                if (box) ", with standard deviations", ", not ", format(policy), "."),
-        i = paste0("`policy_network(output = \"", if (box) "gaussian" else "softmax", "\")` does.")),
+        i = paste0("`output = \"", if (box) "gaussian" else "softmax", "\"` makes it one.")),
       class = "gym_error_argument", argument = "policy", value = policy, call = NULL
     )
   }

@@ -98,7 +98,8 @@ agent_ppo <- function(batch_steps = 2048, batch = 64, epochs = 10, learning_rate
   check_flag(normalize_advantages)
   check_flag(normalize_rewards)
   check_number(target_kl, min = 0, allow_null = TRUE)
-  new_gradient_agent("ppo", c(settings, list(log = rlang::rep_named(ppo_log, NA_real_))))
+  log <- rlang::rep_named(ppo_log, NA_real_)
+  new_gradient_agent("ppo", c(settings, list(log = log)))
 }
 
 ppo_log <- c(

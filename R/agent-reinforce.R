@@ -10,8 +10,8 @@
 #' episode that was truncated would have gone on: with a baseline the value of its last state takes
 #' the place of the rewards to come; without one nothing can, and its returns are too low.
 #'
-#' Sutton and Barto multiply each step by `gamma^t`, which counts late steps less, as the gradient of
-#' the discounted return from the start asks for. This agent leaves the factor out, as nearly all
+#' Sutton and Barto multiply each step by `gamma^t`, which counts late steps less, as the gradient
+#' of the discounted return from the start asks for. This agent leaves the factor out, as nearly all
 #' implementations do: it would hardly learn from the end of an episode.
 #'
 #' Iterations, normalised observations and the default policy are those of [agent_ppo()].
@@ -60,7 +60,8 @@ agent_reinforce <- function(batch_steps = 1000, learning_rate = 0.01, gamma = 0.
   check_count(value_updates)
   check_flag(normalize_advantages)
   check_number(max_grad_norm, min = 0)
-  new_gradient_agent("reinforce", c(settings, list(log = rlang::rep_named(reinforce_log, NA_real_))))
+  log <- rlang::rep_named(reinforce_log, NA_real_)
+  new_gradient_agent("reinforce", c(settings, list(log = log)))
 }
 
 reinforce_log <- c(
@@ -93,7 +94,7 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
   value <- numeric(n)
   if (agent$baseline) {
     value <- expected_values(agent$value, rows$inputs)
-    last_value <- ifelse(rows$terminated[rows$last], 0, expected_values(agent$value, rows$last_inputs))
+    last_value <- expected_values(agent$value, rows$last_inputs) * !rows$terminated[rows$last]
     reward[rows$last] <- reward[rows$last] + agent$gamma * last_value
   }
   return <- sum_backwards(reward, agent$gamma, rows$last)

@@ -145,7 +145,8 @@ column_max <- function(x) {
 seen_columns <- function(policy, observation, call = rlang::caller_env()) {
   check_network(policy, call)
   observation <- observations_from(observation, policy, call)
-  network_columns(policy, observation_rows(observation, policy$observation_space, call)$values, call)
+  rows <- observation_rows(observation, policy$observation_space, call)
+  network_columns(policy, rows$values, call)
 }
 
 #' Find the actions among the outputs

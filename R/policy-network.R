@@ -119,8 +119,8 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   check_flag(bias)
   check_flag(normalize)
   output <- check_output(output)
-  activation <- activation %||% c("tanh", if (identical(output, "greedy")) "logistic" else "identity")
-  activation <- layer_activations(activation, sizes)
+  last <- if (identical(output, "greedy")) "logistic" else "identity"
+  activation <- layer_activations(activation %||% c("tanh", last), sizes)
   check_draws_from_sums(output, activation)
   check_number(epsilon, min = 0, max = 1)
   policy <- new_network(sizes, activation, bias, normalize)
@@ -183,7 +183,7 @@ check_draws_from_sums <- function(output, activation, call = rlang::caller_env()
     gym_abort(
       c(paste0("Outputs that actions are drawn from are those of \"identity\", not of \"", last,
                "\"."),
-        i = "`activation = c(\"tanh\", \"identity\")` gives hidden layers a range, and outputs none."),
+        i = "`activation = c(\"tanh\", \"identity\")` has them."),
       class = "gym_error_argument", argument = "activation", value = activation, call = call
     )
   }

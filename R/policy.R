@@ -25,8 +25,8 @@
 #' A policy that draws, such as a [policy_network()] with the output `"softmax"`, draws from R's
 #' generator, too; `draw = FALSE` gives its most likely action instead.
 #'
-#' `predict()` gives the same actions (where the policy draws the most likely ones), or the outputs that they follow from, for observations in a
-#' data frame, too. It never touches R's generator.
+#' `predict()` gives the same actions (where the policy draws the most likely ones), or the outputs
+#' that they follow from, for observations in a data frame, too. It never touches R's generator.
 #'
 #' # Saving policies
 #'

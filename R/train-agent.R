@@ -44,12 +44,13 @@
 #' many as a batch of episodes has room for. The result has the class [gym_search], too.
 #' [search_random()] trains in this way.
 #'
-#' @param agent The agent, as [agent_ars()], [agent_cem()] or [agent_hill_climb()] make it, or one
-#'   of your own, see [agent_ask()].
+#' @param agent The agent, as [agent_ars()], [agent_ppo()] or [agent_q()] make it, or one of your
+#'   own, see [agent_ask()].
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy whose weights are to be found: a network, by default
-#'   [policy_linear()], or the one that an agent's help page tells. Most agents begin with the weights that it has. A learner such as
-#'   [agent_q()] makes a policy of its own, and may begin with a [policy_table()] of values.
+#'   [policy_linear()], or the one that an agent's help page tells. Most agents begin with the
+#'   weights that it has. A learner such as [agent_q()] makes a policy of its own, and may begin
+#'   with a [policy_table()] of values.
 #' @param iterations,total_steps After how many iterations, or steps of the environment, to end,
 #'   whole numbers of at least 1. The iteration in which the steps are used up is played to its end.
 #'   One of the two must be given.
@@ -105,9 +106,9 @@
 #'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps`
 #'       (those of the training so far, double), `min_return`, `median_return`, `mean_return`,
 #'       `max_return` (of the candidates' mean returns, or of the returns where the agent learns
-#'       from steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean return of the agent's policy, `NA` where
-#'       it was not looked at), `elapsed` (seconds, `NA` for the rounds of a search) and what
-#'       [agent_log()] gives.}
+#'       from steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean
+#'       return of the agent's policy, `NA` where it was not looked at), `elapsed` (seconds, `NA`
+#'       for the rounds of a search) and what [agent_log()] gives.}
 #'     \item{evaluations}{A data frame with a row for each evaluation: `iteration`, `kind`
 #'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
 #'       `mean_return` on.}

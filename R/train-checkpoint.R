@@ -45,7 +45,7 @@ training_checkpoint <- function(state, file, settings, call) {
   server <- settings[c("target", "env_id", "num_envs", "batch_size", "from_model")]
   if (!is.null(file$saved)) {
     check_same_server(file$path, file$saved$server, server, call)
-    resume_training(state, file$saved)
+    resume_training(state, file$saved, file$path, call)
     # Where the budget is a larger one now, the final evaluation comes later.
     state$final <- NULL
     state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
@@ -53,11 +53,14 @@ training_checkpoint <- function(state, file, settings, call) {
     inform_resumed("Going on from {.path {file$path}}, after {played}.")
   }
   state$path <- file$path
+  without_memory <- memory_writer(file$path, max(0, file$saved$training$agent$memory$count))
   write <- checkpoint_writer(file, function() {
+    training <- mget(kept_of_training, state)
+    training$agent <- without_memory(training$agent)
     list(
       what = settings$what, arguments = file$arguments, server = server,
       policy = settings$policy, seed = settings$seed, provenance = settings$provenance,
-      training = mget(kept_of_training, state), streams = saved_streams(state$streams),
+      training = training, streams = saved_streams(state$streams),
       evaluation_streams = saved_streams(state$evaluation_streams),
       elapsed = proc.time()[["elapsed"]] - state$started
     )
@@ -65,8 +68,9 @@ training_checkpoint <- function(state, file, settings, call) {
   function(last = FALSE) write(now = last)
 }
 
-resume_training <- function(state, saved) {
+resume_training <- function(state, saved, path, call = NULL) {
   list2env(saved$training, state)
+  state$agent <- restore_memory(state$agent, path, call)
   state$streams <- restore_streams(saved$streams)
   state$evaluation_streams <- restore_streams(saved$evaluation_streams)
   state$started <- state$started - saved$elapsed
@@ -82,7 +86,7 @@ finished_training <- function(run, client) {
   settings[names(saved$server)] <- saved$server
   settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
   state <- rlang::env(started = proc.time()[["elapsed"]])
-  resume_training(state, saved)
+  resume_training(state, saved, run$file$path)
   search <- settings$search
   if (!is_over(settings, state) || !search && is.null(state$final)) {
     return(NULL)

@@ -23,7 +23,9 @@ log_lines <- function(state, iterations) {
     round(rows$steps / pmax(rows$elapsed, 1e-3)), rows$mean_return, rows$min_return,
     rows$median_return, rows$max_return, rows$mean_length, evaluated$mean_return, length
   )
-  of_agent <- setdiff(names(rows), names(no_iterations))
+  of_agent <- names(agent_log(state$agent))
+  # Before the first iteration there are only names.
+  if (!nrow(rows)) rows[of_agent] <- rep(list(numeric()), length(of_agent))
   csv_lines(rlang::set_names(
     cbind(table, rows[of_agent]), c(log_columns, paste0("train/", of_agent, recycle0 = TRUE))
   ))

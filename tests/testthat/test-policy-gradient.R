@@ -61,7 +61,8 @@ test_that("log-probabilities are those of R's distributions, of numbers beyond t
 
 test_that("Discrete observations are one column each, and actions begin where the space does", {
   env <- fake_environment(
-    observation_space = discrete_space(3L, start = 1L), action_space = discrete_space(2L, start = 5L)
+    observation_space = discrete_space(3L, start = 1L),
+    action_space = discrete_space(2L, start = 5L)
   )
   policy <- policy_network(c(3, 2), weights = list(rbind(c(1, 2, 3), 0)), output = "softmax")
   policy <- policy_bind(policy, env)

@@ -257,7 +257,7 @@ test_that("weights that were given another shape by hand are named", {
                fixed = TRUE, class = "gym_error_argument")
 })
 
-test_that("orthogonal weights stand at right angles, and outputs that are drawn from begin near 0", {
+test_that("orthogonal weights stand at right angles, and are small where actions are drawn", {
   set.seed(1)
   policy <- policy_network(c(6, 4, 5, 3), bias = TRUE, output = "softmax", init = "orthogonal")
   weights <- lapply(policy$weights, function(layer) layer[, -ncol(layer)])

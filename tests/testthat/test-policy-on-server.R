@@ -31,7 +31,7 @@ write_case <- function(policy, observation, file) {
   )
 }
 
-# What the server's policies do, chosen one by one and then in groups: of a Box an action in each row.
+# What the server's policies do, one by one and then in groups: of a Box an action in each row.
 acted_on_server <- function(policies, observation) {
   folder <- withr::local_tempdir()
   names <- file.path(folder, seq_along(policies))

@@ -1,0 +1,131 @@
+# The memory of an agent: the steps that it learns from again and again. It is large and grows by a
+# little, so a checkpoint does not write it anew: what is new is appended to files beside it.
+
+#' Make an empty memory
+#' @param size How many steps it has at most; the oldest are overwritten.
+#' @return A list of class `gym_memory`: `size`, `count`, how many steps there were in all, and
+#'   `steps`, a matrix with numbers of a step in each column.
+#' @noRd
+new_memory <- function(size) {
+  structure(list(size = size, count = 0, steps = NULL), class = "gym_memory")
+}
+
+#' Add steps to a memory
+#' @param new A matrix with a step in each column.
+#' @noRd
+add_to_memory <- function(memory, new) {
+  n <- ncol(new)
+  # Of more than there is room for, the last.
+  kept <- seq.int(max(1, n - memory$size + 1), n)
+  at <- memory_columns(memory, memory$count + kept)
+  room <- max(0L, ncol(memory$steps))
+  if (max(at) > room) {
+    grown <- matrix(0, nrow(new), min(memory$size, max(2 * room, at, 1024)))
+    if (room) grown[, seq_len(room)] <- memory$steps
+    memory$steps <- grown
+  }
+  memory$steps[, at] <- new[, kept]
+  memory$count <- memory$count + n
+  memory
+}
+
+# Where the steps of some numbers, from 1, are.
+memory_columns <- function(memory, number) (number - 1) %% memory$size + 1
+
+# In files ---------------------------------------------------------------------------------------
+
+# A file has as many steps as the memory, the next ones are in the next file. So two files have all
+# that is remembered, and older ones are removed.
+memory_file <- function(path, number) paste0(path, ".memory-", number)
+
+memory_files <- function(path) {
+  files <- list.files(dirname(path), "[.]memory-[0-9]+$", full.names = TRUE)
+  files[startsWith(basename(files), paste0(basename(path), ".memory-"))]
+}
+
+#' Prepare to keep a memory in files
+#' @param path The checkpoint.
+#' @param count How many of its steps the files have.
+#' @return A function of an agent, which appends what is new and returns the agent with a memory
+#'   without steps: what the checkpoint has of it.
+#' @noRd
+memory_writer <- function(path, count = 0) {
+  if (count == 0) unlink(memory_files(path))
+  function(agent) {
+    memory <- agent$memory
+    if (!inherits(memory, "gym_memory") || is.null(memory$steps)) {
+      return(agent)
+    }
+    # The file before those that are named stays, in case that a checkpoint could not be written.
+    remove_forgotten(path, count - 2 * memory$size, memory$size)
+    while (count < memory$count) {
+      number <- count %/% memory$size
+      end <- min(memory$count, (number + 1) * memory$size)
+      append_memory(memory, memory_file(path, number), count + 1, end)
+      count <<- end
+    }
+    agent$memory$room <- ncol(memory$steps)
+    agent$memory$width <- nrow(memory$steps)
+    agent$memory["steps"] <- list(NULL)
+    agent
+  }
+}
+
+# Steps that are forgotten already are needed no more: zeros keep their place.
+append_memory <- function(memory, file, first, last) {
+  numbers <- seq.int(first, last)
+  # What a full disk has left of an earlier attempt is cut off.
+  before <- 8 * nrow(memory$steps) * ((first - 1) %% memory$size)
+  if (file.exists(file) && file.size(file) != before) cut_file(file, before)
+  values <- memory$steps[, memory_columns(memory, numbers), drop = FALSE]
+  values[, numbers <= memory$count - memory$size] <- 0
+  write_bytes(file, writeBin(as.vector(values), raw(), endian = "little"), "ab")
+}
+
+# Removes files that have only steps up to a number.
+remove_forgotten <- function(path, last, size) {
+  numbers <- as.numeric(sub(".*-", "", memory_files(path)))
+  unlink(memory_file(path, numbers[(numbers + 1) * size <= last]))
+}
+
+cut_file <- function(file, bytes) replace_content(file, readBin(file, "raw", bytes))
+
+#' Read the memory of an agent from its files
+#' @param agent As memory_writer() left it in the checkpoint.
+#' @noRd
+restore_memory <- function(agent, path, call = NULL) {
+  memory <- agent$memory
+  if (!inherits(memory, "gym_memory") || is.null(memory$room)) {
+    return(agent)
+  }
+  steps <- matrix(0, memory$width, memory$room)
+  first <- max(0, memory$count - memory$size)
+  while (first < memory$count) {
+    number <- first %/% memory$size
+    end <- min(memory$count, (number + 1) * memory$size)
+    values <- read_memory(memory_file(path, number), end - number * memory$size, memory$width, call)
+    numbers <- seq.int(first + 1, end)
+    steps[, memory_columns(memory, numbers)] <- values[, numbers - number * memory$size]
+    first <- end
+  }
+  memory[c("room", "width")] <- NULL
+  memory$steps <- steps
+  agent$memory <- memory[names(new_memory(1))]
+  class(agent$memory) <- "gym_memory"
+  agent
+}
+
+# Reads the first steps of a file. What follows them was written after the checkpoint, by a process
+# that came no further, and is cut off.
+read_memory <- function(file, count, width, call) {
+  bytes <- 8 * count * width
+  if (!file.exists(file) || file.size(file) < bytes) {
+    gym_abort(
+      c(paste0("The memory that belongs to the checkpoint, \"", file, "\", is missing or damaged."),
+        i = "`resume = FALSE` begins anew."),
+      class = c("gym_error_checkpoint", "gym_error_argument"), path = file, call = call
+    )
+  }
+  if (file.size(file) > bytes) cut_file(file, bytes)
+  matrix(readBin(file, "double", count * width, endian = "little"), width)
+}

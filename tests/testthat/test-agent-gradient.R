@@ -1,0 +1,219 @@
+quiet_learning <- function(...) {
+  suppressMessages(train_agent(..., eval_episodes = 2, eval_every = 1000, target = Inf))
+}
+
+# What differs between two runs of the same training.
+same_training <- function(x, y) {
+  of <- function(training) {
+    training$history$elapsed <- training$elapsed <- training$provenance <- NULL
+    training[c("policy", "agent", "history", "steps", "final")]
+  }
+  expect_identical(of(x), of(y))
+}
+
+small_policy <- function(output = NA) {
+  policy_network(c(NA, 8, NA), c("tanh", "identity"), bias = TRUE, normalize = TRUE,
+                 output = output, init = "orthogonal")
+}
+
+test_that("a training that was cut goes on bit for bit, the memory of DQN appended", {
+  skip_if_no_server()
+  agents <- list(
+    agent_reinforce(batch_steps = 200, learning_rate = schedule_linear(0.02, 0, 5000)),
+    agent_ppo(batch_steps = 200, batch = 50, epochs = 2, normalize_rewards = TRUE),
+    # Three episodes fill the memory, so its files are changed several times.
+    agent_dqn(memory = 60, learning_starts = 50, batch = 8, updates_per_step = 0.3,
+              target_every = 20)
+  )
+  for (agent in agents) {
+    file <- withr::local_tempfile(fileext = ".rds")
+    learn <- function(iterations, ...) {
+      policy <- small_policy(if (inherits(agent, "gym_agent_dqn")) "epsilon-greedy" else NA)
+      quiet_learning(agent, "CartPole-v1", policy, iterations = iterations, seed = 3, ...)
+    }
+    whole <- learn(9)
+    learn(2, checkpoint = file)
+    learn(6, checkpoint = file)
+    cut <- learn(9, checkpoint = file)
+    same_training(cut, whole)
+    # One that has ended is read from its file, the memory too.
+    same_training(learn(9, checkpoint = file), whole)
+    expect_false(identical(coef(learn(8)), coef(whole)))
+  }
+  files <- memory_files(file)
+  expect_identical(sum(file.size(files)) %% (8 * 11), 0)
+  expect_lte(sum(file.size(files)), 8 * 11 * 60 * 4)
+  unlink(files)
+  expect_error(learn(10, checkpoint = file), "missing or damaged", class = "gym_error_checkpoint")
+})
+
+# An agent in an environment with one number and two actions, whose networks give 10 for everything.
+started <- function(agent, value = 10) {
+  dqn <- inherits(agent, "gym_agent_dqn")
+  env <- fake_environment(observation_space = box_space(0, 1))
+  output <- if (dqn) "epsilon-greedy" else "softmax"
+  policy <- policy_network(c(NA, NA), "identity", bias = TRUE, output = output)
+  policy <- policy_bind(policy, env)
+  coef(policy) <- c(0, 0, rep(if (dqn) value else 0, 2))
+  agent <- agent_start(agent, policy)
+  if (!is.null(agent$value)) coef(agent$value) <- c(0, value)
+  agent
+}
+
+# Two episodes of three steps without rewards.
+told <- function(terminated, reward = numeric(6)) {
+  last <- rep(c(FALSE, FALSE, TRUE), 2)
+  list(trajectories = list(
+    candidate = rep(1L, 6), episode = rep(1:2, each = 3), observation = matrix(0.5, 6, 1),
+    action = rep(0:1, 3), reward = reward, terminated = last & terminated,
+    truncated = last & !terminated, next_observation = matrix(0.5, 6, 1)
+  ))
+}
+
+test_that("an episode that was truncated keeps the value of its last state, a terminated one not", {
+  set.seed(1)
+  loss <- function(agent, terminated, name = "value_loss") {
+    agent_tell(started(agent), told(terminated))$log[[name]]
+  }
+  ppo <- agent_ppo(gamma = 1, lambda = 1, epochs = 1, batch = Inf)
+  reinforce <- agent_reinforce(gamma = 1)
+  for (agent in list(ppo, reinforce)) {
+    expect_equal(loss(agent, terminated = FALSE), 0)
+    expect_equal(loss(agent, terminated = TRUE), 100)
+  }
+  # Huber's loss of an error of 10, in the last of three steps.
+  dqn <- agent_dqn(gamma = 1, learning_starts = 0, batch = 600, updates_per_step = 1 / 6,
+                   memory = 600)
+  expect_equal(loss(dqn, terminated = FALSE, "loss"), 0)
+  expect_equal(loss(dqn, terminated = TRUE, "loss"), 9.5 / 3, tolerance = 0.1)
+  # Without a baseline nothing is to come after either.
+  blind <- agent_reinforce(gamma = 1, baseline = FALSE)
+  expect_identical(
+    coef(agent_tell(started(blind), told(TRUE, rnorm(6)))$policy) == 0, rep(FALSE, 4)
+  )
+})
+
+test_that("how many episodes an iteration has follows from the last one", {
+  next_episodes <- function(agent) agent_episodes(agent_tell(started(agent), told(TRUE)), 1)
+  # Episodes had three steps; there were two of them.
+  expect_identical(next_episodes(agent_ppo(batch_steps = 16, batch = 8, min_episodes = 2)), 5L)
+  expect_identical(next_episodes(agent_ppo(batch_steps = 999, min_episodes = 2)), 8L)
+  expect_identical(next_episodes(agent_ppo(batch_steps = 64)), 8L)
+  expect_identical(next_episodes(agent_dqn()), 1L)
+})
+
+test_that("minibatches are nearly equal and have each step once", {
+  set.seed(1)
+  for (batch in c(7, 64, 1000, Inf)) {
+    batches <- draw_minibatches(100, batch)
+    expect_length(batches, max(1, round(100 / batch)))
+    expect_lte(diff(range(lengths(batches))), 1)
+    expect_setequal(unlist(batches), 1:100)
+  }
+})
+
+test_that("the gradient of PPO's loss is that of central differences, clipped or not", {
+  set.seed(1)
+  for (output in c("softmax", "gaussian")) {
+    gaussian <- output == "gaussian"
+    policy <- policy_network(c(3, 5, 2), bias = TRUE, output = output, log_std = -0.3)
+    value <- value_network(policy)
+    count <- count_weights(policy)
+    weights <- c(coef(policy), coef(value))
+    n <- 12
+    batch <- list(
+      inputs = matrix(rnorm(3 * n), 3),
+      action = if (gaussian) matrix(rnorm(2 * n), 2) else sample.int(2, n, TRUE),
+      advantage = rnorm(n), return = rnorm(n)
+    )
+    played <- ppo_forward(policy, value, weights, batch$inputs, batch$action)$draws$log_prob
+    batch$log_prob <- played + rnorm(n, sd = 0.4)
+    settings <- agent_ppo(entropy = 0.1, clip = 0.3)
+    found <- ppo_gradient(policy, value, weights, batch, settings)
+    expect_gt(found$log[["clip_fraction"]], 0.1)
+    expect_lt(found$log[["clip_fraction"]], 1)
+    wanted <- vapply(seq_along(weights), function(i) {
+      at <- function(by) {
+        near <- replace(weights, i, weights[[i]] + by)
+        ppo_gradient(policy, value, near, batch, settings)$log[["loss"]]
+      }
+      (at(1e-6) - at(-1e-6)) / 2e-6
+    }, 0)
+    expect_equal(found$gradient, wanted, tolerance = 1e-6)
+  }
+})
+
+test_that("learning ends where the policy has moved too far, and where weights are NaN", {
+  set.seed(1)
+  started_ppo <- started(agent_ppo(target_kl = 1e-9, epochs = 50, learning_rate = 0.1))
+  far <- agent_tell(started_ppo, told(TRUE, rnorm(6)))
+  expect_identical(far$adam$steps, 1)
+  for (agent in list(agent_ppo(), agent_reinforce(), agent_dqn(learning_starts = 0))) {
+    cnd <- expect_error(agent_tell(started(agent), told(TRUE, rep(NaN, 6))), "in iteration 1",
+                        class = "gym_error_agent")
+    expect_identical(cnd$iteration, 1L)
+  }
+})
+
+test_that("agents refuse policies, spaces and settings that they cannot learn with", {
+  box <- fake_environment(action_space = box_space(c(-1, -1), c(1, 1)))
+  refused <- function(agent, policy, env, words) {
+    expect_error(quiet_learning(agent, env, policy, iterations = 1), words,
+                 class = "gym_error_argument")
+  }
+  greedy <- policy_network(c(NA, NA), "identity")
+  refused(agent_ppo(), greedy, box, "with standard deviations")
+  refused(agent_reinforce(), greedy, fake_environment(), "a policy that draws")
+  refused(agent_dqn(), policy_network(c(NA, NA), output = NA), box, "each action of a Discrete")
+  refused(agent_dqn(), greedy, fake_environment(), "a value for each of 2 actions")
+  picture <- fake_environment(observation_space = space_box(0, 1, shape = c(2, 2)))
+  refused(agent_ppo(), NULL, picture, "observations are vectors")
+  expect_error(agent_ppo(batch = 99, batch_steps = 64), "`batch` must be at most",
+               class = "gym_error_argument")
+  expect_error(agent_dqn(batch = 99, memory = 64), class = "gym_error_argument")
+  expect_error(agent_ppo(learning_rate = "fast"), class = "gym_error_argument")
+})
+
+test_that("learning CartPole reaches its goal; what was evaluated is what is returned", {
+  skip_if_no_server()
+  trained <- suppressMessages(
+    learn_reinforce("CartPole-v1", total_steps = 60000, target = 475, seed = 1)
+  )
+  expect_true(trained$solved)
+  expect_gte(trained$final$mean_return, 475)
+  expect_identical(trained$policy$output, "greedy")
+  expect_identical(agent_policy(trained$agent)$output, "softmax")
+  expect_lt(trained$steps, 60000)
+})
+
+test_that("random episodes make first moments; diagnostics are logged; a draw may be evaluated", {
+  skip_if_no_server()
+  folder <- withr::local_tempdir()
+  trained <- quiet_learning(
+    agent_ppo(batch_steps = 300, batch = 100, epochs = 1), "Pendulum-v1", small_policy(),
+    iterations = 2, evaluate = "draw", log = folder, seed = 1, max_steps = 30
+  )
+  # The first iteration learned nothing from its eight episodes, and its observations count.
+  expect_identical(is.na(trained$history$approx_kl), c(TRUE, FALSE))
+  expect_identical(trained$policy$moments$count, trained$steps)
+  expect_identical(trained$policy$output, "gaussian")
+  expect_identical(trained$history$steps, c(240, 540))
+  log <- utils::read.csv(file.path(folder, "progress.csv"), check.names = FALSE)
+  expect_equal(log[["train/approx_kl"]], trained$history$approx_kl)
+  expect_true(all(paste0("train/", ppo_log) %in% names(log)))
+})
+
+test_that("what a Gaussian draws is kept as drawn and cut when stepped, here and beside R", {
+  skip_if_no_server()
+  wide <- policy_network(c(3, 1), output = "gaussian", log_std = log(20))
+  for (env in list("Pendulum-v1", gym_make("Pendulum-v1"))) {
+    played <- rollout(env, wide, max_steps = 40, steps = TRUE, next_observation = TRUE, seed = 1)
+    steps <- played$steps
+    expect_gt(max(abs(steps$action)), 5)
+    # Gymnasium's pendulum: the speed after a step, of a torque of at most 2.
+    torque <- pmax(-2, pmin(steps$action, 2))
+    speed <- steps$angular_velocity + 0.05 * (15 * steps$sin_theta + 3 * torque)
+    expect_equal(steps$next_angular_velocity, pmax(-8, pmin(speed, 8)), tolerance = 1e-4)
+    if (!is.character(env)) env$close()
+  }
+})
