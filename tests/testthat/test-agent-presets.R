@@ -27,6 +27,15 @@ test_that("a preset belongs to an id with the same arguments", {
   expect_null(find_preset("ars", fake_environment(id = "CartPole-v1"), list()))
 })
 
+test_that("the preset of an agent that follows gradients may normalise observations", {
+  policy_of <- function(env_id) {
+    preset <- find_preset("ppo", env_id, list())
+    preset_policy(preset, preset_agent(preset))
+  }
+  expect_identical(policy_of("Acrobot-v1")$moments, no_moments())
+  expect_null(policy_of("CartPole-v1")$moments)
+})
+
 test_that("a search takes its preset, says so, and lets arguments go before it", {
   skip_unless_all()
   client <- test_client()
