@@ -68,10 +68,10 @@ test_that("ten updates of DQN are those of Stable-Baselines3 and of NumPy, the t
     )
     coef(policy) <- case$start
     agent <- agent_start(agent, policy_bind(policy, env))
-    memory <- remember_steps(new_memory(), agent$policy, list(
+    memory <- add_to_memory(new_memory(40), remembered(agent$policy, list(
       observation = case$observation, next_observation = case$next_observation,
       action = case$action, reward = case$reward, terminated = case$terminated
-    ), 40)
+    )))
     set.seed(seeds[[name]])
     weights <- vapply(0:9, function(steps) {
       agent$steps <<- steps
