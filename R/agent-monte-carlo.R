@@ -4,6 +4,11 @@
 #' whole episodes, and acts by these values, exploring (Sutton and Barto 2018, section 5.4). Nothing
 #' is learned from an episode before it has ended, and no value rests on another one.
 #'
+#' In an environment of the server that is named by its id, the server's processes play all episodes
+#' of an iteration with the table as it is, and the learner learns from them when they have ended;
+#' so give `episodes` in the hundreds. With exploring starts or a `mask` R plays them, in several
+#' sub-environments. In a model, or an environment in R, it learns after each episode.
+#'
 #' With `exploring_starts = TRUE` the first action of each episode is drawn from all, each equally
 #' likely (section 5.3); the environment draws the first state.
 #'
@@ -79,8 +84,32 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
       agent$taken <- taken
       agent$visited <- returns$visited()
       agent
-    }
+    },
+    whole = list(
+      policy = function() iteration_policy(agent, learning$store$get(), taken),
+      learn = function(x, column, reward, episode) {
+        taken <<- taken + length(reward)
+        returns$learn_many(x, column, reward, episode, taken)
+      }
+    )
   )
+}
+
+# The policy that plays an iteration. Of actions with equal values one is drawn for it.
+iteration_policy <- function(agent, weights, taken) {
+  heat <- agent$temperature
+  if (is.null(heat)) {
+    best <- best_column(ifelse(weights == row_max(weights), stats::runif(length(weights)), -1))
+    weights[] <- ifelse(weights == -Inf, -Inf, 0)
+    weights[cbind(seq_along(best), best)] <- 1
+  } else {
+    heat <- scheduled(heat, taken, "temperature", lowest_temperature, Inf)
+  }
+  # A state without an action is an end, where none is taken.
+  weights[row_max(weights) == -Inf, ] <- 0
+  policy <- policy_table(weights, rate_of(agent$epsilon, "epsilon")(taken), heat)
+  policy[c("observation_space", "action_space")] <- agent$spaces
+  policy
 }
 
 # Keeps the steps of an episode until it has ended.
@@ -105,7 +134,8 @@ new_episode <- function() {
 }
 
 #' Keep the means of returns
-#' @return A list of functions: `learn(episode, taken)`, of the steps of a whole episode, and
+#' @return A list of functions: `learn(episode, taken)`, of the steps of a whole episode;
+#'   `learn_many()`, of the steps of several, `episode` being the number of each step's; and
 #'   `visited()`, how often each state and action has counted.
 #' @noRd
 new_returns <- function(agent, store) {
@@ -125,14 +155,41 @@ new_returns <- function(agent, store) {
         store$toward(episode$x[[i]], episode$column[[i]], returns[[i]], share)
       }
     },
+    learn_many = function(x, column, reward, episode, taken) {
+      cell <- store$cells(x, column)
+      returns <- discounted_returns(reward, discount, episode)
+      if (first_only) {
+        counted <- !duplicated(cell + length(visited) * (episode - 1))
+        cell <- cell[counted]
+        returns <- returns[counted]
+      }
+      if (is.null(rate)) {
+        sums <- rowsum(cbind(returns, 1), cell)
+        own <- as.double(rownames(sums))
+        visited[own] <<- visited[own] + sums[, 2L]
+        before <- store$get()[own]
+        store$add(own, (sums[, 1L] - sums[, 2L] * before) / visited[own])
+      } else {
+        share <- rate(taken)
+        for (i in seq_along(cell)) {
+          store$add(cell[[i]], share * (returns[[i]] - store$get()[[cell[[i]]]]))
+        }
+        visited[] <<- visited + tabulate(cell, length(visited))
+      }
+    },
     visited = function() visited
   )
 }
 
 # What followed on each step: its reward, and those after it, discounted.
-discounted_returns <- function(rewards, discount) {
+discounted_returns <- function(rewards, discount, episode = rep(1L, length(rewards))) {
   later <- 0
+  own <- 0L
   for (i in rev(seq_along(rewards))) {
+    if (episode[[i]] != own) {
+      own <- episode[[i]]
+      later <- 0
+    }
     rewards[[i]] <- later <- rewards[[i]] + discount * later
   }
   rewards

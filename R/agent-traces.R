@@ -2,7 +2,8 @@
 
 #' Make the function that moves a value towards what a step has come to
 #' @return A function of `x` and `column`, whose value is moved; `reward`; `ahead`, the value of
-#'   what the step led to, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so far.
+#'   what the step led to, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so
+#'   far.
 #' @noRd
 lookahead <- function(agent, store) {
   rate <- rate_of(agent$learning_rate)

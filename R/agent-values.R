@@ -114,9 +114,9 @@ learning_of <- function(agent) {
 #' @param stores All its tables, in which masks are noted.
 #' @noRd
 new_steps <- function(agent, learning, begin, observe, export,
-                      stores = list(learning$store), act = NULL) {
+                      stores = list(learning$store), act = NULL, whole = NULL) {
   list(
-    begin = begin, observe = observe, act = act,
+    begin = begin, observe = observe, act = act, whole = whole,
     export = function() {
       agent["weights"] <- list(learning$store$get())
       export(agent)

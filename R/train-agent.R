@@ -174,7 +174,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   } else {
     c("training", "iteration")
   }
-  settings$num_envs <- num_envs %||% if (online) learner_envs(env)
+  settings$num_envs <- num_envs %||% if (online) learner_envs(env, agent)
   settings$num_workers <- num_workers
   log <- if (!is.null(log)) absolute_path(log)
   files <- list(checkpoint = checkpoint, log = log, resume = resume)
@@ -255,7 +255,7 @@ train_in <- function(vector_env, run, progress, call) {
   settings[c("num_envs", "batch_size", "client")] <-
     unclass(vector_env)[c("num_envs", "batch_size", "client")]
   online <- learns_online(settings$agent)
-  playing <- if (online) stepped(vector_env) else vector_env
+  playing <- if (online && !plays_whole(settings$agent)) stepped(vector_env) else vector_env
   settings$provenance <- run$file$saved$provenance %||% new_provenance(playing, settings)
   bound <- if (online) {
     spaces_policy(settings$policy, vector_env, settings$model, call)

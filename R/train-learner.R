@@ -69,10 +69,14 @@ agent_observe <- function(agent, transitions) UseMethod("agent_observe")
 
 learns_online <- function(agent) inherits(agent, "gym_learner")
 
-# A learner plays in one sub-environment unless more are asked for. One that was made before has as
-# many as it has.
-learner_envs <- function(env) {
-  if (is.character(env) || inherits(env, c("gym_wrapped", "gym_model", "gym_r_env"))) 1L
+# A learner plays in one sub-environment unless more are asked for, but on a server not one that
+# learns between episodes. One that was made before has as many as it has.
+learner_envs <- function(env, agent) {
+  served <- is_made_by_server(env)
+  if (served && !inherits(agent, "gym_agent_monte_carlo") || is_registered(env) ||
+        inherits(env, c("gym_model", "gym_r_env"))) {
+    1L
+  }
 }
 
 # What a learner's `agent_start()` gets: a policy that was given, with the spaces, and with a model
@@ -99,7 +103,6 @@ format.gym_policy_unknown <- function(x, ...) "the learner's own"
 #' @return A list: `agent`, wiser, `returns` and `lengths` of the episodes.
 #' @noRd
 learn_episodes <- function(state, vector_env, settings, call) {
-  vector_env <- stepped(vector_env)
   learner <- state$learner
   if (is.null(learner)) {
     learner <- state$learner <- learner_of(state$agent)
@@ -108,6 +111,10 @@ learn_episodes <- function(state, vector_env, settings, call) {
     return(learn_by_methods(state, vector_env, settings, call))
   }
   learner$renew()
+  if (learns_beside(learner, state$agent, vector_env, settings)) {
+    return(learn_beside(learner, state, vector_env, settings))
+  }
+  vector_env <- stepped(vector_env)
   if (!is.null(state$agent$mask)) {
     note <- function(observation, mask) {
       forbid_actions(learner, state$agent, observation, mask, call)
@@ -122,6 +129,40 @@ learn_episodes <- function(state, vector_env, settings, call) {
     )
   }
   c(list(agent = learner$export()), played)
+}
+
+# Whether a learner learns between episodes, and nothing but a policy is needed to play them.
+plays_whole <- function(agent) {
+  inherits(agent, "gym_agent_monte_carlo") && !agent$exploring_starts && is.null(agent$mask)
+}
+
+# Whether the server's processes play whole episodes for a learner.
+learns_beside <- function(learner, agent, vector_env, settings) {
+  plays_whole(agent) && plays_beside(
+    vector_env, learner$whole$policy(), settings$max_steps %||% Inf, keep_steps = TRUE
+  )
+}
+
+learn_beside <- function(learner, state, vector_env, settings) {
+  history <- new_history(1L, settings$episodes, state$streams)
+  history$draw_seeds <- draw_training_seeds
+  policy <- with_generator(state$streams$agent, learner$whole$policy())
+  play_batches(
+    vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf,
+    report = function(ended) state$report(history$played_episodes + ended), keep_steps = TRUE
+  )
+  before <- 0L
+  for (batch in history$batches) {
+    for (steps in batch$steps) {
+      check_rewards(steps$reward, NULL)
+      x <- state$agent$basis$of(steps$observation, length(steps$reward))[, 1L]
+      learner$whole$learn(
+        x, action_columns(state$agent$spaces, steps$action), steps$reward, before + steps$at
+      )
+    }
+    before <- before + length(batch$return)
+  }
+  played_of(history, learner$export())
 }
 
 # One sub-environment plays one episode after the other.
@@ -164,8 +205,13 @@ learner_episodes <- function(learner, state, vector_env, settings) {
     report = function(ended) state$report(history$played_episodes + ended),
     max_steps = settings$max_steps %||% Inf
   )
+  played_of(history)
+}
+
+played_of <- function(history, agent = NULL) {
   each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
-  list(returns = each("return"), lengths = each("length"))
+  c(if (!is.null(agent)) list(agent = agent),
+    list(returns = each("return"), lengths = each("length")))
 }
 
 # A value that has become infinite stays so.

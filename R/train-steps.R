@@ -9,6 +9,8 @@
 #'   `observe(x, column, reward, after, terminated, ended, sub_env, observation)`, which learns from
 #'   a step and returns the next action, `NA` at the end of the episode; `act(observation, n)`,
 #'   where a policy acts that must be asked about all sub-environments together, else `NULL`;
+#'   `whole`, of a learner that learns between episodes, a list of the functions `policy()`, with
+#'   which the next episodes can be played, and `learn(x, column, reward, episode)`, of all steps;
 #'   `export()`, the agent as it is now; `forbid(x, forbidden)`, after which these actions are never
 #'   taken, and which returns the values; `renew()`, before an iteration, as [uniform_draws()] has
 #'   it, and `uniform()`, which draws.

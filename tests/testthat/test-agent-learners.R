@@ -157,6 +157,33 @@ test_that("Monte Carlo averages the returns of first visits, or of every one", {
   expect_equal(episode(first)$visited[1, 2], 2)
 })
 
+test_that("Monte Carlo learns the same from many episodes at once as from one after the other", {
+  set.seed(1)
+  episode <- rep(1:20, each = 5)
+  x <- sample(3, 100, replace = TRUE)
+  column <- sample(2, 100, replace = TRUE)
+  reward <- round(stats::rnorm(100), 1)
+  for (how in list(list(), list(visits = "every"), list(learning_rate = 0.1, discount = 1))) {
+    agent <- started(do.call(agent_monte_carlo, how))
+    at_once <- learner_of(agent)
+    at_once$whole$learn(x, column, reward, episode)
+    in_turn <- learner_of(agent)
+    for (i in 1:100) {
+      in_turn$observe(x[[i]], column[[i]], reward[[i]], 1L, FALSE, i %% 5 == 0, 1L, NULL)
+    }
+    expect_equal(at_once$export(), in_turn$export())
+  }
+})
+
+test_that("the policy of an iteration takes one of the actions with equal values, and no other", {
+  agent <- started(agent_monte_carlo(epsilon = 0.3), rbind(c(1, 1), c(3, 5), c(-Inf, 2)))
+  set.seed(1)
+  drawn <- replicate(50, learner_of(agent)$whole$policy()$q, simplify = FALSE)
+  expect_setequal(lapply(drawn, function(q) q[1, ]), list(0:1 + 0, 1:0 + 0))
+  expect_identical(unique(lapply(drawn, function(q) q[2:3, ])), list(rbind(0:1 + 0, c(-Inf, 1))))
+  expect_identical(learner_of(agent)$whole$policy()$epsilon, 0.3)
+})
+
 test_that("exploring starts draw the first action of an episode, and only that", {
   agent <- started(agent_monte_carlo(epsilon = 0, exploring_starts = TRUE))
   set.seed(1)

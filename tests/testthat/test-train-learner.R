@@ -62,8 +62,13 @@ test_that("a learner plays on the server, and judges by Gymnasium's own table", 
 })
 
 test_that("Tuples have tables, too, and are judged by playing", {
-  learned <- learn_monte_carlo("Blackjack-v1", iterations = 5, episodes = 100, num_envs = 32,
-                               discount = 1, seed = 1, eval_episodes = 50, client = test_client())
+  learned <- learn_monte_carlo("Blackjack-v1", iterations = 5, episodes = 100, discount = 1,
+                               seed = 1, eval_episodes = 50, client = test_client())
+  # Whole episodes, by the server's processes.
+  expect_identical(learned$provenance$way, "beside the environment")
+  starts <- learn_monte_carlo("Blackjack-v1", iterations = 1, seed = 1, exploring_starts = TRUE,
+                              eval_episodes = 2, client = test_client())
+  expect_gt(starts$provenance$num_envs, 1)
   expect_identical(learned$final$episodes, 50L)
   expect_identical(dim(learned$agent$weights), c(32L * 11L * 2L, 2L))
   expect_identical(sum(learned$agent$visited > 0) > 50, TRUE)
