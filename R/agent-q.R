@@ -95,7 +95,7 @@ learner_of.gym_agent_q <- function(agent) {
   choose <- learning$choose
   learn <- learning$learn
   taken <- agent$taken
-  memory <- if (agent$planning > 0L) new_memory(agent, learning$store)
+  memory <- if (agent$planning > 0L) new_planning_memory(agent, learning$store)
   new_steps(
     agent, learning,
     begin = function(x, sub_env, observation) choose(row(x), taken),
@@ -159,7 +159,7 @@ double_steps <- function(agent) {
 #' @return A list of functions: `remember()` a step, `plan(taken)`, and `get()`, the memory as the
 #'   agent keeps it.
 #' @noRd
-new_memory <- function(agent, store) {
+new_planning_memory <- function(agent, store) {
   draw <- NULL
   rows <- nrow(agent$weights)
   columns <- ncol(agent$weights)

@@ -1,4 +1,5 @@
-# Checks that every file of R/ uses only what stands on its own floor or below. A file's floor is
+# Checks that every file of R/ uses only what stands on its own floor or below, and that no name is
+# given twice. A file's floor is
 # its prefix: space-array.R and space.R both have the prefix "space". Prints `layers: clean`, or
 # one line for each use of a higher floor, and then fails.
 #
@@ -41,6 +42,9 @@ home <- vapply(objects, function(object) object$file, "")
 names(home) <- vapply(objects, function(object) object$name, "")
 
 problems <- sprintf("R/%s has no known prefix", files[is.na(vapply(files, rank_of, 0L))])
+# Of two objects with one name R keeps the last, and says nothing.
+twice <- unique(names(home)[duplicated(names(home)) & names(home) != ""])
+problems <- c(problems, sprintf("%s is defined more than once", twice))
 for (object in objects) {
   own <- rank_of(object$file)
   for (used in setdiff(intersect(object$uses, names(home)), "")) {
