@@ -35,6 +35,7 @@ sitrep_findings <- function() {
   python_runs <- is.data.frame(pythons) && any(pythons$runs, na.rm = TRUE)
   rbind(
     attempt_rows("R", "versions", sitrep_versions()),
+    attempt_rows("R", "BLAS", sitrep_blas()),
     attempt_rows("R", "suggested packages", sitrep_suggested()),
     attempt_rows("R", "variables", sitrep_variables(variables)),
     attempt_rows("Python", "environment", sitrep_environment(!python_runs && !nzchar(url))),

@@ -182,6 +182,19 @@ book_facts[["book-06-temporal-differences"]] <- function(made) {
   expect_gt(late(made$sarsa), late(made$q) + 10)
 }
 
+book_facts[["book-13-policy-gradients"]] <- function(made) {
+  # Example 13.1.
+  expect_equal(vapply(made$greedy, made$value_of_right, 0), c(left = -82.1, right = -44.2),
+               tolerance = 0.001)
+  expect_equal(made$best$maximum, 2 - sqrt(2), tolerance = 1e-4)
+  # Figures 13.1 and 13.2: both come near the best policy, with a baseline sooner.
+  near <- function(learned) which(learned$right > 0.5)[[1]]
+  expect_lt(near(made$with), 0.75 * near(made$without))
+  expect_lt(max(abs(c(utils::tail(made$with$right, 1), utils::tail(made$without$right, 1)) -
+                      made$best$maximum)), 0.15)
+  expect_gt(made$with$final$mean_return, -15)
+}
+
 test_that("each page of the book is listed here", {
   files <- book_files()
   skip_if_not(length(files) > 0L, "no vignettes/ beside the tests, and none in the package")

@@ -183,3 +183,15 @@ test_that("what could not be found out is wrong", {
   expect_match(seen$text, "could not be found out: Unknown option", fixed = TRUE)
   expect_no_match(seen$text, "Nothing is wrong", fixed = TRUE)
 })
+
+test_that("a slow BLAS is named, with what a faster one brings", {
+  slow <- c("", "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0", "/opt/R/lib/libRblas.so")
+  for (file in slow) {
+    expect_match(sitrep_blas(file)$finding, "OpenBLAS .* 2.1 to 3.1 times as fast")
+    expect_identical(sitrep_blas(file)$state, "note")
+  }
+  fast <- "/usr/lib/x86_64-linux-gnu/openblas-pthread/libopenblasp-r0.3.21.so"
+  expect_identical(sitrep_blas(fast)[c("finding", "state")],
+                   data.frame(finding = fast, state = "ok"))
+  expect_identical(sum(sitrep()$found$what == "BLAS"), 1L)
+})
