@@ -14,7 +14,7 @@ help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
 	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
 	@echo '               half an hour, or a glance: make bench QUICK=1; PARTS="wire" runs that;'
-	@echo '               with GYM_SB3_PYTHON also PPO beside Stable-Baselines3, hours'
+	@echo '               PARTS=gradients is PPO beside Stable-Baselines3, some hours'
 	@echo 'make test      the tests of the main promises: of the server (pytest) and of the R package'
 	@echo '               (testthat); three minutes'
 	@echo 'make test-all  every test of both'

@@ -9,8 +9,11 @@
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
-#   [beside] [wire] [memory] [gradients] runs parts. The last one, PPO against Stable-Baselines3, is
-# only run where GYM_SB3_PYTHON names a Python that has that; see tools/bench/gradients.R.
+#   [beside] [wire] [memory] runs parts.
+#
+#   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
+#                                vignettes/bench-gradients.csv and vignettes/bench-gradients.md.
+#                                Only this part needs torch; see tools/bench/gradients.R
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
@@ -41,7 +44,7 @@ settings <- function(quick) {
 bench <- function(parts, quick) {
   python <- Sys.getenv("GYM_PYTHON")
   scale <- settings(quick)
-  setup <- set_up(python)
+  setup <- set_up(python, parts)
   on.exit(tear_down(setup))
   started <- now()
   contenders <- c(
@@ -64,7 +67,10 @@ bench <- function(parts, quick) {
   list(rows = rows, run = c(describe_run(setup, parts), took = paste(round(now() - started), "s")))
 }
 
-set_up <- function(python) {
+set_up <- function(python, parts) {
+  if (identical(parts, "gradients")) {
+    return(list(python = start_python(python)))
+  }
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
   list(
     client = gym_server_start(python = python, token = FALSE),
@@ -75,8 +81,9 @@ set_up <- function(python) {
 }
 
 tear_down <- function(setup) {
-  for (worker in c(list(setup$development, setup$python), setup$reticulate)) end_worker(worker)
-  gym_server_stop(setup$client)
+  workers <- c(list(setup$development, setup$python), setup$reticulate)
+  for (worker in Filter(Negate(is.null), workers)) end_worker(worker)
+  if (!is.null(setup$client)) gym_server_stop(setup$client)
 }
 
 measure_memory <- function(steps) {
@@ -101,11 +108,13 @@ describe_run <- function(setup, parts) {
     vapply(ours, function(package) format(utils::packageVersion(package)), ""),
     libcurl = curl::curl_version()$version,
     unlist(server[setdiff(names(server), c("cores", "system"))]),
-    reticulate = paste(vapply(reticulates, function(its) {
-      paste0(its$reticulate, " on Python ", its$Python, " with gymnasium ", its$Gymnasium,
-             ", NumPy ", its$NumPy)
-    }, ""), collapse = " and "),
-    if ("gradients" %in% parts) sb3_versions()
+    if (length(reticulates)) {
+      c(reticulate = paste(vapply(reticulates, function(its) {
+        paste0(its$reticulate, " on Python ", its$Python, " with gymnasium ", its$Gymnasium,
+               ", NumPy ", its$NumPy)
+      }, ""), collapse = " and "))
+    },
+    if ("gradients" %in% parts) c(BLAS = name_of_blas(), sb3_versions())
   )
 }
 
@@ -129,18 +138,17 @@ report <- function(result, csv, text, figure, environments) {
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
 all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
-               "memory", "gradients")
-parts <- intersect(all_parts, arguments)
+               "memory")
+parts <- intersect(c(all_parts, "gradients"), arguments)
 whole <- !quick && !length(parts)
-if (!length(parts)) parts <- setdiff(all_parts, if (!has_sb3()) "gradients")
-if (!whole) dir.create("pictures", showWarnings = FALSE)
+if (!length(parts)) parts <- all_parts
+kept <- if (!quick && identical(parts, "gradients")) "bench-gradients" else if (whole) "bench"
+folder <- if (is.null(kept)) "pictures" else "vignettes"
+dir.create(folder, showWarnings = FALSE)
+at <- function(ending) file.path(folder, paste0(if (is.null(kept)) "bench" else kept, ending))
 result <- bench(parts, quick)
 report(
-  result,
-  csv = if (whole) "vignettes/bench.csv" else "pictures/bench.csv",
-  text = if (whole) "vignettes/bench.md" else "pictures/bench.md",
-  figure = if (whole) "vignettes/bench.png" else "pictures/bench.png",
-  environments = if (whole) "vignettes/bench-environments.png"
-  else "pictures/bench-environments.png"
+  result, csv = at(".csv"), text = at(".md"), figure = at(".png"),
+  environments = at("-environments.png")
 )
 if (whole) write_readme(result$rows, result$run)

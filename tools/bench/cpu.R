@@ -1,4 +1,5 @@
-# What processes have used of the processor. Only on Linux, which shows their times in /proc.
+# What processes have used of the processor, and what R calculates with. Only on Linux, which shows
+# times in /proc.
 
 # The seconds that all threads of some processes have run.
 cpu_seconds <- function(pids) {
@@ -25,3 +26,9 @@ descendants <- function(pid) {
 }
 
 server_pid <- function(client) gym:::get_answer(client, "/v1/health/")$pid
+
+# Debian's OpenBLAS is a libblas.so.3, too, in a folder that says so.
+name_of_blas <- function(file = extSoftVersion()[["BLAS"]]) {
+  folder <- basename(dirname(file))
+  paste(c(if (grepl("blas", folder)) folder, basename(file)), collapse = ": ")
+}

@@ -28,10 +28,8 @@ out_of_reach <- 1e9
 # As many steps of each are timed, so that an update of LunarLander is among them.
 timed_steps <- c("CartPole-v1" = 20000, "LunarLander-v3" = 33000)
 
-has_sb3 <- function() nzchar(Sys.getenv("GYM_SB3_PYTHON"))
-
 start_sb3 <- function() {
-  if (!has_sb3()) {
+  if (!nzchar(Sys.getenv("GYM_SB3_PYTHON"))) {
     stop("Name a Python that has Stable-Baselines3: see tools/bench/gradients.R.", call. = FALSE)
   }
   start_worker(Sys.getenv("GYM_SB3_PYTHON"), "tools/bench/sb3.py")

@@ -32,12 +32,6 @@ drawn_return <- if (job$method %in% c("ppo", "reinforce")) {
   NA_real_
 }
 
-# Debian's OpenBLAS is a libblas.so.3, too, in a folder that says so.
-name_of_blas <- function(file) {
-  folder <- basename(dirname(file))
-  paste(c(if (grepl("blas", folder)) folder, basename(file)), collapse = ": ")
-}
-
 final <- training$final
 from <- provenance(training)
 reported <- cbind(
