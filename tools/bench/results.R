@@ -62,7 +62,8 @@ summarise <- function(rows) {
       ratio <- stats::median(ratios(gym, values, key$unit), na.rm = TRUE)
     }
     called <- rows$called[rows$part == key$part & rows$contender == key$contender &
-                            rows$env_id == key$env_id & rows$num_envs == key$num_envs][1L]
+                            rows$env_id == key$env_id & rows$num_envs == key$num_envs &
+                            rows$unit == key$unit][1L]
     data.frame(
       key, called = called, median = stats::median(values), low = min(values),
       high = max(values), turns = length(values), ratio = ratio, row.names = NULL
