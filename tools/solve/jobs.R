@@ -8,22 +8,22 @@
 solve_jobs <- utils::read.csv(text = "
 env_id,kwargs,method,target,target_source,choice,seeds
 CartPole-v1,,ars,475,registered,1,20
+CartPole-v1,,ppo,475,registered,1,20
+CartPole-v1,,reinforce,475,registered,1,20
+CartPole-v1,,dqn,475,registered,1,20
 Acrobot-v1,,ars,-100,registered,1,20
+Acrobot-v1,,ppo,-100,registered,1,20
 MountainCarContinuous-v0,,ars,90,registered,1,20
 LunarLander-v3,continuous,ars,200,registered,1,20
+LunarLander-v3,continuous,ppo,200,registered,1,20
 LunarLander-v3,,ars,200,registered,1,20
+LunarLander-v3,,ppo,200,registered,1,20
 Swimmer-v5,,cem,325,paper (registered 360),3,20
 HalfCheetah-v5,,ars,3430,paper (registered 4800),1,10
 Pendulum-v1,,cem,-200,ours,2,10
+Pendulum-v1,,ppo,-200,ours,1,20
 Hopper-v5,,ars,3120,paper (registered 3800),1,1
 BipedalWalker-v3,,ars,300,registered,1,1
-CartPole-v1,,ppo,475,registered,1,10
-CartPole-v1,,reinforce,475,registered,1,10
-CartPole-v1,,dqn,475,registered,1,5
-Acrobot-v1,,ppo,-100,registered,1,5
-Pendulum-v1,,ppo,-200,ours,1,5
-LunarLander-v3,,ppo,200,registered,1,5
-LunarLander-v3,continuous,ppo,200,registered,1,5
 ", strip.white = TRUE, na.strings = "NA", colClasses = c(kwargs = "character"))
 
 # What a job is told apart from others by. Searches of one environment are one: the first choices of
