@@ -1,35 +1,30 @@
-# Writes a GIF file picture by picture: of each only the part that differs from the one before.
-# ImageMagick can write a whole animation, too, but takes all of its
-# pictures unpacked for that: a gigabyte for an episode of CartPole, half a minute, and
-# more than many systems allow it.
-#
-# The format: CompuServe, "Graphics Interchange Format, Version 89a" (1990), and
-# Netscape's extension that lets a GIF play again and again.
-
 #' Write frames as a GIF file
+#'
+#' Of each picture only the part that differs from the one before is kept: all of them whole would
+#' take ImageMagick a gigabyte for an episode of CartPole, and more than many systems allow it.
 #'
 #' @param pngs A list of PNG files, each a raw vector, all of one size.
 #' @param delays How long each is shown, in hundredths of a second.
 #' @param width Of the pictures, in pixels; `NULL` for their own.
+#' @return The size of the pictures in pixels, width and height.
 #' @noRd
 write_gif <- function(pngs, file, delays, width = NULL) {
-  out <- file(file, "wb")
-  on.exit(close(out))
   before <- NULL
+  parts <- vector("list", length(pngs))
   for (i in seq_along(pngs)) {
     image <- magick::image_background(magick::image_read(pngs[[i]]), "white")
-    if (!is.null(width)) {
-      image <- magick::image_scale(image, as.character(width))
-    }
+    if (!is.null(width)) image <- magick::image_scale(image, as.character(width))
     pixels <- magick::image_data(image, "rgb")
-    if (is.null(before)) {
-      writeBin(gif_header(dim(pixels)[2:3]), out)
-    }
-    part <- changed_part(before, pixels)
-    writeBin(gif_picture(crop_image(image, part), part, delays[[i]]), out)
+    # A part keeps its place, its delay, and that it stays until the next one covers it.
+    image <- in_plain_letters(
+      magick::image_animate(image, delay = delays[[i]], dispose = "none")
+    )
+    parts[[i]] <- crop_image(image, changed_part(before, pixels))
     before <- pixels
   }
-  writeBin(as.raw(0x3b), out)
+  gif <- in_plain_letters(magick::image_write(magick::image_join(parts), format = "gif"))
+  writeBin(gif, file)
+  dim(pixels)[2:3]
 }
 
 #' Find the smallest rectangle outside of which two pictures are the same
@@ -54,60 +49,8 @@ changed_part <- function(before, now) {
 crop_image <- function(image, part) {
   area <- magick::geometry_area(part$width, part$height, part$x, part$y)
   magick::image_quantize(
-    magick::image_crop(image, area), max = 256, colorspace = "sRGB", dither = FALSE
+    magick::image_crop(image, area, repage = FALSE), max = 256, colorspace = "sRGB", dither = FALSE
   )
-}
-
-# The size of the pictures, no colour table for all of them, and the instruction to repeat forever.
-gif_header <- function(size) {
-  c(
-    charToRaw("GIF89a"), two_bytes(size), as.raw(c(0x70, 0, 0)),
-    as.raw(c(0x21, 0xff, 11)), charToRaw("NETSCAPE2.0"), as.raw(c(3, 1, 0, 0, 0))
-  )
-}
-
-#' Make one picture of an animation
-#' @param image The part of the picture that changed.
-#' @param part Where it belongs, as [changed_part()] returns it.
-#' @return A raw vector: how long it is shown (over the pictures before, which stay), its
-#'   place, its colours, its pixels.
-#' @noRd
-gif_picture <- function(image, part, delay) {
-  single <- gif_parts(in_plain_letters(magick::image_write(image, format = "gif")))
-  c(
-    as.raw(c(0x21, 0xf9, 4, 0x04)), two_bytes(delay), as.raw(c(0, 0)),
-    as.raw(0x2c), two_bytes(c(part$x, part$y, part$width, part$height)),
-    as.raw(0x80 + log2(length(single$colours) / 3) - 1),
-    single$colours, single$pixels
-  )
-}
-
-#' Take a GIF file of one picture apart
-#' @return A list of raw vectors: `colours`, the table of them, and `pixels`, packed.
-#' @noRd
-gif_parts <- function(gif) {
-  number <- function(at) as.integer(gif[[at]])
-  # The flags say whether there is a table, and the binary logarithm of its length minus one.
-  table_at <- function(flags, at) {
-    if (number(flags) >= 0x80) seq(at, length.out = 3 * 2^(number(flags) %% 8 + 1))
-  }
-  table <- table_at(11L, 14L)
-  at <- 14L + length(table)
-  while (number(at) == 0x21) {
-    at <- end_of_blocks(number, at + 2L)
-  }
-  own <- table_at(at + 9L, at + 10L)
-  pixels <- at + 10L + length(own)
-  list(
-    colours = gif[own %||% table],
-    pixels = gif[seq(pixels, end_of_blocks(number, pixels + 1L) - 1L)]
-  )
-}
-
-# In a GIF file, data are blocks that begin with their length; a block of length 0 is the last.
-end_of_blocks <- function(number, at) {
-  while (number(at) > 0L) at <- at + number(at) + 1L
-  at + 1L
 }
 
 # ImageMagick looks for the format "gif" in capital and in small letters, which in a Turkish locale
@@ -118,5 +61,3 @@ in_plain_letters <- function(code) {
   Sys.setlocale("LC_CTYPE", "C")
   code
 }
-
-two_bytes <- function(x) writeBin(as.integer(x), raw(), size = 2L, endian = "little")

@@ -158,8 +158,7 @@ new_animation <- function(frames, file, fps, width, every) {
   plan <- animation_plan(length(frames), fps %||% frame_rate(frames), every)
   # An interrupt leaves a file that was there before as it was.
   written <- temporary_file(fileext = ".gif")
-  write_gif(unclass(frames)[plan$steps + 1L], written, plan$delays, width)
-  size <- gif_size(written)
+  size <- write_gif(unclass(frames)[plan$steps + 1L], written, plan$delays, width)
   if (!is.null(file)) {
     move_animation(written, file)
   }
@@ -217,11 +216,6 @@ move_animation <- function(written, file, call = rlang::caller_env(2)) {
   unlink(written)
 }
 
-gif_size <- function(file) {
-  readBin(readBin(file, "raw", 10L)[7:10], "integer", 2L, size = 2L, signed = FALSE,
-          endian = "little")
-}
-
 # Showing it ------------------------------------------------------------------------
 
 #' @export
@@ -271,7 +265,7 @@ knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...
     shown <- path(".pdf")
     size <- filmstrip_size(x$stills)
     grDevices::pdf(shown, width = size[[1L]], height = size[[2L]])
-    tryCatch(draw_filmstrip(x$stills), finally = grDevices::dev.off())
+    tryCatch(print(filmstrip(x$stills)), finally = grDevices::dev.off())
   } else {
     shown <- path(".gif")
     file.copy(x$file, shown, overwrite = TRUE)

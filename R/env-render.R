@@ -42,29 +42,6 @@ as.raster.gym_frame <- function(x, ...) {
   as.raster(values, max = 255L)
 }
 
-#' Show a frame
-#'
-#' Draws the picture as large as the plotting region allows, its proportions
-#' kept.
-#'
-#' @param x A frame, from [env_render()].
-#' @param ... Unused.
-#' @return The frame, invisibly.
-#' @export
-#' @examplesIf gym:::can_start_server()
-#' env <- gym_make("CartPole-v1", seed = 1)
-#' env$reset()
-#' plot(env$render())
-#' env$close()
-plot.gym_frame <- function(x, ...) {
-  old <- graphics::par(mar = c(0, 0, 0, 0))
-  on.exit(graphics::par(old))
-  graphics::plot.new()
-  graphics::plot.window(c(0, ncol(x)), c(0, nrow(x)), asp = 1, xaxs = "i", yaxs = "i")
-  graphics::rasterImage(as.raster(x), 0, 0, ncol(x), nrow(x))
-  invisible(x)
-}
-
 #' @export
 print.gym_frame <- function(x, ...) {
   cat("<gym_frame: ", ncol(x), " x ", nrow(x), " pixels>\n", sep = "")

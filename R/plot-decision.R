@@ -6,127 +6,138 @@
 #' of its bounds. Regions have the names of their actions. The path of an episode begins at
 #' the ring and ends at the cross.
 #'
-#' `autoplot()` draws the same with ggplot2, where that is installed.
+#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
+#' `plot()` prints it, too.
 #'
+#' @inheritParams plot.gym_rollout
 #' @param x,object What [decision_map()] returned.
-#' @param main The title; `NULL`, the default, names the environment and the policy.
-#' @param xlab,ylab The axes' labels; the default are the names of the parts, with their units
-#'   where Gymnasium's documentation has them.
-#' @param ... Further arguments of [plot()][graphics::plot.default()]; not used by
-#'   `autoplot()`.
-#' @return `x`, invisibly; `autoplot()` a ggplot.
-#' @export
+#' @param xlab,ylab The axes' labels, strings; `NULL`, the default, for the names of the parts, with
+#'   their units where Gymnasium's documentation has them.
+#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
+#' @return A ggplot; of `plot()` invisibly.
+#' @rdname plot.gym_decision_map
+#' @exportS3Method ggplot2::autoplot
 #' @examples
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 0.3), nrow = 1)))
 #' plot(decision_map(policy = follow, x = 3, y = 4, xlim = c(-0.2, 0.2), ylim = c(-3, 3)))
-plot.gym_decision_map <- function(x, main = NULL, xlab = decision_label(x, x$x),
-                                  ylab = decision_label(x, x$y), ...) {
-  data <- decision_plot_data(x)
-  open_plot(
-    list(x = range(data$x), y = range(data$y), xlab = xlab, ylab = ylab, xaxs = "i", yaxs = "i"),
-    list(...)
-  )
-  draw_field(data)
-  draw_regions(data$regions)
-  draw_path(data$path)
-  graphics::box(bty = "l")
-  title_above(main %||% played_title(x))
-  if (is.null(data$key$labels)) {
-    colour_key_above(data$key)
-  } else {
-    legend_above(data$key$labels, col = data$key$palette, pch = 15L, lty = NA)
-  }
-  invisible(x)
+autoplot.gym_decision_map <- function(object, ...) {
+  check_dots_empty(...)
+  data <- decision_plot_data(object)
+  ggplot2::ggplot(data$points, ggplot2::aes(.data$x, .data$y)) +
+    ggplot2::geom_raster(ggplot2::aes(fill = .data$shown)) +
+    data$fill +
+    border_line(data) +
+    region_names(data$regions) +
+    path_layers(object$path) +
+    ggplot2::scale_x_continuous(expand = c(0, 0)) +
+    ggplot2::scale_y_continuous(expand = c(0, 0)) +
+    picture_labels(
+      object$env_id %||% "Decision map", policy_subtitle(object),
+      x = observation_labels(object$env_id, object$x),
+      y = observation_labels(object$env_id, object$y)
+    ) +
+    theme_gym()
 }
 
-decision_label <- function(x, name) observation_labels(x$env_id, name)
+# The line between two actions, where both are there: ggplot2 warns where a line is nowhere.
+border_line <- function(data) {
+  if (is.null(data$border)) {
+    return(NULL)
+  }
+  inside <- range(data$points$shown)
+  if (data$border > inside[[1L]] && data$border < inside[[2L]]) {
+    ggplot2::geom_contour(
+      ggplot2::aes(z = .data$shown), breaks = data$border, colour = "black", linewidth = 0.8
+    )
+  }
+}
 
-# Data ----------------------------------------------------------------------------
+region_names <- function(regions) {
+  if (NROW(regions)) {
+    ggplot2::geom_text(
+      ggplot2::aes(label = .data$label), regions, fontface = "bold", size = 3.5
+    )
+  }
+}
+
+path_layers <- function(path) {
+  if (is.null(path)) {
+    return(NULL)
+  }
+  ends <- function(last) path[!duplicated(path$episode, fromLast = last), ]
+  several <- path[path$episode %in% path$episode[duplicated(path$episode)], ]
+  way <- function(...) ggplot2::geom_path(ggplot2::aes(group = .data$episode), several, ...)
+  list(
+    way(colour = "white", linewidth = 1.5), way(linewidth = 0.5),
+    ggplot2::geom_point(data = ends(FALSE), shape = 21, fill = "white", size = 3, stroke = 1),
+    ggplot2::geom_point(data = ends(TRUE), shape = 4, size = 2.5, stroke = 1.5)
+  )
+}
 
 #' Compute what a plot of a decision map shows
-#' @return A list: `x`, `y` (the grid's places), `z` (a matrix, a row for each x),
-#'   `zlim`, `palette`, `border` (the level of the line between, `NULL` where there is none),
-#'   `regions` (data frame: `x`, `y`, `label`, `colour`), `path`, `key` (the legend).
+#' @return A list: `points` (data frame `x`, `y`, `shown`, a number or a factor), `fill` (the scale
+#'   of the colours), `border` (the level of the line between, `NULL` where there is none),
+#'   `regions` (data frame: `x`, `y`, `label`).
 #' @noRd
 decision_plot_data <- function(x) {
-  shown <- x$grid[[3L]]
-  data <- list(x = unique(x$grid[[1L]]), y = unique(x$grid[[2L]]))
-  data$z <- matrix(as.numeric(shown), length(data$x), length(data$y))
-  data <- c(data, switch(x$kind,
-    output = output_colours(x, data),
-    choice = choice_colours(x, data),
-    value = value_colours(x, data)
-  ))
-  data$path <- x$path
-  data
+  points <- stats::setNames(x$grid, c("x", "y", "shown"))
+  switch(
+    x$kind, output = output_map(x, points), choice = choice_map(x, points),
+    value = value_map(x, points)
+  )
 }
 
 # The colours reach as far from one half as the outputs do, because small weights make small
 # differences.
-output_colours <- function(x, data) {
-  palette <- diverging_colours()
-  reach <- max(abs(data$z - 0.5), 0.01)
-  zlim <- 0.5 + c(-reach, reach)
+output_map <- function(x, points) {
+  reach <- max(abs(points$shown - 0.5), 0.01)
   list(
-    zlim = zlim, palette = palette, border = 0.5,
-    regions = region_labels(data, 1 + (data$z > 0.5), x$actions),
-    key = list(palette = palette, ends = sprintf("%.2f", zlim), label = "output")
+    points = points, fill = diverging_fill("output", 0.5 + c(-reach, reach)), border = 0.5,
+    regions = region_labels(points, 1 + (points$shown > 0.5), x$actions)
   )
 }
 
-value_colours <- function(x, data) {
-  palette <- diverging_colours()
-  limits <- x$limits %||% range(data$z)
+value_map <- function(x, points) {
+  limits <- x$limits %||% range(points$shown)
   # One colour where there is only one value.
-  zlim <- if (diff(limits) > 0) limits else limits + c(-1, 1)
-  list(
-    zlim = zlim, palette = palette, border = mean(zlim), regions = NULL,
-    key = list(palette = palette, ends = number_text_each(zlim), label = x$actions)
-  )
+  limits <- if (diff(limits) > 0) limits else limits + c(-1, 1)
+  list(points = points, fill = diverging_fill(x$actions, limits), border = mean(limits))
 }
 
-choice_colours <- function(x, data) {
-  n <- length(x$actions)
+diverging_fill <- function(name, limits) {
+  continuous_fill(name, diverging_colours, limits = limits)
+}
+
+choice_map <- function(x, points) {
   start <- as.integer(sub(":.*", "", x$actions[[1L]]))
-  palette <- choice_palette(n)
-  taken <- sort(unique(as.vector(data$z))) - start + 1
+  taken <- points$shown - start + 1
+  regions <- region_labels(points, taken, x$actions)
+  points$shown <- factor(x$actions[taken], x$actions)
+  found <- levels(droplevels(points$shown))
   list(
-    zlim = start + c(-0.5, n - 0.5), palette = palette, border = NULL,
-    regions = region_labels(data, data$z - start + 1, x$actions),
-    key = list(palette = palette[taken], labels = x$actions[taken])
+    points = points, regions = regions,
+    fill = ggplot2::scale_fill_manual(
+      name = NULL, values = stats::setNames(action_colours(length(x$actions)), x$actions),
+      # Names in the regions need no key.
+      guide = if (all(found %in% regions$label)) "none" else rows_of_key(found)
+    )
   )
-}
-
-# Orange and blue, light enough for black text on them; they differ in lightness, too.
-diverging_colours <- function() {
-  grDevices::colorRampPalette(c("#EFB549", "#FAF7F0", "#4797C8"))(101L)
-}
-
-# Lighter than the colours of lines, so that names and paths can be read on them.
-choice_palette <- function(n) {
-  strong <- c(okabe_ito$orange, okabe_ito$sky_blue, okabe_ito$green, okabe_ito$purple,
-              okabe_ito$yellow, okabe_ito$vermillion, okabe_ito$blue)
-  if (n > length(strong)) {
-    return(grDevices::hcl.colors(n, "viridis"))
-  }
-  tint <- c(0.35, 0.75, 0.8, 0.7, 0.8, 0.7, 0.7)[seq_len(n)]
-  mixed <- grDevices::col2rgb(strong[seq_len(n)]) %*% diag(tint, n) +
-    matrix(255 * (1 - tint), 3L, n, byrow = TRUE)
-  grDevices::rgb(t(mixed), maxColorValue = 255)
 }
 
 #' Find where the names of regions stand
 #'
 #' The name stands at the point of the region that is farthest from others, where there
 #' is room for it.
-#' @param region A matrix of numbers from 1, as `data$z`.
+#' @param region The number of each point's region, from 1.
 #' @noRd
-region_labels <- function(data, region, labels) {
+region_labels <- function(points, region, labels) {
+  x <- unique(points$x)
+  y <- unique(points$y)
+  region <- matrix(region, length(x))
   found <- sort(unique(as.vector(region)))
-  places <- lapply(found, function(i) region_middle(region == i))
-  share <- vapply(found, function(i) mean(region == i), 0)
-  at <- do.call(rbind, places)[share > 0.02, , drop = FALSE]
-  data.frame(x = data$x[at[, 1L]], y = data$y[at[, 2L]], label = labels[found[share > 0.02]])
+  found <- found[vapply(found, function(i) mean(region == i), 0) > 0.02]
+  at <- do.call(rbind, lapply(found, function(i) region_middle(region == i)))
+  data.frame(x = x[at[, 1L]], y = y[at[, 2L]], label = labels[found])
 }
 
 # Points at the border are removed again and again, until none is left: those that are removed last
@@ -146,71 +157,4 @@ region_middle <- function(inside) {
   left <- which(inside, arr.ind = TRUE)
   middle <- colMeans(left)
   left[which.min(colSums((t(left) - middle)^2)), ]
-}
-
-# Drawing -------------------------------------------------------------------------
-
-draw_regions <- function(regions) {
-  if (NROW(regions)) {
-    graphics::text(regions$x, regions$y, regions$label, font = 2L)
-  }
-}
-
-draw_path <- function(path) {
-  if (is.null(path)) {
-    return(invisible())
-  }
-  for (episode in split(path, path$episode)) {
-    last <- nrow(episode)
-    graphics::lines(episode$x, episode$y, col = "white", lwd = 2.5)
-    graphics::lines(episode$x, episode$y)
-    graphics::points(episode$x[[1L]], episode$y[[1L]], pch = 21L, bg = "white", lwd = 2, cex = 1.4)
-    graphics::points(episode$x[[last]], episode$y[[last]], pch = 4L, lwd = 3, cex = 1.4)
-  }
-}
-
-# With ggplot2 -----------------------------------------------------------------------
-
-#' @rdname plot.gym_decision_map
-#' @exportS3Method ggplot2::autoplot
-autoplot.gym_decision_map <- function(object, ...) {
-  data <- decision_plot_data(object)
-  points <- expand.grid(x = data$x, y = data$y)
-  points$z <- as.vector(data$z)
-  ends <- function(path, last) {
-    do.call(rbind, lapply(split(path, path$episode), function(episode) {
-      episode[if (last) nrow(episode) else 1L, ]
-    }))
-  }
-  fill <- if (is.null(data$key$labels)) {
-    ggplot2::scale_fill_gradientn(colours = data$palette, limits = data$zlim,
-                                  name = data$key$label)
-  } else {
-    points$z <- factor(points$z, labels = data$key$labels)
-    ggplot2::scale_fill_manual(values = data$key$palette, name = "action")
-  }
-  plot <- ggplot2::ggplot(points, ggplot2::aes(.data$x, .data$y)) +
-    ggplot2::geom_raster(ggplot2::aes(fill = .data$z)) +
-    fill +
-    ggplot2::labs(title = played_title(object), x = decision_label(object, object$x),
-                  y = decision_label(object, object$y)) +
-    ggplot2::coord_cartesian(expand = FALSE)
-  if (length(data$border)) {
-    plot <- plot + ggplot2::geom_contour(ggplot2::aes(z = .data$z), breaks = data$border,
-                                         colour = "black", linewidth = 1)
-  }
-  if (NROW(data$regions)) {
-    plot <- plot + ggplot2::geom_text(ggplot2::aes(label = .data$label), data$regions,
-                                      fontface = "bold")
-  }
-  if (!is.null(data$path)) {
-    path <- data$path
-    plot <- plot +
-      ggplot2::geom_path(ggplot2::aes(group = .data$episode), path, colour = "white",
-                         linewidth = 1.8) +
-      ggplot2::geom_path(ggplot2::aes(group = .data$episode), path, linewidth = 0.7) +
-      ggplot2::geom_point(data = ends(path, FALSE), shape = 21, fill = "white", size = 3) +
-      ggplot2::geom_point(data = ends(path, TRUE), shape = 4, stroke = 1.5, size = 2)
-  }
-  plot
 }

@@ -9,35 +9,50 @@ pick_stills <- function(frames, n) {
   list(frames = frames[at], steps = as.integer(at - 1))
 }
 
-plot_filmstrip <- function(x, episode, n, main, candidate, call = rlang::caller_env()) {
+filmstrip_picture <- function(x, episode, n, candidate, call = rlang::caller_env()) {
   check_count(n, call = call)
   stills <- pick_stills(episode_frames(x, episode, candidate, call), n)
   check_suggested("png", "draw a filmstrip", call)
-  draw_filmstrip(stills, main)
+  filmstrip(stills)
 }
 
-draw_filmstrip <- function(stills, main = NULL) {
+filmstrip <- function(stills) {
   pictures <- crop_blank(lapply(stills$frames, unclass))
-  old <- graphics::par(mar = c(0.2, 0.2, if (is.null(main)) 0.2 else 2.2, 0.2), xpd = NA)
-  on.exit(graphics::par(old))
-  graphics::plot.new()
-  inches <- graphics::par("pin")
-  aspect <- ncol(pictures[[1L]]) / nrow(pictures[[1L]])
-  grid <- arrange_stills(length(pictures), aspect, inches)
-  graphics::plot.window(c(0, inches[[1L]]), c(0, inches[[2L]]), xaxs = "i", yaxs = "i")
-  left <- (inches[[1L]] - grid$columns * grid$cell[[1L]] + grid$gap) / 2
-  top <- (inches[[2L]] + grid$rows * grid$cell[[2L]]) / 2
-  for (i in seq_along(pictures)) {
-    x <- left + ((i - 1) %% grid$columns) * grid$cell[[1L]]
-    y <- top - ((i - 1) %/% grid$columns) * grid$cell[[2L]] - grid$label
-    picture <- shrink(pictures[[i]], device_shrinkage(pictures[[i]], grid$width))
-    raster <- as.raster(new_frame(picture))
-    graphics::rasterImage(raster, x, y - grid$height, x + grid$width, y)
-    graphics::rect(x, y - grid$height, x + grid$width, y, border = "grey70", lwd = 0.8)
-    graphics::text(x, y + 0.45 * grid$label, paste("step", stills$steps[[i]]), adj = c(0, 0.5),
-                   cex = grid$cex)
-  }
-  if (!is.null(main)) graphics::title(main = main, line = 0.7)
+  grob_picture(grid::gTree(pictures = pictures, steps = stills$steps, cl = "gym_filmstrip"))
+}
+
+# How frames are arranged depends on the room that there is, so they are when they are drawn.
+#' @exportS3Method grid::makeContent
+makeContent.gym_filmstrip <- function(x) { # nolint: object_name_linter.
+  room <- grid::unit(1, "npc")
+  inches <- c(grid::convertWidth(room, "in", TRUE), grid::convertHeight(room, "in", TRUE))
+  aspect <- ncol(x$pictures[[1L]]) / nrow(x$pictures[[1L]])
+  strip <- arrange_stills(length(x$pictures), aspect, inches)
+  drawn <- lapply(seq_along(x$pictures), function(i) {
+    draw_still(x$pictures[[i]], x$steps[[i]], i, strip, inches)
+  })
+  grid::setChildren(x, do.call(grid::gList, drawn))
+}
+
+draw_still <- function(picture, step, i, strip, inches) {
+  left <- (inches[[1L]] - strip$columns * strip$cell[[1L]] + strip$gap) / 2 +
+    ((i - 1) %% strip$columns) * strip$cell[[1L]]
+  top <- (inches[[2L]] + strip$rows * strip$cell[[2L]]) / 2 -
+    ((i - 1) %/% strip$columns) * strip$cell[[2L]] - strip$label
+  inch <- function(x) grid::unit(x, "in")
+  raster <- as.raster(new_frame(shrink(picture, device_shrinkage(picture, strip$width))))
+  place <- list(
+    x = inch(left), y = inch(top), width = inch(strip$width), height = inch(strip$height),
+    just = c("left", "top")
+  )
+  grid::grobTree(
+    do.call(grid::rasterGrob, c(list(raster), place)),
+    do.call(grid::rectGrob, c(place, list(gp = grid::gpar(col = "grey70", fill = NA, lwd = 0.8)))),
+    grid::textGrob(
+      paste("step", step), inch(left), inch(top + 0.45 * strip$label), just = c("left", "centre"),
+      gp = grid::gpar(fontsize = strip$fontsize)
+    )
+  )
 }
 
 #' Cut off what is blank around all of several pictures
@@ -98,7 +113,7 @@ shrink <- function(picture, by) {
 #' @param inches Width and height of the page.
 #' @return A list, all but the counts in inches: `columns`, `rows`, `width` and `height` of a
 #'   picture, `label` (the room above it), `gap` (between two), `cell` (width and height of
-#'   all of it), and `cex` for the label.
+#'   all of it), and `fontsize` of the label.
 #' @noRd
 arrange_stills <- function(n, aspect, inches) {
   columns <- seq_len(n)
@@ -118,7 +133,7 @@ arrange_stills <- function(n, aspect, inches) {
   list(
     columns = columns[[best]], rows = rows[[best]], width = picture, height = picture / aspect,
     label = label, gap = gap, cell = c(width, picture / aspect + label + gap / 2),
-    cex = 0.85 * label / 0.22 / graphics::par("cex")
+    fontsize = 10 * label / 0.22
   )
 }
 

@@ -9,8 +9,10 @@
 #' Inputs are named as the observation's parts and outputs as what they decide, where the
 #' policy knows its environment: because it was played there, or because it is given as `env`.
 #'
-#' `autoplot()` draws the same with ggplot2, where that is installed.
+#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
+#' `plot()` prints it, too.
 #'
+#' @inheritParams plot.gym_rollout
 #' @param x,object A network, as [policy_network()] makes it.
 #' @param env The environment: an id, such as `"CartPole-v1"` or what [gym_wrap()] returns, or
 #'   an environment made by [gym_make()]. `NULL`, the default, is that in which the policy
@@ -19,15 +21,16 @@
 #'   the default is 12.
 #' @param digits With how many digits to write weights on their lines. `NULL`, the
 #'   default, is 2 for up to 24 lines and none for more; 0 writes none.
-#' @param main The title; `NULL`, the default, gives the sizes.
+#' @param main The title; `NULL`, the default, names the environment and gives the sizes.
 #' @param client The client of the server that is asked about an environment named by its id;
 #'   the default is the session's own, [gym_client()].
-#' @param ... Not used.
-#' @return `x`, invisibly; `autoplot()` a ggplot.
+#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
+#' @return A ggplot; of `plot()` invisibly.
 #' @section Errors: `gym_error_argument` when the network does not fit the environment, and
 #'   for a policy that has no weights to draw, such as [policy_random()].
 #' @seealso [decision_map()] shows what a network does.
-#' @export
+#' @rdname plot.gym_policy_network
+#' @exportS3Method ggplot2::autoplot
 #' @examples
 #' set.seed(1)
 #' plot(policy_network(c(4, 2, 1)))
@@ -35,22 +38,52 @@
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
 #' plot(search$policy)
-plot.gym_policy_network <- function(x, env = NULL, ..., neurons = 12, digits = NULL,
-                                    main = NULL, client = gym_client()) {
+autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
+                                        client = gym_client()) {
   check_dots_empty(...)
-  policy <- bind_to(x, env, client)
+  policy <- bind_to(object, env, client)
   data <- network_plot_data(policy, neurons, digits)
-  old <- graphics::par(mar = c(2.5, 1, 4, 1))
-  on.exit(graphics::par(old))
-  room <- open_diagram(data)
-  weight_lines(data$weights, room)
-  draw_neurons(data, room)
-  title_above(main %||% network_title(policy))
-  legend_above(
-    labels = c("positive weight", "negative (wider: further from 0)"),
-    col = weight_colours(), pch = NA, lty = weight_types
-  )
-  invisible(x)
+  units <- data$neurons
+  weights <- data$weights[order(data$weights$width), ]
+  weights <- weights[weights$width > 0, ]
+  crowded <- max(table(units$x)) > 8L
+  name <- c(positive = "positive weight", negative = "negative weight")
+  ggplot2::ggplot(units, ggplot2::aes(.data$x, .data$y)) +
+    ggplot2::geom_segment(
+      ggplot2::aes(
+        xend = .data$xend, yend = .data$yend, colour = name[.data$sign], linetype = name[.data$sign]
+      ),
+      weights, linewidth = weights$width * if (nrow(weights) > 60L) 1.2 else 2.5
+    ) +
+    ggplot2::geom_point(shape = 21, size = if (crowded) 3.5 else 6, fill = "white") +
+    ggplot2::geom_text(ggplot2::aes(label = "1"), units[units$bias, ], size = 3) +
+    ggplot2::geom_point(data = dots_between(data$dots), size = 0.4) +
+    number_layers(weights[nzchar(weights$label), ]) +
+    ggplot2::scale_colour_manual(
+      name = NULL, limits = unname(name),
+      values = stats::setNames(gym_colours[c("blue", "gold")], name),
+      guide = rows_of_key(name, override.aes = list(linewidth = 1))
+    ) +
+    ggplot2::scale_linetype_manual(
+      name = NULL, limits = unname(name), values = stats::setNames(c("solid", "31"), name),
+      guide = rows_of_key(name)
+    ) +
+    # The names of inputs and outputs stand where axes have their numbers: there is room for them.
+    ggplot2::scale_x_continuous(
+      breaks = data$layers$x, labels = data$layers$label,
+      expand = ggplot2::expansion(mult = 0.07)
+    ) +
+    side_names(units) +
+    ggplot2::coord_cartesian(clip = "off") +
+    picture_labels(
+      policy$env_id %||% "Policy", c(network_sizes(policy), "wider lines are further from 0")
+    ) +
+    theme_gym_bare() +
+    ggplot2::theme(
+      axis.text.x = ggplot2::element_text(face = "italic", size = ggplot2::rel(0.8)),
+      axis.text.y = ggplot2::element_text(size = ggplot2::rel(0.75), hjust = 1),
+      axis.text.y.right = ggplot2::element_text(size = ggplot2::rel(1), hjust = 0)
+    )
 }
 
 # The policy with the spaces of `env`, whose names the diagram shows; without `env` it keeps those
@@ -59,143 +92,150 @@ bind_to <- function(policy, env, client, call = rlang::caller_env()) {
   if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
 }
 
-network_title <- function(x) {
-  paste0(if (!is.null(x$env_id)) paste0(x$env_id, ": "), "network ", paste(x$sizes, collapse = "-"))
-}
+network_sizes <- function(x) paste("network", paste(x$sizes, collapse = "-"))
 
-#' @export
-plot.gym_policy <- function(x, ...) {
-  gym_abort(
-    c(paste0("Only a network can be drawn, not a policy that is ", format(x), "."),
-      i = "`policy_network()` makes one."),
-    class = "gym_error_argument", argument = "x", value = x
+# White behind a number, so that its line does not go through it.
+number_layers <- function(weights) {
+  place <- ggplot2::aes(.data$label_x, .data$label_y, label = .data$label)
+  list(
+    ggplot2::geom_label(place, weights, size = 2.8, colour = "white", fill = "white",
+                        label.padding = ggplot2::unit(0.1, "lines")),
+    ggplot2::geom_text(place, weights, size = 2.8)
   )
-}
-
-weight_colours <- function() c(positive = okabe_ito$blue, negative = okabe_ito$vermillion)
-weight_types <- c(positive = "solid", negative = "31")
-
-# Drawing -------------------------------------------------------------------------
-
-#' Open a plot as wide as the labels beside the first and the last layer leave room
-#' @return A list: `cex` of the labels, smaller where they would take more than half of the
-#'   width; `gap` between two layers, in inches.
-#' @noRd
-open_diagram <- function(data) {
-  graphics::plot.new()
-  across <- graphics::par("pin")[[1L]]
-  layers <- max(data$layers$x)
-  wide <- function(layer, cex) {
-    labels <- unlist(strsplit(data$neurons$label[data$neurons$x == layer], "\n"))
-    max(graphics::strwidth(labels, "inches", cex = cex), 0) + 1.2 * neuron_away()
-  }
-  cex <- if (nrow(data$neurons) > 40L) 0.7 else 0.9
-  while (wide(0, cex) + wide(layers, cex) > 0.55 * across && cex > 0.4) cex <- 0.95 * cex
-  gap <- max(across - wide(0, cex) - wide(layers, cex), 0.2 * across) / layers
-  graphics::plot.window(c(-wide(0, cex) / gap, layers + wide(layers, cex) / gap), c(-0.02, 1.02),
-                        xaxs = "i", yaxs = "i")
-  list(cex = cex, gap = gap)
-}
-
-# How far from the middle of a neuron its label begins, in inches.
-neuron_away <- function() 0.95 * graphics::par("csi")
-
-weight_lines <- function(weights, room) {
-  drawn <- weights[order(weights$width), ]
-  drawn <- drawn[drawn$width > 0, ]
-  widest <- if (nrow(drawn) > 60L) 3 else 6
-  graphics::segments(
-    drawn$x, drawn$y, drawn$xend, drawn$yend, lwd = widest * drawn$width,
-    lty = weight_types[drawn$sign], lend = "butt", col = weight_colours()[drawn$sign]
-  )
-  labelled <- weights[nzchar(weights$label), ]
-  if (nrow(labelled) && room$gap > 1) {
-    boxed_text(labelled$label_x, labelled$label_y, labelled$label)
-  }
-}
-
-boxed_text <- function(x, y, labels, cex = 0.75) {
-  half_width <- 0.55 * graphics::strwidth(labels, cex = cex)
-  half_height <- 0.7 * graphics::strheight(labels, cex = cex)
-  graphics::rect(x - half_width, y - half_height, x + half_width, y + half_height,
-                 col = "white", border = NA)
-  graphics::text(x, y, labels, cex = cex)
-}
-
-draw_neurons <- function(data, room) {
-  neurons <- data$neurons
-  crowded <- max(table(neurons$x)) * 0.35 > graphics::par("pin")[[2L]]
-  graphics::points(neurons$x, neurons$y, pch = 21L, cex = if (crowded) 1.8 else 3, bg = "white",
-                   lwd = 1.5)
-  constant <- neurons[neurons$bias, ]
-  if (nrow(constant)) {
-    graphics::text(constant$x, constant$y, "1", cex = if (crowded) 0.5 else 0.8)
-  }
-  draw_dots(data$dots)
-  away <- neuron_away() / room$gap
-  last <- max(neurons$x)
-  side <- function(layer, x, adj) {
-    there <- neurons[neurons$x == layer, ]
-    graphics::text(x, there$y, there$label, adj = c(adj, 0.5), cex = room$cex, xpd = NA)
-  }
-  side(0, -away, 1)
-  side(last, last + away, 0)
-  draw_layer_names(data$layers, room)
 }
 
 # Three dots where neurons are left out.
-draw_dots <- function(dots) {
-  for (i in seq_len(nrow(dots))) {
-    graphics::points(rep(dots$x[[i]], 3L), dots$y[[i]] + c(-0.5, 0, 0.5) * graphics::strheight("M"),
-                     pch = 16L, cex = 0.5)
-  }
+dots_between <- function(dots) {
+  data.frame(x = rep(dots$x, each = 3L), y = rep(dots$y, each = 3L) + c(-0.02, 0, 0.02))
 }
 
-# The layers' names below them, small enough not to overlap.
-draw_layer_names <- function(layers, room) {
-  cex <- min(room$cex, 0.95 * room$gap / max(graphics::strwidth(layers$label, "inches", font = 3L)))
-  graphics::mtext(layers$label, 1L, line = 0.5, at = layers$x, cex = cex * graphics::par("cex"),
-                  font = 3L)
+side_names <- function(units) {
+  first <- units[units$x == 0, ]
+  last <- units[units$x == max(units$x), ]
+  ggplot2::scale_y_continuous(
+    breaks = first$y, labels = first$label, limits = c(0, 1),
+    sec.axis = ggplot2::sec_axis(~., breaks = last$y, labels = last$label)
+  )
 }
 
-# With ggplot2 -----------------------------------------------------------------------
-
-#' @rdname plot.gym_policy_network
 #' @exportS3Method ggplot2::autoplot
-autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
-                                        client = gym_client()) {
-  check_dots_empty(...)
-  policy <- bind_to(object, env, client)
-  data <- network_plot_data(policy, neurons, digits)
-  weights <- data$weights[order(data$weights$width), ]
-  widest <- if (nrow(weights) > 60L) 1.5 else 3
-  labelled <- weights[nzchar(weights$label), ]
-  neurons <- data$neurons
-  neurons$side <- ifelse(neurons$x == 0, 1, 0)
-  neurons$beside <- neurons$x + ifelse(neurons$x == 0, -0.05, 0.05) * max(data$layers$x, 1)
-  ggplot2::ggplot(neurons, ggplot2::aes(.data$x, .data$y)) +
-    ggplot2::geom_segment(
-      ggplot2::aes(xend = .data$xend, yend = .data$yend, colour = .data$sign,
-                   linetype = .data$sign),
-      weights[weights$width > 0, ], linewidth = widest * weights$width[weights$width > 0]
-    ) +
-    # The line is seen through what is behind its number.
-    ggplot2::geom_label(ggplot2::aes(.data$label_x, .data$label_y, label = .data$label), labelled,
-                        size = 3, fill = grDevices::adjustcolor("white", 0.8),
-                        label.padding = ggplot2::unit(0.12, "lines")) +
-    ggplot2::geom_point(shape = 21, size = if (max(table(neurons$x)) > 8L) 5 else 9,
-                        fill = "white") +
-    ggplot2::geom_text(ggplot2::aes(label = "1"), neurons[neurons$bias, ], size = 3) +
-    ggplot2::geom_text(ggplot2::aes(label = "..."), data$dots, angle = 90) +
-    ggplot2::geom_text(ggplot2::aes(.data$beside, label = .data$label, hjust = .data$side),
-                       size = 3.2) +
-    ggplot2::scale_colour_manual(values = weight_colours()) +
-    ggplot2::scale_linetype_manual(values = weight_types) +
-    ggplot2::scale_x_continuous(breaks = data$layers$x, labels = data$layers$label,
-                                expand = ggplot2::expansion(mult = 0.45)) +
-    ggplot2::scale_y_continuous(expand = ggplot2::expansion(mult = 0.1)) +
-    ggplot2::labs(title = network_title(policy), colour = "weight", linetype = "weight") +
-    ggplot2::theme_void() +
-    ggplot2::theme(axis.text.x = ggplot2::element_text(face = "italic"),
-                   legend.position = "top")
+autoplot.gym_policy <- function(object, ...) {
+  gym_abort(
+    c(paste0("Only a network can be drawn, not a policy that is ", format(object), "."),
+      i = "`policy_network()` makes one."),
+    class = "gym_error_argument", argument = "x", value = object
+  )
+}
+
+# Where neurons and weights stand, and what they are called -------------------------------
+
+#' Compute what a diagram of a network shows
+#'
+#' The layers stand at x = 0, 1, ..., the neurons between y = 0 and 1.
+#' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`,
+#'   `y`, `bias`, whether it is the constant 1 whose weights are the biases, and then the last of
+#'   its layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
+#'   left out), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
+#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`, which stands at `label_x`,
+#'   `label_y`), `layers` (data frame `x`, `label`).
+#' @noRd
+network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
+  check_network(policy, call)
+  check_count(most, min = 3, arg = "neurons", call = call)
+  check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
+  layers <- length(policy$sizes)
+  sizes <- policy$sizes + c(rep(as.integer(isTRUE(policy$bias)), layers - 1L), 0L)
+  each <- lapply(seq_len(layers), function(layer) place_neurons(sizes[[layer]], layer, most))
+  neurons <- do.call(rbind, lapply(each, function(placed) placed$neurons))
+  neurons$bias <- neurons$neuron > policy$sizes[neurons$layer]
+  neurons$label <- ""
+  first <- neurons$layer == 1L
+  last <- neurons$layer == layers
+  neurons$label[first] <- c(input_labels(policy), "bias")[neurons$neuron[first]]
+  neurons$label[last] <- output_labels(policy)[neurons$neuron[last]]
+  list(
+    neurons = neurons,
+    dots = do.call(rbind, lapply(each, function(placed) placed$dots)),
+    weights = place_weights(policy, neurons, digits),
+    layers = data.frame(x = seq_len(layers) - 1, label = c("observation", policy$activation))
+  )
+}
+
+# Where there are too many neurons to draw, the first ones and the last one are drawn, with a place
+# for dots between them.
+place_neurons <- function(size, layer, most) {
+  shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
+  y <- 1 - (seq_along(shown) - 0.5) / length(shown)
+  gap <- is.na(shown)
+  list(
+    neurons = data.frame(layer = layer, neuron = shown[!gap], x = layer - 1, y = y[!gap]),
+    dots = data.frame(x = rep(layer - 1, sum(gap)), y = y[gap])
+  )
+}
+
+place_weights <- function(policy, neurons, digits) {
+  each <- lapply(seq_along(policy$weights), function(layer) {
+    from <- neurons[neurons$layer == layer, ]
+    to <- neurons[neurons$layer == layer + 1L & !neurons$bias, ]
+    pairs <- expand.grid(to = seq_len(nrow(to)), from = seq_len(nrow(from)))
+    number <- cbind(to$neuron[pairs$to], from$neuron[pairs$from])
+    data.frame(
+      layer = layer, from = number[, 2L], to = number[, 1L],
+      weight = policy$weights[[layer]][number],
+      x = from$x[pairs$from], y = from$y[pairs$from], xend = to$x[pairs$to], yend = to$y[pairs$to]
+    )
+  })
+  weights <- do.call(rbind, each)
+  largest <- max(abs(unlist(policy$weights)))
+  along <- label_places(weights)
+  weights$label_x <- weights$x + along * (weights$xend - weights$x)
+  weights$label_y <- weights$y + along * (weights$yend - weights$y)
+  weights$sign <- ifelse(weights$weight < 0, "negative", "positive")
+  weights$width <- if (largest > 0) abs(weights$weight) / largest else 0
+  digits <- digits %||% if (nrow(weights) <= 24L) 2 else 0
+  weights$label <- if (digits > 0) {
+    sub("^-(0[.]0+)$", "\\1", sprintf("%.*f", as.integer(digits), weights$weight))
+  } else {
+    ""
+  }
+  weights
+}
+
+# How far along its line a weight's number stands, from 0 to 1. It is the same for all of a layer:
+# as near to the middle as possible, where the lines are at least 85 % as far apart as anywhere.
+label_places <- function(weights) {
+  apart <- function(layer, along) {
+    heights <- sort(layer$y + along * (layer$yend - layer$y))
+    if (length(heights) > 1L) min(diff(heights)) else 1
+  }
+  candidates <- seq(0.5, 0.14, by = -0.04)
+  best <- vapply(split(weights, weights$layer), function(layer) {
+    distance <- vapply(candidates, apart, 0, layer = layer)
+    candidates[[which(distance >= 0.85 * max(distance))[[1L]]]]
+  }, 0)
+  unname(best[as.character(weights$layer)])
+}
+
+input_labels <- function(policy) {
+  space <- policy$observation_space
+  size <- policy$sizes[[1L]]
+  if (inherits(space, "gym_space_discrete")) {
+    return(paste(space$names %||% "observed", space$start + seq_len(size) - 1L))
+  }
+  if (size == 1L && is.null(space$names)) "obs" else number_names(space, size)
+}
+
+output_labels <- function(policy) {
+  space <- policy$action_space
+  outputs <- policy$sizes[[length(policy$sizes)]]
+  if (inherits(space, "gym_space_box")) {
+    bounds <- paste(number_text_each(space$low), "to", number_text_each(space$high))
+    return(paste0(action_parts(policy$env_id, outputs), "\n", bounds))
+  }
+  actions <- action_names(policy$env_id, space$n %||% max(outputs, 2L), space$start %||% 0L)
+  if (outputs == 1L && length(actions) == 2L) {
+    half <- if (output_activation(policy) %in% c("logistic", "Gompertz")) "0.5" else "0"
+    return(paste0("above ", half, ":\n", actions[[2L]], "\n\notherwise:\n", actions[[1L]]))
+  }
+  actions
 }

@@ -5,86 +5,87 @@
 #' return are set side by side.
 #'
 #' With another `type` it shows the network that was found, or plays the networks around it
-#' and shows their landscape, which takes some seconds.
+#' and shows their landscape, which takes some seconds each time: [search_landscape()] plays them
+#' once.
 #'
-#' `autoplot()` draws the same with ggplot2, where that is installed.
+#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
+#' `plot()` prints it, too.
 #'
+#' @inheritParams plot.gym_rollout
 #' @param x,object A search, as [search_random()] returns it.
 #' @param type What to show: `"returns"`, the default; `"network"`, the best policy, as
 #'   [plot.gym_policy_network()]; or `"landscape"`, which plays [search_landscape()].
-#' @param main The title; the default describes what was searched and what came of it.
-#' @param xlab,ylab The axes' labels.
-#' @param ... For the returns further arguments of [plot()][graphics::plot.default()], such as
-#'   `ylim`; for the others the arguments of these functions and their plots, such as
-#'   `size` and `seed` of the landscape.
-#' @return `x`, invisibly; for a landscape what [search_landscape()] returns, invisibly, so
-#'   that it need not be played again; `autoplot()` a ggplot.
+#' @param main The title; `NULL`, the default, says what was searched.
+#' @param ... The arguments of the network's picture, or of [search_landscape()], such as `size` and
+#'   `seed`. Further arguments of `plot()` are those of `autoplot()`.
+#' @return A ggplot; of `plot()` invisibly.
 #' @section Errors: `gym_error_argument` when no round was played to its end.
-#' @export
+#' @rdname plot.gym_search
+#' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
 #' plot(search)
 #' plot(search, type = "network")
-plot.gym_search <- function(x, type = c("returns", "network", "landscape"), main = NULL,
-                            xlab = "round", ylab = "return (reward summed over an episode)", ...) {
+autoplot.gym_search <- function(object, type = c("returns", "network", "landscape"), ...) {
   type <- check_choice(type[1L], c("returns", "network", "landscape"), arg = "type")
   if (type == "network") {
-    check_found(x)
-    plot(x$policy, main = main, ...)
-    return(invisible(x))
+    check_found(object)
+    return(autoplot.gym_policy_network(object$policy, ...))
   }
   if (type == "landscape") {
-    return(plot_landscape(x, main = main, ...))
+    return(autoplot.gym_landscape(search_landscape(object, ...)))
   }
-  main <- main %||% search_title(x)
-  data <- search_plot_data(x)
-  open_plot(list(x = data$xlim, y = data$ylim, xlab = xlab, ylab = ylab, xaxt = "n"), list(...))
-  graphics::axis(1L, at = round_ticks(max(data$means$round)))
-  if (!is.null(data$target)) {
-    graphics::abline(h = data$target, col = okabe_ito$vermillion, lty = "dashed", lwd = 2)
-  }
-  graphics::points(data$points$x, data$points$return, pch = 16L, cex = 0.8,
-                   col = grDevices::adjustcolor(okabe_ito$sky_blue, 0.8))
-  graphics::lines(data$means$round, data$means$mean_return, col = okabe_ito$blue, lwd = 2)
-  graphics::points(data$means$round, data$means$mean_return, col = okabe_ito$blue, pch = 15L,
-                   cex = 0.7)
-  graphics::title(main = main, line = 2.5)
-  search_legend(data)
-  invisible(x)
+  check_dots_empty(...)
+  check_has_rounds(object)
+  means <- object$rounds
+  target <- finite_target(object$target)
+  ggplot2::ggplot(search_points(object, target), ggplot2::aes(.data$x, .data$return)) +
+    target_line(target) +
+    ggplot2::geom_point(ggplot2::aes(colour = "episode"), size = 1.8) +
+    ggplot2::geom_line(
+      ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means,
+      linewidth = 0.7
+    ) +
+    ggplot2::geom_point(
+      ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means, shape = 15
+    ) +
+    key_of_marks(c(
+      list(
+        episode = key_mark("sky", shape = 16),
+        `mean of the round` = key_mark("blue", shape = 15, line = "solid")
+      ),
+      target_mark(target)
+    )) +
+    ggplot2::scale_x_continuous(breaks = round_ticks(max(means$round))) +
+    picture_labels(
+      paste("Random search in", object$env_id), search_outcome(object), x = "round", y = "return"
+    ) +
+    theme_gym()
 }
 
-search_title <- function(x) {
-  outcome <- if (x$solved) {
-    paste(": solved in round", x$round)
-  } else if (!is.null(x$target)) {
-    paste(": not solved in", count_of(nrow(x$rounds), "round"))
-  }
-  paste0("Random search in ", x$env_id, outcome)
-}
-
-#' Compute what a plot of a search shows
-#' @return A list: `points` (data frame: `round`, `return`, `x`, the place on the axis),
-#'   `means` (data frame: `round`, `mean_return`), `target` (`NULL` when there is none to
-#'   show), `xlim`, `ylim`.
-#' @noRd
-search_plot_data <- function(x, call = rlang::caller_env()) {
+check_has_rounds <- function(x, call = rlang::caller_env()) {
   if (nrow(x$rounds) == 0L) {
     gym_abort(
       "There is nothing to plot: the search ended before its first round was played to its end.",
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
-  target <- if (!is.null(x$target) && is.finite(x$target)) x$target
-  ylim <- range(x$episodes$return, target)
+}
+
+search_outcome <- function(x) {
+  if (x$solved) {
+    paste("solved in round", x$round)
+  } else if (!is.null(x$target)) {
+    paste("not solved in", count_of(nrow(x$rounds), "round"))
+  }
+}
+
+# The episodes with their place `x` on the axis.
+search_points <- function(x, target) {
   points <- x$episodes[c("round", "return")]
-  points$x <- points$round + spread(points$round, points$return, diff(ylim) / 50)
-  list(
-    points = points,
-    means = x$rounds[c("round", "mean_return")],
-    target = target,
-    xlim = c(0.5, max(x$rounds$round) + 0.5),
-    ylim = ylim
-  )
+  high <- diff(range(points$return, target))
+  points$x <- points$round + spread(points$round, points$return, high / 50)
+  points
 }
 
 # Offsets that put returns of one round which are closer than `near` side by side. They are not
@@ -95,44 +96,4 @@ spread <- function(round, value, near) {
   place <- stats::ave(value, group, FUN = seq_along)
   size <- stats::ave(value, group, FUN = length)
   0.6 * (place - (size + 1) / 2) / max(size, 5)
-}
-
-search_legend <- function(data) {
-  shown <- c(TRUE, TRUE, !is.null(data$target))
-  legend_above(
-    labels = c("episode", "mean of the round", paste("target", number_text(data$target)))[shown],
-    col = c(okabe_ito$sky_blue, okabe_ito$blue, okabe_ito$vermillion)[shown],
-    pch = c(16L, 15L, NA)[shown],
-    lty = c(NA, "solid", "dashed")[shown]
-  )
-}
-
-#' @rdname plot.gym_search
-#' @exportS3Method ggplot2::autoplot
-autoplot.gym_search <- function(object, type = c("returns", "network", "landscape"), ...) {
-  type <- check_choice(type[1L], c("returns", "network", "landscape"), arg = "type")
-  if (type == "network") {
-    check_found(object)
-    return(autoplot.gym_policy_network(object$policy, ...))
-  }
-  if (type == "landscape") {
-    return(autoplot.gym_landscape(search_landscape(object, ...)))
-  }
-  data <- search_plot_data(object)
-  plot <- ggplot2::ggplot(data$points, ggplot2::aes(.data$x, .data$return)) +
-    ggplot2::geom_point(colour = okabe_ito$sky_blue, alpha = 0.8) +
-    ggplot2::geom_line(ggplot2::aes(.data$round, .data$mean_return), data$means,
-                       colour = okabe_ito$blue, linewidth = 0.8) +
-    ggplot2::geom_point(ggplot2::aes(.data$round, .data$mean_return), data$means,
-                        colour = okabe_ito$blue, shape = 15) +
-    ggplot2::scale_x_continuous(breaks = round_ticks(max(data$means$round))) +
-    ggplot2::labs(title = search_title(object), x = "round",
-                  y = "return (reward summed over an episode)",
-                  subtitle = "points: episodes; line: mean of the round; dashed: target")
-  if (is.null(data$target)) {
-    plot
-  } else {
-    plot + ggplot2::geom_hline(yintercept = data$target, colour = okabe_ito$vermillion,
-                               linetype = "dashed", linewidth = 0.8)
-  }
 }

@@ -3,12 +3,21 @@
 #' Shows what each state is worth as a colour, which is darker the less it is, and the action that
 #' is taken there as an arrow or a letter: on the lake of FrozenLake, beside the cliff of
 #' CliffWalking, on the grid of Taxi for one passenger and destination, and on any other grid whose
-#' `columns` are given. States at which episodes are over have a cross, and those in which none ever
-#' is are grey. Other models have a point for each state.
+#' `columns` are given. Where episodes end a mark tells goals from pits; where none ever is, as in a
+#' wall, the grid is empty. Other models have a point for each state.
 #'
-#' `autoplot()` draws the same with ggplot2, where that is installed.
+#' `type = "q"` shows what each action is worth: each cell has a triangle for each direction, at the
+#' side to which it leads, the best of them in bold. Actions that are no direction are left out.
 #'
+#' Where all states in which episodes end give the same reward they are goals, unless going on gives
+#' more; otherwise those that give most are goals, and the others are pits.
+#'
+#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
+#' `plot()` prints it, too.
+#'
+#' @inheritParams plot.gym_rollout
 #' @param x,object What [solve_mdp()] returned.
+#' @param type What to show, a string: `"values"`, the default, of states; or `"q"`, of actions.
 #' @param columns How many columns the grid has, where states are numbered row by row from the upper
 #'   left; `NULL`, the default, for what is known of the environment.
 #' @param directions What each action does on the grid, strings in the order of the actions:
@@ -19,9 +28,10 @@
 #'   passenger at Y who goes to R.
 #' @param step Of a solution with a horizon: the step whose actions are shown, from 1, the default.
 #' @param main The title; `NULL`, the default, names the environment.
-#' @param ... Not used.
-#' @return `x`, invisibly; `autoplot()` a ggplot.
-#' @export
+#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
+#' @return A ggplot; of `plot()` invisibly.
+#' @rdname plot.gym_solution
+#' @exportS3Method ggplot2::autoplot
 #' @examples
 #' # Four by three fields; the upper right one is the goal.
 #' fields <- expand.grid(action = 0:3, state = setdiff(0:11, 3))
@@ -32,38 +42,42 @@
 #' fields$reward <- -1
 #' solved <- solve_mdp(gym_model(fields, start = 8, id = "Four by three"))
 #' plot(solved, columns = 4, directions = c("left", "down", "right", "up"))
+#' plot(solved, type = "q", columns = 4, directions = c("left", "down", "right", "up"))
 #'
 #' @examplesIf gym:::can_start_server()
 #' plot(solve_mdp("FrozenLake-v1"))
 #' plot(solve_mdp("Taxi-v4"), passenger = 2, destination = 0)
-plot.gym_solution <- function(x, columns = NULL, directions = NULL, passenger = 2, destination = 0,
-                              step = 1, main = NULL, ...) {
+autoplot.gym_solution <- function(object, ..., type = c("values", "q"), columns = NULL,
+                                  directions = NULL, passenger = 2, destination = 0, step = 1) {
   check_dots_empty(...)
-  data <- solution_plot_data(x, columns, directions, passenger, destination, step)
-  if (is.null(data$columns)) draw_state_points(data) else draw_state_grid(data)
-  title_above(main %||% data$title)
-  invisible(x)
+  type <- check_choice(type[1L], c("values", "q"), arg = "type")
+  data <- solution_plot_data(object, columns, directions, passenger, destination, step)
+  data$q <- q_of_cells(object, data)
+  picture <- if (is.null(data$columns)) {
+    if (type == "q") q_points(data) else value_points(data)
+  } else {
+    grid_picture(data, c(if (type == "q") q_layers(data) else value_layers(data), end_layers(data)))
+  }
+  picture + picture_labels(
+    object$model$spec$id, c(solution_subtitle(object, type), taxi_subtitle(data)), width = 40
+  )
+}
+
+solution_subtitle <- function(x, type) {
+  whose <- if (is.null(x$actions)) "of a policy"
+  what <- if (type == "q") "values of actions" else "values of states"
+  within <- if (!is.null(x$horizon)) paste("within", count_of(x$horizon, "step"))
+  paste(c(if (is.null(whose)) "best", what, whose, within), collapse = " ")
 }
 
 # Data ----------------------------------------------------------------------------
 
-# What the actions of Gymnasium's grids do, by the beginnings of their ids; see their documentation,
-# https://gymnasium.farama.org/environments/toy_text/.
-known_directions <- list(
-  FrozenLake = c("left", "down", "right", "up"),
-  CliffWalking = c("up", "right", "down", "left"),
-  Taxi = c("down", "up", "right", "left", "P", "D")
-)
-
-taxi_stands <- data.frame(
-  label = c("R", "G", "Y", "B"), row = c(1, 1, 5, 5), column = c(1, 5, 1, 4)
-)
-
 #' Compute what a plot of a solution shows
 #' @return A list: `cells`, a data frame with a row for each state that is shown and the columns
-#'   `state`, `value` (`NA` where no episode ever is), `text` (the value), `ends` (are episodes over
-#'   there?), `does` (what the action does), and on a grid `row` and `column`; `columns` and `rows`,
-#'   `NULL` without a grid; `walls` and `stands` of Taxi; `title`.
+#'   `state`, `value` (`NA` where no episode goes on), `end` (`"goal"`, `"pit"`, or `""` where
+#'   episodes go on or never are), `does` (what the action does), and on a grid `row` and `column`;
+#'   `directions`, one of each action; `columns` and `rows`, `NULL` without a grid; `walls` and
+#'   `stands` of Taxi.
 #' @noRd
 solution_plot_data <- function(x, columns, directions, passenger, destination, step,
                                call = rlang::caller_env()) {
@@ -71,64 +85,24 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   check_count(step, max = x$horizon %||% 1, call = call)
   cells <- as.data.frame(x)
   if (is.matrix(x$actions)) cells$action <- x$actions[, step]
-  if (inherits(x$policy, "gym_policy_table")) {
-    cells$action <- state_numbers(x$model$action_space)[best_column(x$policy$q)]
-  }
+  numbers <- state_numbers(x$model$action_space)
+  if (inherits(x$policy, "gym_policy_table")) cells$action <- numbers[best_column(x$policy$q)]
   known <- known_grid(x$model$spec$id)
-  directions <- check_directions(
-    directions %||% known_directions[[known]], ncol(x$q), call
-  )
-  cells$text <- vapply(cells$value, function(value) format(signif(value, 3L)), "")
+  directions <- check_directions(directions %||% known_directions[[known]], ncol(x$q), call)
+  directions <- directions %||% as.character(numbers)
   kinds <- state_kinds(x$model)
-  cells$ends <- kinds$ends
-  # Nothing comes after the end, whatever the model says of moves from there.
-  cells$value[kinds$ends] <- 0
-  cells$value[!kinds$reached & !kinds$ends] <- NA
-  place <- match(cells$action, state_numbers(x$model$action_space))
-  cells$does <- (directions %||% state_numbers(x$model$action_space))[place]
-  cells$does[cells$ends | is.na(cells$value)] <- ""
-  cells$does[is.na(cells$does)] <- ""
-  finite <- cells$value[is.finite(cells$value)]
-  data <- list(title = solution_title(x), key = if (length(finite)) range(finite) else c(0, 0))
-  if (known == "Taxi" && is.null(columns)) {
-    return(c(data, taxi_cells(cells, passenger, destination, taxi_walls(x$model), call)))
+  cells$end <- end_kinds(x$model, kinds)
+  cells$value[!kinds$reached] <- NA
+  cells$does <- directions[match(cells$action, numbers)]
+  cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
+  placed <- if (known == "Taxi" && is.null(columns)) {
+    taxi_cells(cells, passenger, destination, taxi_walls(x$model), call)
+  } else {
+    grid_cells(cells, columns %||% if (known != "") grid_columns(x$model), call)
   }
-  c(data, grid_cells(cells, columns %||% if (known != "") grid_columns(x$model), call))
-}
-
-# Puts states into rows and columns, where it is known how many columns there are.
-grid_cells <- function(cells, columns, call) {
-  if (is.null(columns)) {
-    return(list(cells = cells))
-  }
-  count <- nrow(cells)
-  if (count %% columns != 0) {
-    must <- paste("a number by which", count_of(count, "state"), "make whole rows")
-    abort_argument(columns, must, "columns", call)
-  }
-  cells$row <- (seq_len(count) - 1L) %/% columns + 1L
-  cells$column <- (seq_len(count) - 1L) %% columns + 1L
-  list(cells = cells, columns = columns, rows = count / columns)
-}
-
-solution_title <- function(x) {
-  whose <- if (is.null(x$actions)) "values of a policy" else "best values"
-  within <- if (!is.null(x$horizon)) paste("within", count_of(x$horizon, "step"))
-  paste(c(x$model$spec$id, paste(c(whose, within), collapse = " ")), collapse = ", ")
-}
-
-# Which of Gymnasium's grids it is, "" for none of them.
-known_grid <- function(id) {
-  found <- names(known_directions)[startsWith(id, names(known_directions))]
-  if (length(found)) found else ""
-}
-
-check_directions <- function(directions, count, call) {
-  if (!is.null(directions) && (!is.character(directions) || length(directions) != count)) {
-    must <- paste("a string for each of", count_of(count, "action"))
-    abort_argument(directions, must, "directions", call)
-  }
-  directions
+  placed$cells$ink <- ink_on(placed$cells$value)
+  placed$cells$text <- number_texts(placed$cells$value)
+  c(placed, list(directions = directions))
 }
 
 #' What the states are: those that episodes go through, those in which they are over, and others
@@ -147,170 +121,161 @@ state_kinds <- function(model) {
   list(reached = reached, ends = one_of(to[!goes_on & reached[from]]) & !reached)
 }
 
-# A step down adds as many to the state's number as there are columns: the most common difference
-# above 1.
-grid_columns <- function(model) {
-  further <- with(model$transitions, next_state - state)
-  further <- further[further > 1L]
-  if (length(further)) as.integer(names(which.max(table(further))))
-}
-
-# The states of Taxi number the row, the column, the passenger and the destination, see its
-# documentation.
-taxi_cells <- function(cells, passenger, destination, walls, call) {
-  check_count(passenger, min = 0, max = 4, call = call)
-  check_count(destination, min = 0, max = 3, call = call)
-  state <- cells$state
-  shown <- state %/% 4L %% 5L == passenger & state %% 4L == destination
-  cells$row <- state %/% 100L + 1L
-  cells$column <- state %/% 20L %% 5L + 1L
-  cells <- cells[shown, ]
-  list(
-    cells = cells, columns = 5L, rows = 5L,
-    walls = cells[cells$column < 5L & cells$state %in% walls, c("row", "column")],
-    stands = taxi_stands, from = passenger, to = destination
+# Is the end of an episode a goal or a pit? The rewards of arriving there tell.
+end_kinds <- function(model, kinds) {
+  table <- model$transitions
+  table <- table[table$probability > 0, ]
+  to <- state_rows(model, table$next_state)
+  arrives <- table$terminated & kinds$ends[to] & kinds$reached[state_rows(model, table$state)]
+  reward <- as.vector(
+    tapply(table$reward[arrives], factor(to[arrives], seq_along(model$start)), max)
   )
-}
-
-# The states from which a move to the right stays in its place.
-taxi_walls <- function(model) {
-  right <- model$transitions[model$transitions$action == 2L, ]
-  right$state[right$state == right$next_state & right$probability == 1]
-}
-
-# Drawing ---------------------------------------------------------------------------
-
-value_palette <- function(n = 101L) grDevices::hcl.colors(n, "viridis")
-
-# The colours of values, and those of what is written on them.
-cell_colours <- function(data) {
-  if (!is.null(data$fill)) {
-    return(list(fill = data$fill, ink = rep("black", nrow(data$cells))))
+  least <- if (length(unique(reward[!is.na(reward)])) > 1L) {
+    max(reward, na.rm = TRUE)
+  } else {
+    mean(table$reward[!table$terminated])
   }
-  span <- diff(data$key)
-  share <- if (span > 0) (data$cells$value - data$key[[1L]]) / span else rep(1, nrow(data$cells))
-  share <- pmin(pmax(share, 0), 1)
-  fill <- value_palette()[round(share * 100) + 1L]
-  list(
-    fill = ifelse(is.na(fill), "grey92", fill),
-    ink = ifelse(share < 0.6, "white", "black")
+  ifelse(is.na(reward), "", ifelse(reward >= least, "goal", "pit"))
+}
+
+# The value of each action in each cell where episodes go on.
+q_of_cells <- function(x, data) {
+  cells <- data$cells[!is.na(data$cells$value), ]
+  rows <- match(cells$state, state_numbers(x$model$observation_space))
+  q <- x$q[rows, , drop = FALSE]
+  each <- data.frame(
+    cells[
+      rep(seq_len(nrow(cells)), ncol(q)), intersect(c("state", "row", "column"), names(cells)),
+      drop = FALSE
+    ],
+    direction = rep(data$directions, each = nrow(cells)), q = as.vector(q),
+    best = as.vector(q == apply(q, 1L, max)), row.names = NULL
+  )
+  each[is.finite(each$q), ]
+}
+
+# Layers --------------------------------------------------------------------------
+
+value_layers <- function(data) {
+  cells <- data$cells[!is.na(data$cells$value), ]
+  size <- text_size(data, cells$text)
+  c(
+    list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
+    action_layers(data, cells, above = if (size > 0) 0.12 else 0),
+    if (size > 0) {
+      each_ink(cells, function(cells, ink) {
+        ggplot2::geom_text(
+          ggplot2::aes(label = .data$text), cells, nudge_y = -0.33, size = size, colour = ink
+        )
+      })
+    }
   )
 }
 
-draw_state_grid <- function(data) {
+value_fill <- function() {
+  continuous_fill("value", value_colours())
+}
+
+# A triangle is the side to which an action leads, and the middle of the cell.
+q_layers <- function(data) {
+  moves <- data$q[data$q$direction %in% names(arrow_steps), ]
+  moves$cell <- seq_len(nrow(moves))
+  step <- matrix(as.numeric(unlist(arrow_steps[moves$direction])), ncol = 2L, byrow = TRUE)
+  along <- 0.5 * step
+  across <- 0.5 * step[, 2:1, drop = FALSE]
+  corner <- function(sign) {
+    data.frame(moves, x = moves$column + along[, 1L] + sign * across[, 1L],
+               y = moves$row + along[, 2L] + sign * across[, 2L])
+  }
+  corners <- rbind(data.frame(moves, x = moves$column, y = moves$row), corner(1), corner(-1))
+  moves$x <- moves$column + 0.32 * step[, 1L]
+  moves$y <- moves$row + 0.34 * step[, 2L]
+  moves$text <- number_texts(moves$q)
+  moves$ink <- ink_on(moves$q)
+  # Two numbers stand side by side.
+  size <- text_size(data, strrep("0", 2 * nchar(moves$text) + 2))
+  c(
+    list(
+      ggplot2::geom_polygon(
+        ggplot2::aes(.data$x, .data$y, group = .data$cell, fill = .data$q), corners,
+        colour = "grey80", linewidth = 0.2
+      ),
+      value_fill(), cell_tiles(data = unique(moves[c("row", "column")]), fill = NA)
+    ),
+    if (size > 0) {
+      each_ink(moves, function(moves, ink) {
+        ggplot2::geom_text(
+          ggplot2::aes(
+            .data$x, .data$y, label = .data$text, fontface = ifelse(.data$best, "bold", "plain")
+          ),
+          moves, size = size, colour = ink
+        )
+      })
+    }
+  )
+}
+
+end_marks <- function() {
+  list(goal = key_mark("green", shape = 18), pit = key_mark("ink", shape = 16))
+}
+
+end_layers <- function(data) {
   cells <- data$cells
-  old <- graphics::par(mar = c(1, 1, 3, 1))
-  on.exit(graphics::par(old))
-  graphics::plot(
-    c(0.5, data$columns + 0.5), c(0.5, data$rows + 0.5), type = "n", asp = 1, axes = FALSE,
-    xlab = "", ylab = "", ylim = c(data$rows + 0.5, 0.5)
-  )
-  colours <- cell_colours(data)
-  graphics::rect(
-    cells$column - 0.5, cells$row - 0.5, cells$column + 0.5, cells$row + 0.5, col = colours$fill,
-    border = "grey80"
-  )
-  over <- cells$ends
-  graphics::points(cells$column[over], cells$row[over], pch = 4L, cex = 2, col = colours$ink[over])
-  draw_actions(cells, colours$ink)
-  cex <- min(1, 9 / max(data$columns, data$rows))
-  shown <- !over & !is.na(cells$value)
-  if (any(shown)) {
-    graphics::text(
-      cells$column[shown], cells$row[shown] + 0.33, cells$text[shown], cex = 0.7 * cex,
-      col = colours$ink[shown]
-    )
-  }
-  draw_taxi(data)
-}
-
-arrow_steps <- list(left = c(-1, 0), right = c(1, 0), up = c(0, -1), down = c(0, 1))
-
-draw_actions <- function(cells, ink) {
-  moves <- cells$does %in% names(arrow_steps)
-  if (any(moves)) {
-    step <- do.call(rbind, arrow_steps[cells$does[moves]])
-    x <- cells$column[moves]
-    y <- cells$row[moves] - 0.1
-    graphics::arrows(
-      x - 0.2 * step[, 1L], y - 0.2 * step[, 2L], x + 0.2 * step[, 1L], y + 0.2 * step[, 2L],
-      length = 0.06, lwd = 1.5, col = ink[moves]
-    )
-  }
-  named <- !moves & nzchar(cells$does)
-  if (any(named)) {
-    graphics::text(cells$column[named], cells$row[named] - 0.1, cells$does[named],
-                   col = ink[named], font = 2L)
-  }
-}
-
-draw_taxi <- function(data) {
-  if (is.null(data$stands)) {
-    return(invisible())
-  }
-  graphics::segments(
-    data$walls$column + 0.5, data$walls$row - 0.5, data$walls$column + 0.5, data$walls$row + 0.5,
-    lwd = 4, lend = "butt", col = "black"
-  )
-  stand <- data$stands
-  graphics::text(stand$column - 0.38, stand$row - 0.38, stand$label, cex = 0.8, font = 2L,
-                 col = okabe_ito$orange)
-  where <- if (data$from == 4) "in the taxi" else paste("at", stand$label[[data$from + 1L]])
-  graphics::mtext(
-    paste0("passenger ", where, ", destination ", stand$label[[data$to + 1L]],
-           "; P picks up, D drops off"),
-    side = 1L, cex = 0.8
+  there <- end_marks()[names(end_marks()) %in% cells$end]
+  c(
+    list(cell_tiles(data = cells[cells$end != "", ], fill = "white")),
+    lapply(names(there), function(end) {
+      ggplot2::geom_point(
+        ggplot2::aes(colour = end), cells[cells$end == end, ], shape = there[[end]]$shape,
+        size = 0.45 * cell_width(data)
+      )
+    }),
+    if (length(there)) key_of_marks(there)
   )
 }
 
-draw_state_points <- function(data) {
+# Without a grid ------------------------------------------------------------------
+
+value_points <- function(data) {
   cells <- data$cells
-  open_plot(
-    list(x = range(cells$state), y = data$key, xlab = "state", ylab = "value",
-         xlim = range(cells$state), ylim = data$key),
-    list()
-  )
-  graphics::points(cells$state, cells$value, pch = ifelse(cells$ends, 4L, 16L),
-                   col = okabe_ito$blue)
-  graphics::text(cells$state, cells$value, cells$does, pos = 3L, cex = 0.8, xpd = NA)
+  cells$value[cells$end != ""] <- 0
+  cells$kind <- ifelse(cells$end == "", "value", cells$end)
+  marks <- c(list(value = key_mark("blue", shape = 16)), end_marks())
+  there <- marks[names(marks) %in% cells$kind[!is.na(cells$value)]]
+  ggplot2::ggplot(cells, ggplot2::aes(.data$state, .data$value)) +
+    lapply(names(there), function(kind) {
+      ggplot2::geom_point(
+        ggplot2::aes(colour = kind), cells[cells$kind == kind, ], shape = there[[kind]]$shape,
+        size = 2.5, na.rm = TRUE
+      )
+    }) +
+    # Of more states the names would touch.
+    (if (nrow(cells) <= 30L) {
+      ggplot2::geom_text(
+        ggplot2::aes(label = .data$does), cells[!is.na(cells$value), ], vjust = -0.9, size = 3
+      )
+    }) +
+    key_of_marks(there) +
+    ggplot2::scale_x_continuous(breaks = few_breaks) +
+    ggplot2::labs(x = "state", y = "value") +
+    theme_gym()
 }
 
-# With ggplot2 ------------------------------------------------------------------------
-
-#' @rdname plot.gym_solution
-#' @exportS3Method ggplot2::autoplot
-autoplot.gym_solution <- function(object, ..., columns = NULL, directions = NULL, passenger = 2,
-                                  destination = 0, step = 1) {
-  check_dots_empty(...)
-  data <- solution_plot_data(object, columns, directions, passenger, destination, step)
-  cells <- data$cells
-  cells$does <- with_arrow_signs(cells$does)
-  cells$does[cells$ends] <- "\u00d7"
-  cells$text[is.na(cells$value)] <- ""
-  cells$ink <- cell_colours(data)$ink
-  if (is.null(data$columns)) {
-    return(
-      ggplot2::ggplot(cells, ggplot2::aes(x = .data$state, y = .data$value)) +
-        ggplot2::geom_point(colour = okabe_ito$blue) +
-        ggplot2::geom_text(ggplot2::aes(label = .data$does), vjust = -0.8) +
-        ggplot2::labs(x = "state", y = "value", title = data$title)
-    )
-  }
-  ggplot2::ggplot(cells, ggplot2::aes(x = .data$column, y = .data$row)) +
-    ggplot2::geom_tile(ggplot2::aes(fill = .data$value), colour = "grey80") +
-    ggplot2::geom_text(ggplot2::aes(label = .data$does), colour = cells$ink, nudge_y = 0.1) +
-    ggplot2::geom_text(ggplot2::aes(label = .data$text), colour = cells$ink, size = 2.5,
-                       nudge_y = -0.3) +
-    ggplot2::scale_fill_gradientn(colours = value_palette(), na.value = "grey92") +
-    ggplot2::scale_y_reverse() +
-    ggplot2::coord_fixed() +
-    ggplot2::theme_void() +
-    ggplot2::labs(title = data$title)
-}
-
-with_arrow_signs <- function(does) {
-  signs <- c(left = "\u2190", right = "\u2192", up = "\u2191", down = "\u2193")
-  known <- does %in% names(signs)
-  does[known] <- signs[does[known]]
-  does
+q_points <- function(data) {
+  labels <- unique(data$directions)
+  shapes <- stats::setNames(rep_len(c(16L, 17L, 15L, 18L, 1L, 2L), length(labels)), labels)
+  ggplot2::ggplot(data$q, ggplot2::aes(.data$state, .data$q)) +
+    ggplot2::geom_point(
+      ggplot2::aes(
+        colour = factor(.data$direction, labels), shape = factor(.data$direction, labels)
+      ),
+      size = 2.5
+    ) +
+    ggplot2::scale_colour_manual(
+      name = "action", values = named_colours(labels), guide = rows_of_key(labels)
+    ) +
+    ggplot2::scale_shape_manual(name = "action", values = shapes, guide = rows_of_key(labels)) +
+    ggplot2::scale_x_continuous(breaks = few_breaks) +
+    ggplot2::labs(x = "state", y = "value of the action") +
+    theme_gym()
 }

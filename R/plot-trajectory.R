@@ -1,149 +1,310 @@
-# An episode's observations and actions over its steps, with base graphics.
+# An episode's observations and actions over its steps.
 
-plot_trajectory <- function(x, episode, variables, main, candidate, call = rlang::caller_env()) {
-  data <- trajectory_plot_data(x, episode, variables, candidate, call)
-  n <- nrow(data$panels)
-  grid <- arrange_panels(n)
-  # layout() sets some of these, too, so they are read before it.
-  old <- graphics::par("mfrow", "mar", "oma", "mgp", "tcl", "cex", "las", "xpd")
-  on.exit({
-    graphics::layout(1)
-    graphics::par(old)
-  })
-  # A size of letters that leaves room for the picture on small devices.
-  inches <- graphics::par("din") / rev(dim(grid))
-  cex <- max(0.4, min(0.85, inches[[1L]] / 2.8, 0.75 * inches[[2L]]))
-  graphics::par(cex = cex)
-  left <- left_margins(data, grid)
-  # So that the plots of all columns are equally wide.
-  graphics::layout(grid, widths = (left + 0.8) * line_inches(cex) + plot_width(left, cex))
-  graphics::par(cex = cex, oma = c(2.8, 0, 3.2, 0), mgp = c(3, 0.5, 0), tcl = -0.25, las = 1,
-                xpd = FALSE)
-  title_cex <- panel_title_cex(data$panels$panel, left)
-  for (i in seq_len(n)) {
-    column <- which(grid == i, arr.ind = TRUE)[1L, 2L]
-    graphics::par(mar = c(0.6, left[[column]], 1.6, 0.8))
-    draw_panel(data, i, at_bottom = i %in% grid[nrow(grid), ], title_cex)
+trajectory_picture <- function(x, data) {
+  near <- near_rows(data)
+  values <- panel_values(data)
+  of_kind <- function(kind) values[values$kind == kind, ]
+  place <- ggplot2::aes(.data$time, .data$value, colour = .data$part)
+  ggplot2::ggplot() +
+    lapply(names(limit_colours), function(kind) {
+      ggplot2::geom_hline(
+        ggplot2::aes(yintercept = .data$at), near[near$kind == kind, ], linetype = "dashed",
+        colour = limit_colours[[kind]]
+      )
+    }) +
+    ggplot2::geom_vline(xintercept = data$length, colour = ending_colours[[data$ending]]) +
+    # A line of one step would not be seen.
+    (if (data$length == 1L) {
+      ggplot2::geom_point(place, values[values$kind != "choice", ], na.rm = TRUE)
+    } else {
+      list(
+        ggplot2::geom_line(place, of_kind("line"), na.rm = TRUE),
+        ggplot2::geom_step(place, of_kind("stairs"), na.rm = TRUE)
+      )
+    }) +
+    choice_layers(of_kind("choice"), data$choices) +
+    part_scale(levels(values$part)) +
+    ggplot2::facet_wrap(
+      ggplot2::vars(.data$panel), scales = "free_y", ncol = if (nrow(data$panels) > 3L) 2L else 1L,
+      labeller = ggplot2::as_labeller(panel_titles(data))
+    ) +
+    ggplot2::scale_x_continuous(breaks = few_breaks) +
+    ggplot2::scale_y_continuous(
+      breaks = trajectory_breaks(values), guide = ggplot2::guide_axis(check.overlap = TRUE)
+    ) +
+    picture_labels(
+      x$env_id, c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL
+    ) +
+    theme_gym()
+}
+
+limit_colours <- c(failure = gym_colours[["brown"]], goal = gym_colours[["green"]])
+ending_colours <- c(terminated = gym_colours[["brown"]], truncated = "grey50")
+
+# The values with the kind of their panel and the number of an action that they are, `""` where an
+# action is one.
+panel_values <- function(data) {
+  values <- data$values
+  values$value[!is.finite(values$value)] <- NA
+  values$kind <- data$panels$kind[match(values$panel, data$panels$panel)]
+  parts <- if (length(data$actions) > 1L) data$actions else character()
+  part <- unname(parts[values$name])
+  values$part <- factor(ifelse(is.na(part), "", part), c("", unname(parts)))
+  values$panel <- factor(values$panel, data$panels$panel)
+  values
+}
+
+# The numbers of an action share a panel and have a key, other lines have one colour.
+part_scale <- function(parts) {
+  named <- parts[nzchar(parts)]
+  ggplot2::scale_colour_manual(
+    name = NULL, breaks = named,
+    values = c(stats::setNames(gym_colours[["blue"]], ""), named_colours(named)),
+    guide = if (length(named)) rows_of_key(named) else "none"
+  )
+}
+
+# Actions that are one of few: a bar from a step's beginning to its end, in the action's place and
+# colour. Those that were never chosen have their place, too.
+choice_layers <- function(values, choices) {
+  if (is.null(choices)) {
+    return(NULL)
   }
-  title <- main %||% played_title(x)
-  graphics::mtext(title, line = 1.6, outer = TRUE, font = 2, cex = 1.1 * cex)
-  graphics::mtext(data$subtitle, line = 0.3, outer = TRUE, cex = cex)
-  graphics::mtext("steps taken", side = 1L, line = 1.6, outer = TRUE, cex = cex)
+  labels <- choice_labels(choices)
+  values$choice <- factor(labels[match(values$value, choices$value)], labels)
+  ends <- data.frame(
+    time = 0, value = range(choices$value) + c(-0.5, 0.5), panel = values$panel[[1L]]
+  )
+  list(
+    ggplot2::geom_tile(
+      ggplot2::aes(.data$time + 0.5, .data$value, fill = .data$choice), values, width = 1,
+      height = 0.8
+    ),
+    ggplot2::geom_blank(ggplot2::aes(.data$time, .data$value), ends),
+    ggplot2::scale_fill_manual(
+      name = "action", values = named_colours(labels), limits = labels, guide = rows_of_key(labels)
+    )
+  )
 }
 
-# Two columns where there are more than two panels; the last panel, of the actions, fills its row.
-arrange_panels <- function(n) {
-  if (n <= 2L) {
-    return(matrix(seq_len(n), ncol = 1L))
+choice_labels <- function(choices) {
+  number <- as.character(choices$value)
+  ifelse(choices$label == number, number, paste0(number, ": ", choices$label))
+}
+
+# The axis of a panel in which a value is constant has a mark at this value alone. ggplot2 passes
+# only the limits of a panel: around a constant that is 0.05 to either side.
+trajectory_breaks <- function(values) {
+  shown <- values[values$kind != "choice" & is.finite(values$value), ]
+  each <- split(shown$value, shown$panel)
+  constants <- unlist(lapply(each, function(value) if (length(unique(value)) == 1L) value[[1L]]))
+  function(limits) {
+    middle <- mean(limits)
+    own <- constants[abs(constants - middle) <= 1e-9 * max(1, abs(middle))]
+    if (length(own) && diff(limits) < 0.11) own[[1L]] else few_breaks(limits, 4)
   }
-  matrix(c(seq_len(n), if (n %% 2L) n), ncol = 2L, byrow = TRUE)
 }
 
-# The left margins in lines: room for numbers, and in the column of the actions for their names.
-left_margins <- function(data, grid) {
-  left <- rep(3.6, ncol(grid))
-  line <- line_inches(graphics::par("cex"))
-  words <- graphics::strwidth(c(data$choices$label, ""), "inches", cex = 0.9)
-  column <- which(grid == nrow(data$panels), arr.ind = TRUE)[1L, 2L]
-  left[[column]] <- max(left[[column]], max(words) / line + 1)
-  left
+# The limits that are drawn.
+near_rows <- function(data) {
+  keep <- vapply(seq_len(nrow(data$limits)), function(i) {
+    limit <- data$limits[i, ]
+    length(near_limits(limit$at, data$values$value[data$values$panel == limit$panel])) > 0L
+  }, NA)
+  near <- data$limits[keep, ]
+  near$panel <- factor(near$panel, data$panels$panel)
+  near
 }
 
-plot_width <- function(left, cex) {
-  margins <- (left + 0.8) * line_inches(cex)
-  max(graphics::par("din")[[1L]] - sum(margins), 0.1) / length(left)
+# The titles of panels say at which values episodes end.
+panel_titles <- function(data) {
+  labels <- data$panels$panel
+  text <- vapply(labels, function(label) {
+    unique(data$limits$text[data$limits$panel == label])[1L]
+  }, "")
+  between <- ifelse(nchar(labels) + nchar(text) > 24, ",\n", ", ")
+  titles <- vapply(labels, broken_text, "", width = 26)
+  stats::setNames(ifelse(is.na(text), titles, paste0(titles, between, text)), labels)
 }
 
-# The height of a line of the margins, in inches.
-line_inches <- function(cex) graphics::par("cin")[[2L]] * cex
+most_panels <- 8L
+# There are as many colours for lines.
+most_actions <- length(series_colours)
 
-# One size of titles for all panels, with which the longest fits. The ratio of the widths does not
-# give it, because devices round the sizes of letters.
-panel_title_cex <- function(titles, left) {
-  room <- plot_width(left, graphics::par("cex"))
-  cex <- 1
-  while (max(graphics::strwidth(titles, "inches", font = 2, cex = cex)) > room && cex > 0.3) {
-    cex <- 0.95 * cex
+#' Compute what a trajectory shows
+#' @param variables Names of columns, `NULL` for the observation's first.
+#' @return A list: `panels` (data frame with one row for each panel from the top: `panel`, its
+#'   label; `kind`, `"line"`, `"stairs"` for whole numbers, or `"choice"` for actions that are one
+#'   of few), `values` (data frame: `panel`, `name` (the column), `step`, `time` (steps taken
+#'   beforehand), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data
+#'   frame `value`, `label`, of the actions, `NULL` where they are not one of few), `actions`
+#'   (labels of the actions' columns, named by them), `length` and `ending`, `"terminated"` or
+#'   `"truncated"`, `subtitle`.
+#' @noRd
+trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1,
+                                 call = rlang::caller_env()) {
+  row <- episode_row(x, episode, candidate, call)
+  check_steps(x, call)
+  own <- x$steps$episode == episode & (x$steps$candidate %||% candidate) == candidate
+  steps <- x$steps[own, ]
+  shown <- trajectory_columns(steps, variables, call)
+  values <- lapply(c(shown$observed, shown$actions), function(name) steps[[name]])
+  names(values) <- c(shown$observed, shown$actions)
+  choices <- action_choices(x, values[shown$actions])
+  labels <- c(
+    observation_labels(x$env_id, shown$observed),
+    rep(action_title(x$env_id, shown$actions), length(shown$actions))
+  )
+  kinds <- vapply(values, function(value) if (all_whole(value)) "stairs" else "line", "")
+  kinds[shown$actions] <- if (!is.null(choices)) "choice" else kinds[shown$actions]
+  first <- !duplicated(labels)
+  n <- nrow(steps)
+  list(
+    panels = data.frame(panel = labels[first], kind = unname(kinds[first])),
+    values = data.frame(
+      panel = rep(labels, each = n), name = rep(names(values), each = n),
+      step = steps$step, time = steps$step - 1L,
+      value = as.numeric(unlist(lapply(values, as.numeric)))
+    ),
+    limits = trajectory_limits(x$env_id, shown$observed, labels),
+    choices = choices,
+    actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
+    length = n,
+    ending = if (steps$terminated[[n]]) "terminated" else "truncated",
+    subtitle = trajectory_subtitle(x$episodes[row, ])
+  )
+}
+
+# The row of an episode in the table of episodes. Those of each candidate are counted apart.
+episode_row <- function(x, episode, candidate, call) {
+  candidates <- x$episodes$candidate %||% rep(1L, nrow(x$episodes))
+  check_count(candidate, max = max(candidates, 1L), call = call)
+  own <- which(candidates == candidate)
+  check_count(episode, max = length(own), call = call)
+  own[[episode]]
+}
+
+check_steps <- function(x, call) {
+  if (!is.data.frame(x$steps)) {
+    kept <- if (is.null(x$steps)) "without its steps being kept" else "with its steps in arrays"
+    gym_abort(
+      c(paste0("This rollout was played ", kept, "."),
+        i = "`rollout(..., steps = TRUE)` keeps them in a table."),
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
   }
-  cex
 }
 
-draw_panel <- function(data, i, at_bottom, title_cex) {
-  panel <- data$panels[i, ]
-  values <- data$values[data$values$panel == panel$panel, ]
-  limits <- data$limits[data$limits$panel == panel$panel, ]
-  choice <- panel$kind == "choice"
-  at <- near_limits(limits$at, values$value)
-  seen <- c(values$value[is.finite(values$value)], at)
-  scale <- panel_scale(seen, panel$kind, data$choices)
-  graphics::plot.new()
-  graphics::plot.window(c(0, data$length), scale$ylim)
-  graphics::abline(h = at, col = limit_colours[limits$kind[limits$at %in% at]], lty = "dashed",
-                   lwd = 1.5)
-  if (choice) {
-    draw_choices(values, data$choices)
+#' Choose the columns to show
+#' @return A list: `observed` and `actions`, names of columns.
+#' @noRd
+trajectory_columns <- function(steps, variables, call) {
+  names <- names(steps)
+  numbers <- vapply(steps, function(column) is.numeric(column) || is.logical(column), NA)
+  is_action <- grepl("^action(_|$)", names)
+  actions <- names[is_action & numbers]
+  possible <- setdiff(names[!is_action & numbers], c("candidate", "episode", "step"))
+  if (is.null(variables)) {
+    possible <- setdiff(possible, c("reward", "terminated", "truncated"))
+    possible <- possible[!startsWith(possible, "next_")]
+    observed <- first_few(possible, most_panels, "numbers of the observation", "variables")
   } else {
-    draw_lines(values, panel$kind)
-    graphics::axis(2L, at = scale$ticks, cex.axis = 0.9)
-  }
-  graphics::abline(v = data$length, col = ending_colours[[data$ending]], lwd = 1.5)
-  at <- unique(round(graphics::axTicks(1L)))
-  graphics::axis(1L, at = at, labels = at_bottom, cex.axis = 0.9)
-  graphics::box(bty = "l")
-  parts <- if (!choice) data$actions[intersect(names(data$actions), values$name)]
-  draw_panel_title(panel$panel, limits, parts, title_cex)
-}
-
-# Which values a panel shows, and where its axis has marks: NULL leaves that to R. A constant
-# has a single mark, and whole numbers have whole marks.
-panel_scale <- function(seen, kind, choices = NULL) {
-  if (kind == "choice") {
-    list(ylim = range(choices$value) + c(-0.5, 0.5))
-  } else if (length(seen) == 0L) {
-    list(ylim = 0:1)
-  } else if (length(unique(seen)) == 1L) {
-    list(ylim = seen[[1L]] + c(-0.5, 0.5), ticks = seen[[1L]])
-  } else {
-    list(ylim = range(seen), ticks = if (kind == "stairs") few_breaks(range(seen)))
-  }
-}
-
-draw_lines <- function(values, kind) {
-  names <- unique(values$name)
-  for (j in seq_along(names)) {
-    one <- values[values$name == names[[j]], ]
-    graphics::lines(one$time, one$value, type = if (kind == "stairs") "s" else "l", lwd = 1.5,
-                    col = line_colours[[j]])
-    if (nrow(one) <= 30L) {
-      graphics::points(one$time, one$value, pch = 16L, cex = 0.7, col = line_colours[[j]])
+    unknown <- setdiff(variables, possible)
+    if (!is.character(variables) || length(unknown)) {
+      must <- paste0(
+        "names of columns of the steps (", text_list(possible), ")"
+      )
+      abort_argument(variables, must, "variables", call)
     }
+    observed <- unique(variables)
+  }
+  list(observed = observed, actions = first_few(actions, most_actions, "numbers of the action"))
+}
+
+first_few <- function(names, most, what, argument = NULL) {
+  if (length(names) <= most) {
+    return(names)
+  }
+  rlang::inform(
+    c(paste0("Showing the first ", most, " of ", length(names), " ", what, "."),
+      i = if (!is.null(argument)) paste0("`", argument, " = ` chooses others.")),
+    class = "gym_message_variables"
+  )
+  names[seq_len(most)]
+}
+
+text_list <- function(names, most = 10L) {
+  more <- if (length(names) > most) ", ..."
+  paste0(paste0("\"", utils::head(names, most), "\"", collapse = ", "), more)
+}
+
+# Actions ---------------------------------------------------------------------------
+
+# The possible actions, where an action is one of few whole numbers, with the names of the
+# environment's documentation where it has some. NULL for other actions.
+action_choices <- function(x, actions) {
+  value <- if (length(actions) == 1L) as.numeric(actions[[1L]])
+  if (is.null(value) || !all_whole(value)) {
+    return(NULL)
+  }
+  # A function has no action space.
+  space <- if (!is.function(x$policy)) x$policy$action_space
+  meaning <- action_meaning(x$env_id, space$n)
+  possible <- (space$start %||% 0L) + seq_along(meaning) - 1L
+  if (length(meaning) > 1L && all(value %in% possible)) {
+    data.frame(value = possible, label = meaning)
+  } else if (diff(range(value)) < most_choices) {
+    value <- seq(min(value), max(value))
+    data.frame(value = value, label = as.character(value))
   }
 }
 
-# Each action as a box from its step's beginning to its end.
-draw_choices <- function(values, choices) {
-  graphics::rect(values$time, values$value - 0.35, values$time + 1, values$value + 0.35,
-                 col = okabe_ito$blue, border = NA)
-  graphics::axis(2L, at = choices$value, labels = choices$label, cex.axis = 0.9, tick = FALSE,
-                 gap.axis = 0)
+most_choices <- 10L
+
+all_whole <- function(value) all(is.finite(value)) && all(value == round(value))
+
+action_title <- function(env_id, names) {
+  if (length(names) != 1L) {
+    return("actions"[length(names) > 0L])
+  }
+  part <- action_meaning(env_id, 1L)
+  if (is.null(part)) {
+    return("action")
+  }
+  unit <- action_units[[environment_family(env_id), exact = TRUE]]
+  paste0("action: ", part, if (!is.null(unit)) paste0(" (", unit, ")"))
 }
 
-# The notes beside the title are left out where they do not fit.
-draw_panel_title <- function(title, limits, parts, cex) {
-  width <- function(text, ...) graphics::strwidth(text, "inches", cex = cex, ...)
-  write <- function(text, ...) {
-    graphics::mtext(text, side = 3L, line = 0.25, cex = cex * graphics::par("cex"), ...)
+# Limits -----------------------------------------------------------------------------
+
+trajectory_limits <- function(env_id, observed, labels) {
+  limits <- episode_limits[[environment_family(env_id), exact = TRUE]]
+  rows <- lapply(intersect(observed, names(limits)), function(name) {
+    limit <- limits[[name]]
+    data.frame(
+      panel = labels[[match(name, observed)]], at = limit$at, kind = limit$kind, text = limit$text
+    )
+  })
+  none <- data.frame(
+    panel = character(), at = numeric(), kind = character(), text = character()
+  )
+  do.call(rbind, c(list(none), rows))
+}
+
+# The limits that are near the values. Showing one far away would make the values a flat line: they
+# keep at least about a tenth of the height.
+near_limits <- function(at, value) {
+  if (!any(is.finite(value))) {
+    return(numeric())
   }
-  write(title, adj = 0, font = 2)
-  taken <- width(title, font = 2) + width("M")
-  note <- unique(limits$text)
-  if (length(note) && taken + width(note) < graphics::par("pin")[[1L]]) {
-    write(note, adj = 1, col = limit_colours[[limits$kind[[1L]]]])
-  }
-  if (length(parts) > 1L) {
-    starts <- taken + cumsum(c(0, width(paste0(parts, "M"))))[seq_along(parts)]
-    left <- graphics::grconvertX(0, "npc", "inches")
-    write(parts, at = graphics::grconvertX(left + starts, "inches", "user"), adj = 0,
-          col = line_colours[seq_along(parts)])
-  }
+  seen <- range(value, finite = TRUE)
+  at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
+}
+
+# `row` is the episode's in the table of episodes.
+trajectory_subtitle <- function(row) {
+  ending <- if (row$terminated) "terminated" else "truncated"
+  of <- if (!is.null(row$candidate)) paste0("candidate ", row$candidate, ", ")
+  paste0(of, "episode ", row$episode, ": return ", number_text(row$return), ", ", ending,
+         " after ", count_of(row$length, "step"))
 }

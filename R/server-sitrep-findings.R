@@ -28,7 +28,7 @@ sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
 
 # Packages that only some functions need.
 suggested_packages <- c(
-  ggplot2 = "autoplot()", magick = "animate()", png = "frames of rollouts",
+  magick = "animate()", png = "frames of rollouts",
   sigmoid = "the scripts of the tutorial", bit64 = "integers beyond 2^53"
 )
 

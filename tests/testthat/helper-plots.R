@@ -1,20 +1,28 @@
-# For tests of plots: a device that keeps nothing, and what a plot must leave as it was.
+# For tests of pictures. What was built is looked at, not pixels.
 
-local_device <- function(width = 7, height = 5, frame = parent.frame()) {
-  grDevices::pdf(NULL, width = width, height = height)
+local_device <- function(frame = parent.frame()) {
+  grDevices::pdf(NULL)
   withr::defer(grDevices::dev.off(), envir = frame)
 }
 
-# What plots may have changed, and must have put back.
-plot_parameters <- function() {
-  graphics::par(c("mar", "oma", "mgp", "las", "xpd", "cex", "mfrow", "col", "lwd", "tcl"))
+# Prints the picture, which must not warn, or touch R's generator. Returns it.
+drawn <- function(picture) {
+  force(picture)
+  local_device()
+  state <- globalenv()$.Random.seed
+  testthat::expect_silent(print(picture))
+  testthat::expect_identical(globalenv()$.Random.seed, state)
+  invisible(picture)
 }
 
-expect_leaves_session_alone <- function(code) {
-  graphics::plot.new()
-  before <- plot_parameters()
-  state <- globalenv()$.Random.seed
-  force(code)
-  testthat::expect_identical(plot_parameters(), before)
-  testthat::expect_identical(globalenv()$.Random.seed, state)
+# The data of a picture's layers of one kind, such as "GeomPoint", in their order.
+layers_of <- function(picture, geom) {
+  kinds <- vapply(picture$layers, function(layer) Find(nzchar, class(layer$geom)), "")
+  lapply(which(kinds == geom), function(i) ggplot2::layer_data(picture, i))
+}
+
+# The labels of a picture's key, and nothing where it has none.
+key_of <- function(picture, aesthetic = "colour") {
+  scale <- ggplot2::ggplot_build(picture)$plot$scales$get_scales(aesthetic)
+  if (is.null(scale)) NULL else scale$get_labels()
 }

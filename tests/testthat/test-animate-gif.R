@@ -24,19 +24,17 @@ test_that("the pictures read back are those written", {
   }
 })
 
-test_that("delays, size and loop stand in the file", {
+test_that("delays and loop stand in the file", {
   skip_if_not_installed("magick")
   skip_if_not_installed("png")
   file <- withr::local_tempfile(fileext = ".gif")
-  write_gif(list(dotted(1, 1), dotted(2, 2)), file, c(2, 300))
+  expect_identical(write_gif(list(dotted(1, 1), dotted(2, 2)), file, c(2, 300)), c(8L, 6L))
   bytes <- readBin(file, "raw", 1e5)
   expect_identical(rawToChar(bytes[1:6]), "GIF89a")
-  expect_identical(gif_size(file), c(8L, 6L))
   control <- which(bytes == as.raw(0x21) & c(bytes[-1], as.raw(0)) == as.raw(0xf9))
   delay <- function(at) as.integer(bytes[at + 4]) + 256L * as.integer(bytes[at + 5])
   expect_identical(vapply(control, delay, 1L), c(2L, 300L))
   expect_length(grepRaw("NETSCAPE2.0", bytes), 1)
-  expect_identical(utils::tail(bytes, 1), as.raw(0x3b))
 })
 
 test_that("a picture is made smaller as a whole", {

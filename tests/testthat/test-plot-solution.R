@@ -1,17 +1,25 @@
+autoplot <- ggplot2::autoplot
+
 test_that("Gymnasium's grids have their rows, columns, arrows and ends", {
   client <- test_client()
   solved <- solve_mdp(env_model("FrozenLake-v1", client = client))
   data <- solution_plot_data(solved, NULL, NULL, 2, 0, 1)
   expect_identical(c(data$columns, data$rows), c(4L, 4))
   # The holes and the goal of the map SFFF FHFH FFFH HFFG.
-  expect_identical(data$cells$state[data$cells$ends], c(5L, 7L, 11L, 12L, 15L))
+  expect_identical(data$cells$state[data$cells$end == "pit"], c(5L, 7L, 11L, 12L))
+  expect_identical(data$cells$state[data$cells$end == "goal"], 15L)
   expect_identical(data$cells$does[c(1, 15)], c("left", "down"))
   cliff <- solve_mdp(env_model("CliffWalking-v1", client = client))
   data <- solution_plot_data(cliff, NULL, NULL, 2, 0, 1)
   expect_identical(data$columns, 12L)
-  # No episode is ever on the cliff.
-  expect_identical(which(is.na(data$cells$value)), 38:47)
-  expect_identical(data$cells$state[data$cells$ends], 47L)
+  expect_identical(data$cells$state[data$cells$end != ""], 47L)
+  # No episode is ever on the cliff, where the grid is empty.
+  picture <- drawn(autoplot(cliff))
+  each <- lapply(layers_of(picture, "GeomTile"), function(layer) layer[c("x", "y")])
+  tiles <- do.call(rbind, each)
+  expect_identical(nrow(tiles), 38L)
+  expect_false(any(tiles$y == -4 & tiles$x %in% 2:11))
+  expect_identical(key_of(picture), "goal")
 })
 
 test_that("Taxi has a grid for each passenger and destination, with its walls", {
@@ -23,28 +31,65 @@ test_that("Taxi has a grid for each passenger and destination, with its walls", 
   # Gymnasium's map: +---------+ |R: | : :G| |X: | : : | | : : : : | | | : | : | |Y| : |B: |
   walls <- with(data$walls, paste(row, column))
   expect_setequal(walls, c("1 2", "2 2", "4 1", "5 1", "4 3", "5 3"))
+  expect_length(layers_of(drawn(autoplot(taxi)), "GeomLabel")[[1]]$label, 4)
   expect_error(plot(taxi, passenger = 5), class = "gym_error_argument")
 })
 
-test_that("any solution plots, returns itself and leaves par and R's generator alone", {
-  local_device()
-  limited <- solve_mdp(walk_model(), horizon = 3)
-  policy <- solve_mdp(walk_model(), policy = policy_random())
-  for (solved in list(solve_mdp(walk_model()), limited, policy)) {
-    expect_leaves_session_alone({
-      expect_identical(plot(solved), solved)
-      plot(solved, columns = 2, directions = c("left", "right"), main = "Walk")
-    })
+test_that("cells have the values as colours and numbers, what is done as arrows, and ends a mark", {
+  solved <- solve_mdp(walk_model())
+  picture <- drawn(autoplot(solved, columns = 4, directions = c("left", "right")))
+  data <- solution_plot_data(solved, 4, c("left", "right"), 2, 0, 1)
+  inside <- data$cells[!is.na(data$cells$value), ]
+  numbers <- do.call(rbind, layers_of(picture, "GeomText"))
+  expect_setequal(as.numeric(numbers$label), round(inside$value, 2))
+  arrows <- do.call(rbind, layers_of(picture, "GeomSegment"))
+  expect_identical(arrows$xend > arrows$x, inside$does == "right")
+  expect_identical(key_of(picture), c("goal", "pit"))
+})
+
+test_that("Q-values are triangles at the side to which an action leads, the best in bold", {
+  solved <- solve_mdp(walk_model())
+  picture <- drawn(autoplot(solved, type = "q", columns = 4, directions = c("left", "right")))
+  triangles <- layers_of(picture, "GeomPolygon")[[1]]
+  numbers <- do.call(rbind, layers_of(picture, "GeomText"))
+  reached <- which(!is.na(solution_plot_data(solved, 4, NULL, 2, 0, 1)$cells$value))
+  expect_length(unique(triangles$group), 2 * length(reached))
+  expect_setequal(round(as.numeric(numbers$label), 2), round(as.vector(solved$q[reached, ]), 2))
+  best <- numbers[numbers$fontface == "bold", ]
+  expect_equal(sort(unique(as.numeric(best$label))),
+               sort(unique(round(apply(solved$q[reached, ], 1, max), 2))))
+  # Where one action is best, to the right of the middle of its cell.
+  expect_gt(best$x[round(best$x) == 2], 2)
+  points <- drawn(autoplot(solved, type = "q"))
+  expect_length(unique(layers_of(points, "GeomPoint")[[1]]$shape), 2)
+})
+
+test_that("an end that costs is a pit, alone it is one where going on gives more", {
+  ends <- function(left, right, move = 0) {
+    model <- gym_model(data.frame(
+      state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+      reward = c(left, move, move, right)
+    ), start = 1)
+    end_kinds(model, state_kinds(model))
   }
+  expect_identical(ends(0, 1), c("pit", "", "", "goal"))
+  expect_identical(ends(-1, -1, move = -1), c("goal", "", "", "goal"))
+  expect_identical(ends(-9, -9, move = 1), c("pit", "", "", "pit"))
+})
+
+test_that("any solution is drawn, and a wrong grid, direction or step refused", {
+  limited <- solve_mdp(walk_model(), horizon = 3)
+  expect_match(drawn(autoplot(limited))$labels$subtitle, "best values of states within 3 steps")
+  drawn(autoplot(solve_mdp(walk_model(), policy = policy_random()), columns = 2))
   expect_error(plot(limited, columns = 3), "make whole rows", class = "gym_error_argument")
   expect_error(plot(limited, directions = "up"), class = "gym_error_argument")
   expect_error(plot(limited, step = 4), class = "gym_error_argument")
+  expect_error(plot(limited, type = "actions"), class = "gym_error_argument")
 })
 
-test_that("ggplot2 draws the same cells", {
-  testthat::skip_if_not_installed("ggplot2")
-  solved <- solve_mdp(walk_model())
-  grid <- ggplot2::autoplot(solved, columns = 4, directions = c("left", "right"))
-  expect_identical(ggplot2::layer_data(grid, 2)$label, c("\u00d7", "\u2192", "\u2192", "\u00d7"))
-  expect_s3_class(ggplot2::autoplot(solved), "ggplot")
+test_that("numbers in cells have three digits, the same decimals, and none where they are small", {
+  expect_identical(number_texts(c(1, 0.123, -0.001, NA)), c("1.00", "0.12", "0.00", ""))
+  expect_identical(number_texts(c(-13.2, 7)), c("-13", "7"))
+  expect_identical(text_size(list(columns = 40, rows = 40), "0.12"), 0)
+  expect_gt(text_size(list(columns = 4, rows = 4), "0.12"), 3)
 })

@@ -1,3 +1,5 @@
+autoplot <- ggplot2::autoplot
+
 # A training as it would be, with these evaluations.
 training_of <- function(steps, returns, target = 5, agent = agent_ars(), ...) {
   evaluations <- data.frame(
@@ -26,8 +28,8 @@ test_that("a band is the middle half of the seeds, its line their median", {
     training_of(c(5, 20), c(7, 10)), training_of(c(10, 20), c(8, 8)),
     training_of(c(10, 40), c(9, 9))
   )
-  data <- trainings_plot_data(list(ARS = trained))
-  curve <- data$curves
+  picture <- drawn(autoplot(ARS = trained))
+  curve <- picture$data
   # From where all were evaluated once; one that ended stays where it came to.
   expect_identical(range(curve$steps), c(10, 40))
   expect_equal(unlist(curve[1, c("median", "lower", "upper")]),
@@ -35,53 +37,37 @@ test_that("a band is the middle half of the seeds, its line their median", {
   at_last <- sort(c(2, 6, 10, 8, 9))
   expect_equal(unlist(curve[nrow(curve), c("median", "lower", "upper")]),
                c(median = at_last[[3]], lower = at_last[[2]], upper = at_last[[4]]))
-  expect_identical(data$target, 5)
-  expect_identical(data$title, "ARS V2-t in Fake-v0, 5 seeds")
+  expect_identical(layers_of(picture, "GeomRibbon")[[1]]$ymax, curve$upper)
+  expect_identical(layers_of(picture, "GeomHline")[[1]]$yintercept, 5)
+  expect_identical(picture$labels$title, "ARS V2-t in Fake-v0, 5 seeds")
 })
 
 test_that("between evaluations a curve is straight, of several at one place the last counts", {
   evaluated_twice <- training_of(c(10, 10, 20), c(99, 1, 3))
-  curve <- trainings_plot_data(list(a = trainings_of(evaluated_twice, evaluated_twice)))$curves
+  curve <- autoplot(trainings_of(evaluated_twice, evaluated_twice))$data
   expect_equal(curve$median, 1 + (curve$steps - 10) / 10 * 2)
 })
 
 test_that("trainings that are given together are compared, by their names", {
   ars <- trainings_of(training_of(c(10, 20), c(1, 2)), training_of(c(10, 20), c(3, 4)))
   cem <- training_of(c(10, 30), c(1, 6), agent = agent_cem())
-  given <- given_trainings(list(A = ars, cem), quote(list(A = ars, cem)))
-  expect_named(given$trainings, c("A", "cem"))
-  data <- trainings_plot_data(given$trainings)
-  expect_identical(unique(data$curves$label), c("A", "cem"))
-  expect_identical(data$curves$median[data$curves$label == "cem"], c(1, 6))
-  expect_named(data$colours, c("A", "cem"))
+  picture <- drawn(autoplot(A = ars, cem = cem))
+  expect_identical(levels(picture$data$label), c("A", "cem"))
+  expect_identical(picture$data$median[picture$data$label == "cem"], c(1, 6))
+  expect_identical(key_of(picture), c("A", "cem", "target 5"))
+  expect_identical(unique(layers_of(picture, "GeomLine")[[1]]$colour), series_colours[1:2])
+  expect_identical(levels(autoplot(cem, A = ars)$data$label), c("cem", "A"))
   # Different targets are no line.
-  expect_null(trainings_plot_data(list(a = ars, b = training_of(1:2, 1:2, target = 9)))$target)
-  local_device()
-  expect_leaves_session_alone(plot(ars))
-  expect_identical(plot(ars, cem), ars)
-  expect_identical(plot(A = ars, B = cem, ylim = c(0, 9)), ars)
-  expect_identical(plot(cem, ars, main = "mine"), cem)
+  other <- training_of(1:2, 1:2, target = 9)
+  expect_identical(key_of(autoplot(ars, other)), c("ars", "other"))
   expect_error(plot(ars, 3), class = "gym_error_argument")
-  skip_if_not_installed("ggplot2")
-  for (plot in list(ggplot2::autoplot(ars, cem), ggplot2::autoplot(cem, A = ars),
-                    ggplot2::autoplot(ars))) {
-    built <- ggplot2::ggplot_build(plot)
-    expect_identical(built$data[[4]]$yintercept, 5)
-  }
-  expect_error(ggplot2::autoplot(ars, ylim = 3), class = "gym_error_argument")
+  expect_error(autoplot(ars, col = 3), "no argument for `col`", class = "gym_error_argument")
 })
 
 test_that("trainings that were evaluated once are a point and a bar", {
   once <- trainings_of(training_of(10, 1), training_of(10, 3), training_of(10, 2))
-  curve <- trainings_plot_data(list(a = once))$curves
-  expect_identical(nrow(curve), 1L)
-  expect_equal(unlist(curve[c("median", "lower", "upper")]),
-               c(median = 2, lower = 1.5, upper = 2.5))
-  local_device()
-  expect_identical(plot(once), once)
-  skip_if_not_installed("ggplot2")
-  built <- ggplot2::ggplot_build(ggplot2::autoplot(once))
-  expect_identical(built$data[[3]]$ymax, 2.5)
+  bar <- layers_of(suppressMessages(autoplot(once)), "GeomPointrange")[[1]]
+  expect_equal(unlist(bar[c("y", "ymin", "ymax")]), c(y = 2, ymin = 1.5, ymax = 2.5))
 })
 
 test_that("a search among them is refused, with or without a name", {
@@ -99,9 +85,7 @@ test_that("trainings without an evaluation are refused, and single ones drawn wi
     train_agent(agent_ars(), env, iterations = 9, seed = 1, target = Inf)
   )
   expect_identical(nrow(trained$evaluations), 0L)
-  expect_identical(nrow(training_plot_data(trained)$curve), 0L)
-  local_device()
-  expect_identical(plot(trained), trained)
+  expect_identical(key_of(drawn(autoplot(trained))), c("range of candidates", "their median"))
   expect_error(plot(trained, trained), "no policy of trained was evaluated",
                class = "gym_error_argument")
 })

@@ -8,8 +8,6 @@ test_that("a learner trains in the loop of all agents, exactly judged where ther
   expect_output(print(summary(learned)), "The episodes of the last iteration", fixed = TRUE)
   expect_identical(predict(learned, 1:2), c(1L, 1L))
   expect_identical(predict(learned, 1:2, type = "output"), learned$agent$weights[2:3, ])
-  local_device()
-  expect_identical(plot(learned), learned)
 })
 
 test_that("a seed fixes what is learned, and another one gives another table", {

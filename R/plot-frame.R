@@ -1,0 +1,31 @@
+#' Show a frame
+#'
+#' Draws the picture as large as there is room for, its proportions kept.
+#'
+#' `autoplot()` makes the picture, a ggplot; `plot()` prints it, too.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object A frame, from [env_render()].
+#' @param main The title; `NULL`, the default, for none.
+#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
+#' @return A ggplot; of `plot()` invisibly.
+#' @rdname plot.gym_frame
+#' @exportS3Method ggplot2::autoplot
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", seed = 1)
+#' env$reset()
+#' plot(env$render())
+#' env$close()
+autoplot.gym_frame <- function(object, ...) {
+  check_dots_empty(...)
+  grob_picture(grid::rasterGrob(as.raster(object)))
+}
+
+# A picture that is no plot of data: all room for what `grid` draws.
+grob_picture <- function(grob) {
+  ggplot2::ggplot(data.frame(x = 0:1, y = 0:1), ggplot2::aes(.data$x, .data$y)) +
+    ggplot2::geom_blank() +
+    ggplot2::annotation_custom(grob) +
+    theme_gym_bare() +
+    ggplot2::theme(plot.margin = ggplot2::margin(2, 2, 2, 2))
+}

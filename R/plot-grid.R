@@ -1,0 +1,180 @@
+# States on a grid: where they stand, and what is drawn in their cells.
+
+# A picture of cells with the columns `row` and `column`; `layers` are those below the marks of the
+# environment.
+grid_picture <- function(data, layers) {
+  ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
+    layers +
+    taxi_layers(data) +
+    ggplot2::scale_y_reverse() +
+    ggplot2::coord_fixed() +
+    theme_gym_bare() +
+    # Beside a square there is room for the key, above a wide grid.
+    ggplot2::theme(legend.position = if (data$columns > 1.5 * data$rows) "top" else "right")
+}
+
+# The width of a square cell, in millimetres, where the picture is four inches wide.
+cell_width <- function(data) min(91 / data$columns, 56 / data$rows)
+
+cell_tiles <- function(mapping = NULL, ...) {
+  ggplot2::geom_tile(mapping, ..., colour = "grey80", linewidth = 0.3)
+}
+
+# How large text may be in a cell, in millimetres; 0 where it could not be read.
+text_size <- function(data, text) {
+  cell <- cell_width(data)
+  size <- min(3.2, 0.3 * cell, 0.85 * cell / (0.55 * max(nchar(text), 1L)))
+  if (size < 1.5) 0 else size
+}
+
+arrow_steps <- list(left = c(-1, 0), right = c(1, 0), up = c(0, -1), down = c(0, 1))
+
+#' Draw what is done in each cell: arrows, or letters for what is no direction
+#' @param cells The cells, with the columns `does` and `ink`, the colour to draw with.
+#' @param above How much of a cell's height it stands above the middle.
+#' @noRd
+action_layers <- function(data, cells, above = 0) {
+  cells$does <- as.character(cells$does)
+  moves <- cells[cells$does %in% names(arrow_steps), ]
+  step <- matrix(as.numeric(unlist(arrow_steps[moves$does])), ncol = 2L, byrow = TRUE)
+  moves$x <- moves$column - 0.2 * step[, 1L]
+  moves$y <- moves$row - above - 0.2 * step[, 2L]
+  moves$xend <- moves$x + 0.4 * step[, 1L]
+  moves$yend <- moves$y + 0.4 * step[, 2L]
+  named <- cells[!cells$does %in% c(names(arrow_steps), ""), ]
+  inches <- min(0.08, 0.7 / max(data$columns, data$rows))
+  head <- ggplot2::arrow(length = ggplot2::unit(inches, "in"))
+  each_ink(moves, function(moves, ink) {
+    ggplot2::geom_segment(
+      ggplot2::aes(.data$x, .data$y, xend = .data$xend, yend = .data$yend), moves, arrow = head,
+      colour = ink, linewidth = 0.5
+    )
+  }, each_ink(named, function(named, ink) {
+    ggplot2::geom_text(
+      ggplot2::aes(label = .data$does), named, nudge_y = above, colour = ink, fontface = "bold",
+      size = max(text_size(data, named$does), 2)
+    )
+  }))
+}
+
+# A layer for the cells with white ink and one for those with black, where there are some.
+each_ink <- function(cells, layer, others = NULL) {
+  c(unname(lapply(split(cells, cells$ink), function(part) layer(part, part$ink[[1L]]))), others)
+}
+
+number_texts <- function(values) {
+  largest <- max(abs(values[is.finite(values)]), 1e-6)
+  # Three digits, and those of 1 as those of 0.99.
+  decimals <- max(0, 1 - floor(log10(largest) - 1e-6))
+  text <- sprintf("%.*f", as.integer(decimals), values)
+  text <- sub("^-(0[.]?0*)$", "\\1", text)
+  ifelse(is.na(values), "", text)
+}
+
+# White on dark colours of values, black on light ones.
+ink_on <- function(values) {
+  seen <- range(values, finite = TRUE)
+  ifelse(is.na(values) | values >= seen[[1L]] + 0.6 * diff(seen), "black", "white")
+}
+
+# Where states stand ---------------------------------------------------------------------
+
+# What the actions of Gymnasium's grids do, by the beginnings of their ids; see their documentation,
+# https://gymnasium.farama.org/environments/toy_text/.
+known_directions <- list(
+  FrozenLake = c("left", "down", "right", "up"),
+  CliffWalking = c("up", "right", "down", "left"),
+  Taxi = c("down", "up", "right", "left", "P", "D")
+)
+
+taxi_stands <- data.frame(
+  label = c("R", "G", "Y", "B"), row = c(1, 1, 5, 5), column = c(1, 5, 1, 4)
+)
+
+# Which of Gymnasium's grids it is, "" for none of them.
+known_grid <- function(id) {
+  found <- names(known_directions)[startsWith(id, names(known_directions))]
+  if (length(found)) found else ""
+}
+
+check_directions <- function(directions, count, call) {
+  if (!is.null(directions) && (!is.character(directions) || length(directions) != count)) {
+    must <- paste("a string for each of", count_of(count, "action"))
+    abort_argument(directions, must, "directions", call)
+  }
+  directions
+}
+
+# Puts states into rows and columns, where it is known how many columns there are.
+grid_cells <- function(cells, columns, call) {
+  if (is.null(columns)) {
+    return(list(cells = cells))
+  }
+  count <- nrow(cells)
+  if (count %% columns != 0) {
+    must <- paste("a number by which", count_of(count, "state"), "make whole rows")
+    abort_argument(columns, must, "columns", call)
+  }
+  cells$row <- (seq_len(count) - 1L) %/% columns + 1L
+  cells$column <- (seq_len(count) - 1L) %% columns + 1L
+  list(cells = cells, columns = columns, rows = count / columns)
+}
+
+# A step down adds as many to the state's number as there are columns: the most common difference
+# above 1.
+grid_columns <- function(model) {
+  further <- with(model$transitions, next_state - state)
+  further <- further[further > 1L]
+  if (length(further)) as.integer(names(which.max(table(further))))
+}
+
+# The states of Taxi number the row, the column, the passenger and the destination, see its
+# documentation.
+taxi_cells <- function(cells, passenger, destination, walls, call) {
+  check_count(passenger, min = 0, max = 4, call = call)
+  check_count(destination, min = 0, max = 3, call = call)
+  state <- cells$state
+  shown <- state %/% 4L %% 5L == passenger & state %% 4L == destination
+  cells$row <- state %/% 100L + 1L
+  cells$column <- state %/% 20L %% 5L + 1L
+  cells <- cells[shown, ]
+  list(
+    cells = cells, columns = 5L, rows = 5L,
+    walls = cells[cells$column < 5L & cells$state %in% walls, c("row", "column")],
+    stands = taxi_stands, from = passenger, to = destination
+  )
+}
+
+# The states from which a move to the right stays in its place.
+taxi_walls <- function(model) {
+  right <- model$transitions[model$transitions$action == 2L, ]
+  right$state[right$state == right$next_state & right$probability == 1]
+}
+
+# Walls, and the letters of the stands.
+taxi_layers <- function(data) {
+  if (is.null(data$stands)) {
+    return(NULL)
+  }
+  right <- ggplot2::aes(
+    .data$column + 0.5, .data$row - 0.5, xend = .data$column + 0.5, yend = .data$row + 0.5
+  )
+  list(
+    ggplot2::geom_segment(right, data$walls, linewidth = 1.5, colour = "black"),
+    ggplot2::geom_label(
+      ggplot2::aes(.data$column - 0.35, .data$row - 0.35, label = .data$label), data$stands,
+      size = 2.5, fontface = "bold", label.padding = ggplot2::unit(0.1, "lines")
+    )
+  )
+}
+
+taxi_subtitle <- function(data) {
+  if (is.null(data$stands)) {
+    return(NULL)
+  }
+  stand <- data$stands$label
+  where <- if (data$from == 4) "in the taxi" else paste("at", stand[[data$from + 1L]])
+  c(
+    paste0("passenger ", where, ", destination ", stand[[data$to + 1L]]), "P picks up, D drops off"
+  )
+}

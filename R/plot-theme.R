@@ -1,0 +1,155 @@
+# What all pictures share: the colours, the theme, the text above and the key.
+
+# Colours that remain apart for the colour-blind (simulated as by Machado, Oliveira and Fernandes,
+# 2009), and in grey, because each is lighter than the one before it in this order:
+# blue, brown, purple, green, gold, sky.
+gym_colours <- c(
+  blue = "#003473", gold = "#CDA514", purple = "#9250C2", green = "#009A79", brown = "#833718",
+  sky = "#A2CDE9", ink = "#333333"
+)
+
+# Of lines and areas that are told apart by colour alone.
+series_colours <- unname(gym_colours[c("blue", "gold", "purple", "green", "brown", "sky")])
+
+named_colours <- function(labels) {
+  stats::setNames(rep_len(series_colours, length(labels)), labels)
+}
+
+# From low to high, light enough at both ends for black text. The ends differ in lightness, too.
+diverging_colours <- c("#EFB549", "#FAF7F0", "#4797C8")
+
+# Regions and cells that have a colour for each action, light enough for black text.
+action_colours <- function(n) {
+  light <- c("#F3D98B", "#A2CDE9", "#D9B8EE", "#7FC9B3", "#E3B7A2", "#EDEDED", "#C6D66B")
+  if (n > length(light)) grDevices::hcl.colors(n, "viridis") else light[seq_len(n)]
+}
+
+# Values from low to high.
+value_colours <- function() grDevices::hcl.colors(101L, "viridis")
+
+theme_gym <- function() {
+  text <- ggplot2::element_text
+  ggplot2::theme_minimal(base_size = 11) +
+    ggplot2::theme(
+      plot.title = text(face = "bold", size = ggplot2::rel(1.1)),
+      plot.subtitle = text(colour = "grey30", size = ggplot2::rel(0.9)),
+      plot.title.position = "plot", plot.caption.position = "plot",
+      legend.position = "top", legend.justification = "left", legend.box = "vertical",
+      legend.box.just = "left", legend.margin = ggplot2::margin(),
+      legend.spacing = ggplot2::unit(2, "pt"), legend.box.spacing = ggplot2::unit(4, "pt"),
+      legend.key.height = ggplot2::unit(12, "pt"),
+      legend.title = text(size = ggplot2::rel(0.8)), legend.text = text(size = ggplot2::rel(0.75)),
+      panel.grid.minor = ggplot2::element_blank(), strip.clip = "off",
+      strip.text = text(hjust = 0, size = ggplot2::rel(0.7), margin = ggplot2::margin(b = 2))
+    )
+}
+
+# A picture without axes: grids, diagrams and frames.
+theme_gym_bare <- function() {
+  theme_gym() +
+    ggplot2::theme(
+      panel.grid = ggplot2::element_blank(), axis.text = ggplot2::element_blank(),
+      axis.title = ggplot2::element_blank()
+    )
+}
+
+# Text above a picture is broken into lines that fit into four inches: ggplot2 cuts off what is
+# longer than the picture is wide.
+# The parts of a subtitle that are too long for one line have a line each.
+picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54) {
+  joined <- paste(subtitle, collapse = ", ")
+  lines <- unlist(lapply(if (nchar(joined) > width) subtitle else joined, broken_text, width))
+  ggplot2::labs(
+    title = broken_text(title, 38),
+    subtitle = if (length(lines)) paste(lines, collapse = "\n"), ...
+  )
+}
+
+broken_text <- function(text, width) {
+  if (length(text) && nzchar(text)) paste(strwrap(text, width), collapse = "\n")
+}
+
+policy_subtitle <- function(x) paste("policy:", policy_label(x$policy))
+
+# The key -------------------------------------------------------------------------------
+
+# What a point or a line of a picture stands for.
+key_mark <- function(colour, shape = NA, line = "blank") {
+  list(colour = gym_colours[[colour]], shape = shape, line = line)
+}
+
+#' Make the key of a picture
+#'
+#' Layers name their mark by the colour, as in `aes(colour = "episode")`.
+#' @param marks A list of marks, named by what they stand for; those that are `NULL` are not drawn.
+#' @return A list, to be added to the picture.
+#' @noRd
+key_of_marks <- function(marks) {
+  marks <- marks[lengths(marks) > 0L]
+  each <- function(part) unlist(lapply(marks, function(mark) mark[[part]]))
+  list(
+    ggplot2::scale_colour_manual(
+      name = NULL, values = each("colour"), limits = names(marks),
+      guide = rows_of_key(
+        names(marks),
+        override.aes = list(shape = unname(each("shape")), linetype = unname(each("line")))
+      )
+    )
+  )
+}
+
+# A key in as many rows as fit into four inches.
+rows_of_key <- function(labels, ...) {
+  ggplot2::guide_legend(nrow = ceiling(sum(nchar(labels) + 6) / 54), byrow = TRUE, ...)
+}
+
+# The key of a scale of colours, with few numbers: they would touch.
+continuous_fill <- function(name, colours, ...) {
+  ggplot2::scale_fill_gradientn(
+    name = name, colours = colours, n.breaks = 4, guide = ggplot2::guide_colourbar(order = 1), ...
+  )
+}
+
+target_label <- function(target) paste("target", number_text(target))
+
+# The line of a target, none where there is no target.
+target_line <- function(target) {
+  if (!is.null(target)) {
+    ggplot2::geom_hline(
+      ggplot2::aes(yintercept = .data$target, colour = .data$label),
+      data.frame(target = target, label = target_label(target)), linetype = "dashed",
+      linewidth = 0.7
+    )
+  }
+}
+
+target_mark <- function(target) {
+  if (!is.null(target)) {
+    stats::setNames(list(key_mark("ink", line = "dashed")), target_label(target))
+  }
+}
+
+finite_target <- function(target) if (!is.null(target) && is.finite(target)) target
+
+# Axes ----------------------------------------------------------------------------------
+
+number_axis <- function(scale, ...) {
+  scale(labels = function(at) ifelse(is.na(at), NA, number_text_each(at)), ...)
+}
+
+# The marks of an axis: all whole numbers where there are only a few, because actions are whole.
+few_breaks <- function(limits, n = 5) {
+  from <- ceiling(limits[[1L]])
+  to <- floor(limits[[2L]])
+  if (from < to && to - from < n) from:to else pretty(limits, n)
+}
+
+# Rounds are whole numbers from 1, and so are the marks on their axis.
+round_ticks <- function(last) {
+  at <- unique(round(pretty(c(1, last))))
+  at[at >= 1 & at <= last]
+}
+
+returns_label <- "return (reward summed over an episode)"
+
+training_steps_label <- "steps of the environment"

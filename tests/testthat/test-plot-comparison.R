@@ -1,0 +1,85 @@
+autoplot <- ggplot2::autoplot
+
+played_with <- function(returns, policy = policy_random(), ...) {
+  rollout(scripted_environment(returns, ...), policy, episodes = length(returns), seed = 1)
+}
+
+many <- c(10, 12, 13, 15, 16, 18, 20, 40)
+
+test_that("each rollout has a row from the top, its median beside it", {
+  picture <- drawn(autoplot(upper = played_with(many), lower = played_with(c(3, 3))))
+  y <- ggplot2::ggplot_build(picture)$layout$panel_params[[1]]$y
+  expect_identical(unname(y$get_labels()[match(c(1, 0), y$breaks)]), c("upper", "lower"))
+  data <- comparison_plot_data(list(upper = played_with(many), lower = played_with(0:1)))
+  expect_identical(as.character(data$rows$label), c("upper", "lower"))
+  expect_identical(data$rows$y, c(1, 0))
+  expect_identical(data$rows$median, c(15.5, 0.5))
+  expect_setequal(layers_of(picture, "GeomSegment")[[1]]$x, c(many, 3))
+  expect_identical(picture$labels$subtitle, "2 to 8 episodes each")
+  # A row has one colour, of its area and of its ticks.
+  expect_identical(unique(layers_of(picture, "GeomPolygon")[[1]]$fill), series_colours[1:2])
+})
+
+test_that("rows show their own returns, medians and densities, or bars of one width", {
+  data <- comparison_plot_data(
+    list(a = played_with(many), b = played_with(rep(c(0, 40), c(6, 2))), c = played_with(rep(5, 4)))
+  )
+  expect_identical(data$rows$median, c(15.5, 0, 5))
+  expect_identical(split(data$returns$value, data$returns$label),
+                   list(a = many, b = rep(c(0, 40), c(6, 2)), c = rep(5, 4)))
+  shape <- function(label) data$shapes[data$shapes$label == label, ]
+  whole <- density(many, from = 10, to = 40)
+  expect_identical(range(shape("a")$x), c(10, 40))
+  expect_equal(shape("a")$y[seq_along(whole$y) + 1], 2 + 0.75 * whole$y / max(whole$y))
+  bars <- rbind(shape("b"), shape("c"))
+  expect_identical(unique(shape("b")$area), 1:2)
+  widths <- tapply(bars$x, paste(bars$label, bars$area), function(x) diff(range(x)))
+  expect_equal(as.vector(widths), rep(4, 3))
+  # The higher bar of a row fills it, the other is a third as high.
+  heights <- tapply(shape("b")$y, shape("b")$area, max)
+  expect_equal(as.vector(heights), 1 + 0.75 * c(1, 1 / 3))
+})
+
+test_that("the policies of one rollout have a row each, with their names", {
+  env <- fake_vector_env(4, reward = function(seed, step, action) action)
+  zero <- function(observation) rep(0L, nrow(observation))
+  one <- function(observation) rep(1L, nrow(observation))
+  labels <- function(...) as.character(comparison_plot_data(list(...))$rows$label)
+  played <- rollout(env, list(zero = zero, one = one), 6, seed = 1)
+  expect_identical(labels(played = played), c("zero", "one"))
+  expect_identical(comparison_plot_data(list(played = played))$rows$median, c(0, 3))
+  unnamed <- rollout(env, list(zero, one), 6, seed = 1)
+  expect_identical(labels(played = unnamed), c("1", "2"))
+  expect_identical(labels(first = played, second = unnamed),
+                   c("first zero", "first one", "second 1", "second 2"))
+  drawn(autoplot(rollout(env, list(policy_random()), 5, seed = 1)))
+})
+
+test_that("of many policies those with the highest mean returns are shown, and it is said", {
+  rollouts <- lapply(c(1:6, 12:7), function(value) played_with(c(value, value + 1)))
+  data <- comparison_plot_data(stats::setNames(rollouts, letters[1:12]))
+  expect_identical(as.character(data$rows$label),
+                   c("g", "h", "i", "j", "k", "l", "f", "e", "d", "c"))
+  expect_identical(data$subtitle[[1]], "the 10 of 12 policies with the highest mean returns")
+})
+
+test_that("the title names every environment", {
+  data <- comparison_plot_data(list(a = played_with(1:3), b = played_with(1:3, id = "Other-v0")))
+  expect_identical(data$title, "Fake-v0, Other-v0")
+})
+
+test_that("what cannot be compared is refused", {
+  played <- played_with(1:3)
+  refused <- function(code, text) expect_error(code, text, class = "gym_error_argument")
+  refused(plot(played, "trajectory"), "must be a result as the others, or have a name")
+  refused(plot(a = played, b = played, type = "trajectory"), "shows one rollout, not 2")
+  refused(autoplot(played, played, type = "filmstrip"), "A filmstrip shows one rollout, not 2")
+})
+
+test_that("a rollout that was interrupted before it had an episode is refused", {
+  interrupted <- function(observation) rlang::interrupt()
+  none <- suppressMessages(rollout(fake_environment(), interrupted, episodes = 2))
+  some <- rollout(fake_environment(), policy_random(), episodes = 2)
+  expect_error(plot(none), "has no episode to plot", class = "gym_error_argument")
+  expect_error(plot(some, none), "has no episode to plot", class = "gym_error_argument")
+})

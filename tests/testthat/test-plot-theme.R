@@ -1,0 +1,57 @@
+# How light colours are, from 0 to 100.
+lightness <- function(colours) {
+  grDevices::convertColor(t(grDevices::col2rgb(colours)) / 255, "sRGB", "Lab")[, "L"]
+}
+
+# What the colour-blind see; the matrices are those of Machado, Oliveira and Fernandes (2009) for
+# linear RGB.
+seen <- function(colours, blindness) {
+  rgb <- t(grDevices::col2rgb(colours)) / 255
+  linear <- ifelse(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055)^2.4)
+  linear <- pmin(pmax(linear %*% t(blindness), 0), 1)
+  shown <- ifelse(linear <= 0.0031308, linear * 12.92, 1.055 * linear^(1 / 2.4) - 0.055)
+  grDevices::convertColor(shown, "sRGB", "Lab")
+}
+blindness <- list(
+  protan = rbind(c(0.152286, 1.052583, -0.204868), c(0.114503, 0.786281, 0.099216),
+                 c(-0.003882, -0.048116, 1.051998)),
+  deutan = rbind(c(0.367322, 0.860646, -0.227968), c(0.280085, 0.672501, 0.047413),
+                 c(-0.011820, 0.042940, 0.968881)),
+  tritan = rbind(c(1.255528, -0.076749, -0.178779), c(-0.078411, 0.930809, 0.147602),
+                 c(0.004733, 0.691367, 0.303900))
+)
+
+test_that("colours of lines remain apart in grey and for the colour-blind", {
+  expect_gt(min(diff(sort(lightness(series_colours)))), 9)
+  for (kind in names(blindness)) {
+    expect_gt(min(stats::dist(seen(series_colours, blindness[[kind]]))), 20, label = kind)
+  }
+})
+
+test_that("what is mapped from low to high is told apart in grey, and text on it is black", {
+  expect_true(all(diff(lightness(value_colours())) > 0))
+  ends <- lightness(diverging_colours[c(1, 3)])
+  expect_gt(abs(diff(ends)), 15)
+  expect_gt(min(ends, lightness(action_colours(7))), 55)
+  expect_length(unique(action_colours(18)), 18)
+})
+
+test_that("text above a picture is broken where four inches end, a part a line", {
+  labels <- picture_labels(strrep("word ", 20), c("policy: random", strrep("long ", 10)))
+  expect_lte(max(nchar(strsplit(labels$title, "\n")[[1]])), 38)
+  expect_identical(strsplit(labels$subtitle, "\n")[[1]][[1]], "policy: random")
+  expect_identical(picture_labels("a", c("b", "c"))$subtitle, "b, c")
+  expect_null(picture_labels("a")$subtitle)
+})
+
+test_that("marks on an axis are whole numbers where some fit", {
+  expect_identical(few_breaks(c(-0.5, 1.5)), 0:1)
+  expect_identical(few_breaks(c(-2.4, 2.4)), -2:2)
+  expect_identical(few_breaks(c(0.01, 0.09)), pretty(c(0.01, 0.09)))
+  expect_equal(round_ticks(1), 1)
+  expect_equal(round_ticks(50), c(10, 20, 30, 40, 50))
+  for (last in 1:60) {
+    at <- round_ticks(last)
+    expect_true(length(at) > 0 && all(at == round(at) & at >= 1 & at <= last))
+  }
+})

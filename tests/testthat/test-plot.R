@@ -1,0 +1,59 @@
+autoplot <- ggplot2::autoplot
+
+search_of <- function(returns, rounds, ...) {
+  search_random(
+    scripted_environment(returns), rounds = rounds, episodes = length(returns) / rounds, ...
+  )
+}
+
+test_that("plot() prints the picture of autoplot(), and returns it invisibly", {
+  local_device()
+  search <- search_of(1:4, rounds = 2)
+  picture <- expect_invisible(plot(search))
+  expect_gt(grDevices::dev.cur(), 1)
+  expect_identical(ggplot2::layer_data(picture), ggplot2::layer_data(autoplot(search)))
+  expect_identical((picture + ggplot2::labs(title = "mine"))$labels$title, "mine")
+})
+
+test_that("titles, labels and limits can be chosen", {
+  local_device()
+  picture <- plot(search_of(1:4, rounds = 2), main = "mine", xlab = "a", ylab = "b",
+                  ylim = c(-50, 50))
+  expect_identical(picture$labels[c("title", "x", "y")], list(title = "mine", x = "a", y = "b"),
+                   ignore_attr = TRUE)
+  expect_identical(picture$coordinates$limits$y, c(-50, 50))
+  expect_null(plot(search_of(1:4, rounds = 2), main = "")$labels$title)
+})
+
+test_that("results are called as in the call, as their variables, or by a label of their own", {
+  named <- function(object, ...) {
+    names(given_rollouts(arguments_as_written(quote(object))))
+  }
+  a <- rollout(scripted_environment(1:3), policy_random(), episodes = 3)
+  expect_identical(named(random = a, `no name` = a), c("random", "no name"))
+  expect_identical(named(a, b = a), c("a", "b"))
+  expect_identical(named(rollout(scripted_environment(1:3), policy_random(), 3), a),
+                   c("random", "a"))
+  expect_identical(named(a, a), c("a", "a 1"))
+  expect_identical(named(a, rollout(scripted_environment(1:3), policy_random(), 3)),
+                   c("a", "random"))
+  local_device()
+  expect_identical(levels(plot(b = a, a)$data$label), c("a", "b"))
+})
+
+test_that("a frame is a picture, too", {
+  picture <- drawn(autoplot(new_frame(array(0:11, c(2, 2, 3)))))
+  expect_identical(dim(picture$layers[[2]]$geom_params$grob$raster), c(2L, 2L))
+})
+
+test_that("library(gym) loads neither ggplot2 nor grid, a picture does", {
+  skip_unless_all()
+  code <- paste(
+    "library(gym); loaded <- function() intersect(c('ggplot2', 'grid'), loadedNamespaces())",
+    "before <- loaded(); pdf(NULL); plot(policy_network(c(2, 1)))",
+    "cat(length(before), length(loaded()), class(ggplot2::autoplot(policy_network(c(2, 1))))[[1]])",
+    sep = "; "
+  )
+  said <- processx::run(file.path(R.home("bin"), "Rscript"), c("-e", code))$stdout
+  expect_match(said, "^0 2 gg")
+})
