@@ -73,7 +73,8 @@ number_texts <- function(values) {
 
 # White on dark colours of values, black on light ones.
 ink_on <- function(values) {
-  seen <- range(values, finite = TRUE)
+  seen <- range(0, values[is.finite(values)])
+  if (any(is.finite(values))) seen <- range(values, finite = TRUE)
   ifelse(is.na(values) | values >= seen[[1L]] + 0.6 * diff(seen), "black", "white")
 }
 
