@@ -115,6 +115,7 @@ make_and_train <- function(make, frame, ...) {
   training <- c(given[setdiff(names(given), own)], dots[names(dots) %in% of_training])
   # A budget of the user's own is the only one.
   budget <- any(c("iterations", "total_steps") %in% names(training))
+  check_spelling(names(kwargs), c(of_agent, of_training), budget || !is.null(preset), frame)
   if (is.null(preset) && !budget) {
     abort_no_budget(preset_hints(env, kwargs), frame)
   }
@@ -133,14 +134,13 @@ make_and_train <- function(make, frame, ...) {
 
 preset_hints <- function(env, kwargs) {
   presets <- if (is.character(env)) agent_presets(env)
-  if (!NROW(presets)) {
-    return(NULL)
-  }
   known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
                   presets$kwargs, collapse = ", ")
   c(
-    i = paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
-               known, "."),
+    i = if (NROW(presets)) {
+      paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
+             known, ".")
+    },
     i = if (length(kwargs)) {
       paste0("These were taken for the environment's own: ",
              paste0("`", names(kwargs), "`", collapse = ", "), ".")

@@ -46,3 +46,24 @@ action_names <- function(env_id, n, start = 0L) {
 action_parts <- function(env_id, n) {
   action_meaning(env_id, n) %||% if (n == 1L) "action" else paste0("action_", seq_len(n))
 }
+
+#' Turn actions that are given by what they mean into their numbers
+#' @return The actions; what is no text, as it is.
+#' @noRd
+numbered_actions <- function(instance, action, call) {
+  space <- instance$single_action_space
+  if (!is.character(action) || !inherits(space, "gym_space_discrete")) {
+    return(action)
+  }
+  names <- action_names(instance$spec$id, space$n, space$start)
+  number <- match(sub("^[0-9]+: ", "", action), sub("^[0-9]+: ", "", names))
+  if (anyNA(number)) {
+    gym_abort(
+      c(paste0("There is no action ", describe_value(action[is.na(number)][[1L]]), " in ",
+               instance$spec$id, "."),
+        i = paste0("Its actions: ", toString(names), ".")),
+      class = "gym_error_space", space = space, value = action, path = "", call = call
+    )
+  }
+  as.integer(space$start) + number - 1L
+}

@@ -127,6 +127,7 @@ prepare_single_step <- function(instance, fields, named) {
   # A classic server's error does not say that an action was wrong, so bounds are checked here.
   bounds <- instance$classic && inherits(actions, "gym_space_discrete")
   request$check_and_write <- function(action, call) {
+    action <- numbered_actions(instance, action, call)
     check_value(actions, action, "", call, bounds)
     if (sends) {
       to_tensors(actions, action, "action", call)

@@ -50,6 +50,7 @@ prepare_vector_step <- function(instance, fields, which, named, infos) {
   request$which <- which
   request$write <- if (sends) tensors_writer(single, n) else function(action) NULL
   request$check_and_write <- function(action, call) {
+    action <- numbered_actions(instance, action, call)
     check_batch(single, actions, action, n, call, which)
     if (sends) {
       to_tensors(actions, action, "action", call)

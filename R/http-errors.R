@@ -13,8 +13,7 @@ abort_http <- function(response, method, call) {
   gym_abort(
     c(
       if (is.null(problem$message)) foreign_answer_message(response) else sentence(problem$message),
-      i = sentence(hint),
-      " " = paste0(request, " [", trimws(paste(status, status_text)), "]")
+      i = sentence(hint)
     ),
     class = c(
       if (identical(problem$code, "action_not_in_space")) "gym_error_space",
@@ -24,6 +23,9 @@ abort_http <- function(response, method, call) {
     status = status,
     code = problem$code,
     hint = hint,
+    parent = rlang::error_cnd(
+      message = paste0(request, " [", trimws(paste(status, status_text)), "]")
+    ),
     call = call
   )
 }

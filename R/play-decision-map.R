@@ -93,6 +93,7 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
       class = "gym_error_argument", argument = "policy", value = NULL
     )
   }
+  policy <- trained_policy(policy)
   check_policy(policy)
   check_mappable(policy)
   xlim <- plain_numbers(xlim)

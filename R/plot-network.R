@@ -122,7 +122,11 @@ side_names <- function(units) {
 autoplot.gym_policy <- function(object, ...) {
   gym_abort(
     c(paste0("Only a network can be drawn, not a policy that is ", format(object), "."),
-      i = "`policy_network()` makes one."),
+      i = if (inherits(object, "gym_policy_table")) {
+        "`decision_map()` and `state_values()` show what a table has, and both can be plotted."
+      } else {
+        "`policy_network()` makes one."
+      }),
     class = "gym_error_argument", argument = "x", value = object
   )
 }

@@ -77,7 +77,11 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
 abort_no_weights <- function(policy, arg, call) {
   gym_abort(
     c(paste0("`", arg, "` must be a policy with weights, not ", policy_text(policy), "."),
-      i = "`policy_network()` makes one."),
+      i = if (inherits(policy, "gym_policy_table")) {
+        "`state_values()` and `decision_map()` show what a table has."
+      } else {
+        "`policy_network()` makes one."
+      }),
     class = "gym_error_argument", argument = arg, value = policy, call = call
   )
 }

@@ -128,17 +128,31 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
 
 # A policy, or a list of policies, which become candidates.
 check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  force(arg)
+  x <- trained_policy(x)
   if (!is.list(x) || is.object(x)) {
     return(check_policy(x, arg, call))
   }
   if (!length(x)) {
     abort_argument(x, "a policy, or a list of at least one", arg, call)
   }
+  x <- lapply(x, trained_policy)
   for (i in seq_along(x)) {
     check_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
     check_one_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
   }
   policy_list(x)
+}
+
+# A training plays as the policy that it found, trainings as the policies of their seeds.
+trained_policy <- function(x) {
+  if (inherits(x, c("gym_training", "gym_rollout"))) {
+    x$policy
+  } else if (inherits(x, "gym_trainings")) {
+    lapply(x$trainings, `[[`, "policy")
+  } else {
+    x
+  }
 }
 
 # Candidates are several policies, so they are none of a list.

@@ -146,6 +146,9 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   call <- rlang::current_env()
   check_agent(agent, call)
   check_no_steps(...names(), call)
+  check_spelling(
+    ...names(), names(formals(train_agent)), !is.null(iterations) || !is.null(total_steps), call
+  )
   kwargs <- list(...)
   solved_by <- check_choice(solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
   online <- learns_online(agent)
@@ -286,6 +289,13 @@ check_training <- function(settings, call) {
   check_trained_policy(settings$policy, settings$agent, call)
   check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
+  if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
+    gym_abort(
+      c(paste0("`seed` is one whole number, not ", length(settings$seed), "."),
+        i = "`seeds` trains once with each of several seeds."),
+      class = "gym_error_argument", argument = "seed", value = settings$seed, call = call
+    )
+  }
   check_seed(settings$seed, arg = "seed", call = call)
   for (name in c("iterations", "max_steps")) {
     check_count(settings[[name]], allow_null = TRUE, arg = name, call = call)
@@ -317,6 +327,21 @@ check_no_steps <- function(names, call) {
   }
 }
 
+# An argument that is misspelt would be taken for one of the environment's own. One that only
+# resembles another may be that: it is refused where training cannot begin anyway.
+check_spelling <- function(names, choices, can_begin, call) {
+  plain <- function(x) lower_case(gsub("[._]", "", x))
+  for (name in names) {
+    near <- nearest_name(name, choices)
+    if (length(near) && (plain(near) == plain(name) || !can_begin)) {
+      gym_abort(
+        c(paste0("There is no argument `", name, "`."), i = paste0("Did you mean `", near, "`?")),
+        class = "gym_error_argument", argument = name, call = call
+      )
+    }
+  }
+}
+
 abort_no_budget <- function(hints = NULL, call) {
   gym_abort(
     c("Training needs a budget: give `iterations`, or `total_steps` of the environment.", hints),
@@ -345,6 +370,16 @@ check_agent <- function(agent, call) {
     )
   }
   if (!inherits(agent, "gym_agent")) {
-    abort_argument(agent, "an agent, as `agent_ars()` makes it", "agent", call)
+    gym_abort(
+      c(paste0("`agent` must be an agent, as `agent_ars()` makes it, not ",
+               describe_argument(agent), "."),
+        i = if (is.character(agent)) {
+          paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",
+                 "`agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables ",
+                 "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`. Others, such ",
+                 "as SAC, are left to Stable-Baselines3 or torch.")
+        }),
+      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    )
   }
 }

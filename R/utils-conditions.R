@@ -52,6 +52,10 @@ describe_value <- function(value) {
     # deparse() shows its bits.
     return(paste("the integer64", describe_value(double_from_integer64(value))))
   }
+  if (is.data.frame(value)) {
+    return(paste("of a data frame with", count_of(nrow(value), "row"), "and",
+                 count_of(ncol(value), "column")))
+  }
   text <- paste(deparse(value, width.cutoff = 60L, nlines = 3L), collapse = " ")
   if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }

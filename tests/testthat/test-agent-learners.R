@@ -25,7 +25,8 @@ started <- function(agent, table = q) {
   agent_start(agent, policy)
 }
 
-# The agent after some steps. Its learner goes on with it; `chosen` are the actions that it does next.
+# The agent after some steps. Its learner goes on with it; `chosen` are the actions that it does
+# next.
 observe <- function(agent, steps) {
   learner <- attr(agent, "learner") %||% learner_of(agent)
   basis <- agent$basis

@@ -21,3 +21,20 @@ test_that("there are as many meanings as the real environments have actions", {
     expect_identical(length(meaning), as.integer(space_width(space)), info = id)
   }
 })
+
+test_that("an action may be given by what it means, one or one for each sub-environment", {
+  env <- local_env("CartPole-v1")
+  steps <- lapply(list(1L, "push right", "1: push right"), function(action) {
+    env$reset(seed = 1)
+    env$step(action)
+  })
+  expect_identical(steps[2:3], steps[c(1, 1)])
+  cnd <- expect_error(env$step("jump"), "no action \"jump\"", class = "gym_error_space")
+  expect_match(conditionMessage(cnd), "0: push left, 1: push right", fixed = TRUE)
+  both <- local_env("CartPole-v1", num_envs = 2)
+  results <- lapply(list(c(0L, 1L), c("push left", "push right")), function(action) {
+    both$reset(seed = 1)
+    both$step(action)
+  })
+  expect_identical(results[[1]], results[[2]])
+})

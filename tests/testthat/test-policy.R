@@ -82,3 +82,18 @@ test_that("observations of another length than the environment's have no feature
   policy <- new_feature_policy(basis, matrix(0, basis$count, 2), env)
   expect_error(act(policy, c(0, 0, 0, 0)), "2 numbers", class = "gym_error_argument")
 })
+
+test_that("a training plays as its policy, trainings as the policies of their seeds", {
+  training <- structure(
+    list(policy = function(observation) rep(1L, nrow(observation))), class = "gym_training"
+  )
+  trainings <- structure(list(trainings = list(`3` = training, `4` = training)),
+                         class = "gym_trainings")
+  play <- function(policy) {
+    rollout(fake_vector_env(2), policy, episodes = 2, seed = 1, steps = TRUE)$steps
+  }
+  alone <- play(training$policy)
+  expect_identical(play(training), alone)
+  expect_identical(unique(play(trainings)$candidate), 1:2)
+  expect_identical(unique(play(list(a = training, b = policy_random()))$candidate), 1:2)
+})

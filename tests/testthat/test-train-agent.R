@@ -514,3 +514,21 @@ test_that("a large iteration gets more sub-environments, whoever else's agent ha
   own <- structure(list(population = list(1)), class = c("own", "gym_agent"))
   expect_identical(iteration_candidates(own), 0L)
 })
+
+test_that("what is misspelt, or not there, is refused with what there is", {
+  expect_error(
+    train_agent("ppo", "CartPole-v1", iterations = 1), "agent_ppo", class = "gym_error_argument"
+  )
+  expect_error(
+    train_agent(agent_cem(), "CartPole-v1", totalsteps = 10), "Did you mean `total_steps`",
+    class = "gym_error_argument"
+  )
+  expect_error(
+    search_ars("CartPole-v1", stepsize = 10), "Did you mean `step_size`",
+    class = "gym_error_argument"
+  )
+  expect_error(
+    train_agent(agent_cem(), "CartPole-v1", iterations = 1, seed = 1:3), "`seeds` trains once",
+    class = "gym_error_argument"
+  )
+})
