@@ -186,7 +186,8 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' observation, the reward 0 and neither `terminated` nor `truncated`.
 #'
 #' @inheritParams env_reset
-#' @param action An action of the action space: a whole number for Discrete, a
+#' @param action An action of the action space: a whole number for Discrete (or what it means, such
+#'   as `"push left"`, where the printed environment says that), a
 #'   numeric vector or array for Box; [space_sample()] has the table of all kinds.
 #'   In a vector environment one for each sub-environment, in the form in which [env_reset()]
 #'   returns observations: a vector for Discrete, for a Box of one dimension a matrix with a row

@@ -52,8 +52,9 @@
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of
 #'   many observations that returns as many actions: for the usual environments a function of a
 #'   matrix with an observation in each row, one for each episode that still plays, see [act()];
-#'   [as_policy()] makes one of a fitted model. Or several of them, the candidates, which are played
-#'   side by side: a list of policies, or [policy_candidates()].
+#'   [as_policy()] makes one of a fitted model. A training plays as its policy. Or several of them,
+#'   the candidates, which are played side by side: a list of policies, [policy_candidates()], or
+#'   trainings with several seeds.
 #' @param episodes How many episodes to play, with each of the candidates, a whole number of at
 #'   least 1; the default is 1.
 #' @param max_steps After how many steps to cut an episode short, a whole number of
