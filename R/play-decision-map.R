@@ -8,8 +8,9 @@
 #'
 #' - A network with one output and two actions: the output, scaled to the range from 0 to
 #'   1, which is rounded to the action; the border between the actions is at one half.
+#' - A network with the output `"softmax"` and two actions: the probability of the second one.
 #' - Any other policy with discrete actions: the action that is taken. A function is asked
-#'   as in [act()].
+#'   as in [act()]; of a network that draws it is the most likely one.
 #' - Actions that are a Box: the action, or of several numbers the one named by `action`.
 #'
 #' Where observations are Discrete the map has the action in each state, and the other arguments
@@ -208,7 +209,9 @@ decide_action <- function(place, values, outputs) {
   space <- place$action_space
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)
-  if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L && has_range(place$policy)) {
+  if (!is.null(outputs) && identical(place$policy$output, "softmax") && n == 2L) {
+    list(kind = "output", values = softmax_rows(outputs)[, 2L], actions = actions)
+  } else if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L && has_range(place$policy)) {
     unit <- unit_outputs(outputs[, 1L], output_activation(place$policy))
     list(kind = "output", values = unit, actions = actions)
   } else {
@@ -233,7 +236,7 @@ decide_value <- function(place, values, outputs, action, call) {
 # A function is called as it is while it plays.
 policy_actions <- function(place, values, outputs) {
   if (!is.null(outputs)) {
-    return(network_action(place$action_space, outputs, place$policy, one = FALSE))
+    return(network_action(place$action_space, outputs, greedy_policy(place$policy), one = FALSE))
   }
   shape <- place$observation_space$shape
   observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))

@@ -11,7 +11,8 @@ new_state_map <- function(place, call) {
   space <- place$observation_space
   states <- state_numbers(space)
   place$call <- call
-  actions <- keep_random_state(act_batch(place$policy, states, length(states), place))
+  policy <- greedy_policy(place$policy)
+  actions <- keep_random_state(act_batch(policy, states, length(states), place))
   structure(
     list(
       grid = data.frame(state = states, action = as.integer(actions)), x = "state", kind = "state",

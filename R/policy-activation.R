@@ -31,7 +31,10 @@ activate <- function(x, activation) {
     logistic = stats::plogis(x),
     identity = x,
     Gompertz = exp(-exp(-x)),
-    ReLU = pmax(x, 0),
+    ReLU = {
+      x[x < 0] <- 0
+      x
+    },
     leakyReLU = pmax(x, 0.01 * x)
   )
 }

@@ -10,19 +10,21 @@
 #'   (`NULL` for none).
 #' @noRd
 layers_of <- function(policy, weights) {
+  sizes <- policy$sizes
   bias <- isTRUE(policy$bias)
+  layers <- vector("list", length(sizes) - 1L)
   end <- 0L
-  lapply(weight_shapes(policy$sizes, FALSE), function(shape) {
-    count <- shape[[1L]] * shape[[2L]]
-    own <- weights[end + seq_len(count)]
-    dim(own) <- shape
-    end <<- end + count
-    if (!bias) {
-      return(list(weights = own))
-    }
-    end <<- end + shape[[1L]]
-    list(weights = own, bias = weights[(end - shape[[1L]] + 1L):end])
-  })
+  # A loop, as this is done anew for each minibatch.
+  for (i in seq_along(layers)) {
+    neurons <- sizes[[i + 1L]]
+    count <- neurons * sizes[[i]]
+    own <- weights[(end + 1L):(end + count)]
+    dim(own) <- c(neurons, sizes[[i]])
+    end <- end + count
+    layers[[i]] <- list(weights = own, bias = if (bias) weights[(end + 1L):(end + neurons)])
+    if (bias) end <- end + neurons
+  }
+  layers
 }
 
 #' Compute what each layer gives

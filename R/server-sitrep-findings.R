@@ -12,7 +12,7 @@ sitrep_versions <- function() {
 }
 
 # The library that multiplies matrices. R's own, which Windows has, is named by no file, or is
-# Rblas; Debian's reference is libblas itself. Measured: an update of PPO, 64 rows, two networks
+# Rblas; Debian's reference is libblas itself. Measured: an update of PPO of 64 rows, two networks
 # with two hidden layers of 64.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
   slow <- !nzchar(file) || grepl("Rblas|/blas/libblas|/libblas[.]", file)

@@ -187,3 +187,15 @@ test_that("a policy in the environment's place is told where it belongs", {
   expect_error(decision_map(policy_network()), "decision_map(policy = policy)", fixed = TRUE,
                class = "gym_error_argument")
 })
+
+test_that("a network that draws is mapped by its probabilities, or its most likely action", {
+  withr::local_seed(1)
+  before <- .Random.seed
+  softmax <- policy_network(c(2, 2), weights = list(rbind(0, c(1, -2))), output = "softmax")
+  map <- decision_map(policy = softmax, xlim = c(-1, 1), ylim = c(-1, 1), size = 5)
+  expect_equal(map$grid$output, plogis(map$grid[[1]] - 2 * map$grid[[2]]))
+  three <- policy_network(c(2, 3), weights = list(diag(3)[, 1:2]), output = "softmax")
+  map <- decision_map(policy = three, xlim = c(-1, 1), ylim = c(-1, 1), size = 5)
+  expect_identical(map$grid$action, act(three, as.matrix(map$grid[1:2]), draw = FALSE))
+  expect_identical(.Random.seed, before)
+})
