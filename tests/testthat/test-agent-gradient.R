@@ -17,6 +17,7 @@ small_policy <- function(output = NA) {
 }
 
 test_that("a training that was cut goes on bit for bit, the memory of DQN appended", {
+  skip_unless_all()
   skip_if_no_server()
   agents <- list(
     agent_reinforce(batch_steps = 200, learning_rate = schedule_linear(0.02, 0, 5000)),
@@ -184,6 +185,7 @@ test_that("agents refuse policies, spaces and settings that they cannot learn wi
 })
 
 test_that("learning CartPole reaches its goal; what was evaluated is what is returned", {
+  skip_unless_all()
   skip_if_no_server()
   trained <- suppressMessages(
     learn_reinforce("CartPole-v1", total_steps = 60000, target = 475, seed = 1)
