@@ -26,7 +26,7 @@ gradient_tasks <- list(
 out_of_reach <- 1e9
 
 # As many steps of each are timed, so that an update of LunarLander is among them.
-timed_steps <- c("CartPole-v1" = 20000, "LunarLander-v3" = 33000)
+timed_steps <- c("CartPole-v1" = 10000, "LunarLander-v3" = 33000)
 
 start_sb3 <- function() {
   if (!nzchar(Sys.getenv("GYM_SB3_PYTHON"))) {
