@@ -30,6 +30,7 @@
 #'   for a policy that has no weights to draw, such as [policy_random()].
 #' @seealso [decision_map()] shows what a network does.
 #' @rdname plot.gym_policy_network
+#' @aliases plot.gym_policy_network
 #' @exportS3Method ggplot2::autoplot
 #' @examples
 #' set.seed(1)
