@@ -16,8 +16,9 @@ grid_picture <- function(data, layers) {
 # The width of a square cell, in millimetres, where the picture is four inches wide.
 cell_width <- function(data) min(91 / data$columns, 56 / data$rows)
 
+# Without a size ggplot2 makes cells as large as they are apart.
 cell_tiles <- function(mapping = NULL, ...) {
-  ggplot2::geom_tile(mapping, ..., colour = "grey80", linewidth = 0.3)
+  ggplot2::geom_tile(mapping, ..., width = 1, height = 1, colour = "grey80", linewidth = 0.3)
 }
 
 # How large text may be in a cell, in millimetres; 0 where it could not be read.

@@ -159,13 +159,15 @@ q_of_cells <- function(x, data) {
 value_layers <- function(data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   size <- text_size(data, cells$text)
+  # Below the actions, where there are some.
+  below <- if (any(nzchar(cells$does))) 0.33 else 0
   c(
     list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
     action_layers(data, cells, above = if (size > 0) 0.12 else 0),
     if (size > 0) {
       each_ink(cells, function(cells, ink) {
         ggplot2::geom_text(
-          ggplot2::aes(label = .data$text), cells, nudge_y = -0.33, size = size, colour = ink
+          ggplot2::aes(label = .data$text), cells, nudge_y = -below, size = size, colour = ink
         )
       })
     }

@@ -45,6 +45,11 @@ test_that("cells have the values as colours and numbers, what is done as arrows,
   arrows <- do.call(rbind, layers_of(picture, "GeomSegment"))
   expect_identical(arrows$xend > arrows$x, inside$does == "right")
   expect_identical(key_of(picture), c("goal", "pit"))
+  # The two ends are three columns apart, and no wider than the other cells.
+  tiles <- do.call(rbind, lapply(layers_of(picture, "GeomTile"), function(layer) {
+    layer[c("xmin", "xmax", "ymin", "ymax")]
+  }))
+  expect_equal(unique(c(tiles$xmax - tiles$xmin, tiles$ymax - tiles$ymin)), 1)
 })
 
 test_that("Q-values are triangles at the side to which an action leads, the best in bold", {
