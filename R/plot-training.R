@@ -1,8 +1,8 @@
 #' Plot a training
 #'
 #' Shows how a training went over the steps of the environment: the range of the returns that the
-#' agent played in each iteration as a band (those of its candidates, of a learner those of its
-#' episodes), their median as a line, the mean return of the agent's own policy, where it was
+#' agent played in each iteration as a band (those of its candidates; of an agent that learns from
+#' steps those of its episodes), their median as a line, the mean return of the agent's own policy, where it was
 #' evaluated, as points, and the target as a dashed line. The final evaluation is the filled point
 #' at the end, with its interval.
 #'
@@ -33,8 +33,7 @@ autoplot.gym_training <- function(object, ...) {
   evaluations <- placed_evaluations(x)
   final <- evaluations[evaluations$kind == "final", ]
   target <- finite_target(x$target)
-  played <- if (learns_online(x$agent)) "episodes" else "candidates"
-  range <- paste("range of", played)
+  range <- paste("range of", returned_unit(x$agent))
   ggplot2::ggplot(x$history, ggplot2::aes(.data$steps)) +
     ggplot2::geom_ribbon(
       ggplot2::aes(ymin = .data$min_return, ymax = .data$max_return, colour = range),

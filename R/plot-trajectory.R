@@ -45,7 +45,6 @@ ending_colours <- c(terminated = gym_colours[["brown"]], truncated = "grey50")
 # action is one.
 panel_values <- function(data) {
   values <- data$values
-  values$value[!is.finite(values$value)] <- NA
   values$kind <- data$panels$kind[match(values$panel, data$panels$panel)]
   parts <- if (length(data$actions) > 1L) data$actions else character()
   part <- unname(parts[values$name])

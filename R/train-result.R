@@ -110,6 +110,12 @@ coef.gym_training <- function(object, ...) {
   stats::coef(object$policy)
 }
 
+# Whose returns an iteration's row is about: an agent that learns from steps plays one policy.
+returned_unit <- function(agent) {
+  by_steps <- learns_online(agent) || "trajectories" %in% agent_needs(agent)
+  if (by_steps) "episodes" else "candidates"
+}
+
 #' @export
 summary.gym_training <- function(object, ...) {
   structure(list(training = object), class = "summary.gym_training")
@@ -127,8 +133,7 @@ print.summary.gym_training <- function(x, ...) {
   several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
   cat(
     "",
-    paste0(if (learns_online(training$agent)) "The episodes" else "The candidates",
-           " of the last iteration: mean return ", number_text(last$mean_return), ", from ",
+    paste0("The ", returned_unit(training$agent), " of the last iteration: mean return ", number_text(last$mean_return), ", from ",
            number_text(last$min_return), " to ", number_text(last$max_return)),
     if (length(stopping$iteration)) {
       paste0("Stopping evaluation", several, ": ",

@@ -18,7 +18,7 @@ test_that("the picture has the mean returns in their places, and the target's li
   field <- layers_of(picture, "GeomRaster")[[1]]
   expect_identical(order(field$y, field$x), 1:9)
   lightness <- grDevices::convertColor(t(grDevices::col2rgb(field$fill)) / 255, "sRGB", "Lab")[, 1]
-  expect_identical(order(lightness), 1:9)
+  expect_true(all(diff(lightness) > 0))
   lines <- layers_of(picture, "GeomContour")
   expect_identical(unique(lines[[2]]$level), 6.5)
   expect_identical(key_of(picture), c("best policy", "target 6.5"))

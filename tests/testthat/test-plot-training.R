@@ -27,6 +27,8 @@ test_that("a learner has no candidates, and no key has a target that is not ther
   expect_identical(key_of(drawn(autoplot(learned))),
                    c("range of episodes", "their median", "the policy"))
   expect_length(layers_of(autoplot(trained_in_fake(target = Inf)), "GeomHline"), 0)
+  by_gradients <- train_agent(agent_reinforce(), fake_environment(), iterations = 2, seed = 1)
+  expect_identical(key_of(autoplot(by_gradients))[[1]], "range of episodes")
 })
 
 test_that("a training without an iteration is refused", {
