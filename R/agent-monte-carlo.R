@@ -21,6 +21,14 @@
 #' @param exploring_starts Draw the first action of each episode? `FALSE`, the default, or `TRUE`.
 #' @param learning_rate `NULL`, the default, for the mean of all returns, each of which counts the
 #'   same; a number from 0 to 1, or a function of the steps so far, lets later ones count more.
+#' @param importance `"none"`, the default, learns the values of what it does itself, exploring.
+#'   `"weighted"` and `"ordinary"` learn those of a policy that does not explore from episodes of
+#'   one that does, by importance sampling (off-policy learning; sections 5.5 to 5.7): of
+#'   `target_policy`, or without one of the best policy so far. Weighted returns are the mean of
+#'   those whose actions the policy might have taken, and every visit counts.
+#' @param target_policy The policy whose values are learned with `importance`, a [policy_table()];
+#'   what plays is the same, but explores with `epsilon`: with 1 it is a random policy. `NULL`, the
+#'   default, for the best policy so far.
 #' @return `agent_monte_carlo()` an agent of class `gym_agent_monte_carlo`; `learn_monte_carlo()`
 #'   makes that agent, trains it and returns what [train_agent()] does.
 #' @inheritSection agent_q Errors
@@ -34,27 +42,63 @@
 #' learn_monte_carlo("Blackjack-v1", iterations = 10, discount = 1, seed = 1, sab = TRUE)
 agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
                               visits = c("first", "every"), exploring_starts = FALSE,
-                              learning_rate = NULL, mask = NULL) {
+                              learning_rate = NULL, mask = NULL,
+                              importance = c("none", "weighted", "ordinary"),
+                              target_policy = NULL) {
+  importance <- check_choice(
+    importance[1L], c("none", "weighted", "ordinary"), arg = "importance"
+  )
+  check_importance(importance, target_policy, temperature, exploring_starts, learning_rate)
   visits <- check_choice(visits[1L], c("first", "every"), arg = "visits")
   check_flag(exploring_starts)
   settings <- list(
     discount = discount, learning_rate = learning_rate, epsilon = epsilon,
     temperature = temperature, initial = initial, features = NULL, visits = visits,
-    exploring_starts = exploring_starts, mask = mask
+    exploring_starts = exploring_starts, mask = mask, importance = importance,
+    learns = target_policy
   )
   check_learner(settings[!vapply(settings, is.null, NA)])
   new_learner("gym_agent_monte_carlo", settings)
 }
 
+check_importance <- function(importance, target_policy, temperature, exploring_starts,
+                             learning_rate, call = rlang::caller_env()) {
+  if (importance == "none") {
+    if (!is.null(target_policy)) {
+      gym_abort(
+        "`target_policy` is learned from other episodes than its own: give `importance`, too.",
+        class = "gym_error_argument", argument = "target_policy", value = target_policy,
+        call = call
+      )
+    }
+    return()
+  }
+  if (!is.null(target_policy) && !inherits(target_policy, "gym_policy_table")) {
+    must <- "a table, whose probabilities are known, or NULL"
+    abort_argument(target_policy, must, "target_policy", call)
+  }
+  if (!is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)) {
+    gym_abort(
+      paste("`importance` is for `epsilon`: leave out `temperature`, `exploring_starts` and",
+            "`learning_rate`."),
+      class = "gym_error_argument", argument = "importance", value = importance, call = call
+    )
+  }
+}
+
 #' @export
 agent_start.gym_agent_monte_carlo <- function(agent, policy) {
   agent <- NextMethod()
+  if (!is.null(agent$learns)) agent$learns <- policy_bind(agent$learns, policy)
   agent$visited <- array(0, dim(agent$weights))
   agent
 }
 
 #' @exportS3Method
 learner_of.gym_agent_monte_carlo <- function(agent) {
+  if (agent$importance != "none") {
+    return(off_policy_steps(agent))
+  }
   learning <- learning_of(agent)
   row <- learning$store$row
   choose <- learning$choose
@@ -93,6 +137,88 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
       }
     )
   )
+}
+
+#' Learn from episodes of a policy that explores the values of one that does not
+#'
+#' A return counts as much as the policy is more likely to take the actions after its own (Sutton
+#' and Barto 2018, section 5.7). How likely actions were is what they were when they were taken.
+#' @noRd
+off_policy_steps <- function(agent) {
+  learning <- learning_of(agent)
+  store <- learning$store
+  draw <- learning$uniform$draw
+  taken <- agent$taken
+  weight_of <- agent$visited
+  weighted <- agent$importance == "weighted"
+  discount <- agent$discount
+  epsilon <- rate_of(agent$epsilon, "epsilon")
+  target <- target_probabilities(agent, store$row)
+  ratios <- for_each_sub_env(new_episode)
+  episodes <- for_each_sub_env(new_episode)
+  act <- function(x, sub_env) {
+    wanted <- target(x)
+    possible <- store$row(x) > -Inf
+    explores <- epsilon(taken)
+    plays <- (1 - explores) * wanted + explores * possible / sum(possible)
+    column <- draw_place(plays, draw())
+    ratios(sub_env)$add(0L, 0L, wanted[[column]] / plays[[column]])
+    column
+  }
+  learn <- function(episode, ratio) {
+    cell <- store$cells(episode$x, episode$column)
+    returns <- discounted_returns(episode$reward, discount)
+    weight <- 1
+    for (i in rev(seq_along(cell))) {
+      at <- cell[[i]]
+      counts <- if (weighted) weight else 1
+      if (counts > 0) {
+        weight_of[[at]] <<- weight_of[[at]] + counts
+        goal <- if (weighted) returns[[i]] else weight * returns[[i]]
+        store$toward(episode$x[[i]], episode$column[[i]], goal, counts / weight_of[[at]])
+      }
+      weight <- weight * ratio[[i]]
+    }
+  }
+  new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) act(x, sub_env),
+    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
+      episode <- episodes(sub_env)
+      episode$add(x, column, reward)
+      taken <<- taken + 1
+      if (ended) {
+        learn(episode$take(), ratios(sub_env)$take()$reward)
+        NA_integer_
+      } else {
+        act(after, sub_env)
+      }
+    },
+    export = function(agent) {
+      agent$taken <- taken
+      agent$visited <- weight_of
+      agent
+    }
+  )
+}
+
+# How likely the policy that is learned about takes each action, a function of a state.
+target_probabilities <- function(agent, row) {
+  if (is.null(agent$learns)) {
+    return(function(x) {
+      values <- row(x)
+      replace(numeric(length(values)), which.max(values), 1)
+    })
+  }
+  q <- agent$learns$q
+  q[row_max(q) == -Inf, ] <- 0
+  probabilities <- row_probabilities(agent$learns, q)
+  function(x) probabilities[x, ]
+}
+
+#' @export
+agent_policy.gym_agent_monte_carlo <- function(agent) {
+  if (is.null(agent$learns)) NextMethod() else agent$learns
 }
 
 # The policy that plays an iteration. Of actions with equal values one is drawn for it.
@@ -197,8 +323,12 @@ discounted_returns <- function(rewards, discount, episode = rep(1L, length(rewar
 
 #' @export
 format.gym_agent_monte_carlo <- function(x, ...) {
-  name <- paste0("Monte Carlo (", x$visits, " visits",
-                 if (x$exploring_starts) ", exploring starts", ")")
+  how <- if (x$importance == "none") {
+    paste0(x$visits, " visits", if (x$exploring_starts) ", exploring starts")
+  } else {
+    paste(x$importance, "importance sampling")
+  }
+  name <- paste0("Monte Carlo (", how, ")")
   learner_text(name, x)
 }
 
@@ -207,6 +337,8 @@ format.gym_agent_monte_carlo <- function(x, ...) {
 learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target = NULL,
                               episodes = 10, discount = 0.99, epsilon = 0.1, temperature = NULL,
                               initial = 0, visits = c("first", "every"), exploring_starts = FALSE,
-                              learning_rate = NULL, mask = NULL, ...) {
+                              learning_rate = NULL, mask = NULL,
+                              importance = c("none", "weighted", "ordinary"),
+                              target_policy = NULL, ...) {
   make_and_train("agent_monte_carlo", rlang::current_env(), ...)
 }

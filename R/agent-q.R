@@ -24,14 +24,18 @@
 #' @param temperature The temperature of softmax exploration, in place of `epsilon`, a number above
 #'   0 or a function of the steps so far; `NULL`, the default, for none. See [policy_table()].
 #' @param initial The value that all actions have at first, a number; a large one makes it try
-#'   everything ("optimistic"). The default is 0. With features of a function all weights are 0 at
-#'   first.
+#'   everything ("optimistic"). The default is 0. With features of a function it is the first weight
+#'   of all of them, or a number for each.
 #' @param features `NULL`, the default, for a table with a row for each state; what [tile_coding()]
 #'   makes; or a function of a batch of observations that returns a numeric matrix with a row of
 #'   features for each.
 #' @param double Double Q-learning? `FALSE`, the default, or `TRUE`.
 #' @param planning How many remembered steps to learn from after each real one, a whole number;
 #'   tables only. The default is 0.
+#' @param bonus What planning adds to the reward of an action that was last taken k steps ago, times
+#'   the square root of k (Dyna-Q+; section 8.3), a number such as 0.001. Actions that were never
+#'   taken in a state that was seen are planned with, too, as if they stayed there for no reward.
+#'   The default is 0, for none.
 #' @param mask The name of the element of the environment's info that says which actions can be
 #'   taken, such as `"action_mask"` of Taxi: a number for each action, 0 for one that must not be.
 #'   What it forbids at an observation is never taken there again, and its value is `-Inf`; tables
@@ -59,15 +63,23 @@
 #' learned <- learn_q("FrozenLake-v1", iterations = 20, seed = 1, is_slippery = FALSE, initial = 1)
 #' learned
 agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                    initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL) {
+                    initial = 0, features = NULL, double = FALSE, planning = 0, bonus = 0,
+                    mask = NULL) {
   check_flag(double)
   check_count(planning, min = 0)
+  check_number(bonus, min = 0)
   settings <- list(
     discount = discount, learning_rate = learning_rate, epsilon = epsilon,
     temperature = temperature, initial = initial, features = features, double = double,
-    planning = as.integer(planning), mask = mask
+    planning = as.integer(planning), bonus = bonus, mask = mask
   )
   check_learner(settings)
+  if (bonus > 0 && planning == 0) {
+    gym_abort(
+      "`bonus` is added to the rewards of planning: give `planning`, too.",
+      class = "gym_error_argument", argument = "bonus", value = bonus
+    )
+  }
   if (planning > 0 && (double || !is.null(features))) {
     gym_abort(
       "`planning` is for a single table, not for features or double Q-learning.",
@@ -104,7 +116,7 @@ learner_of.gym_agent_q <- function(agent) {
       learn(x, column, reward, ahead, ended, sub_env, taken)
       taken <<- taken + 1
       if (!is.null(memory)) {
-        memory$remember(x, column, reward, after, terminated)
+        memory$remember(x, column, reward, after, terminated, taken)
         # No steps of the environment: schedules stay where they are.
         memory$plan(taken)
       }
@@ -160,38 +172,53 @@ double_steps <- function(agent) {
 #'   agent keeps it.
 #' @noRd
 new_planning_memory <- function(agent, store) {
-  draw <- NULL
   rows <- nrow(agent$weights)
   columns <- ncol(agent$weights)
   count <- length(agent$memory$pair)
   pairs <- agent$memory$pair
   outcome <- agent$memory$outcome
-  if (is.null(outcome)) outcome <- matrix(NA_real_, rows * columns, 3L)
+  if (is.null(outcome)) outcome <- matrix(NA_real_, rows * columns, 4L)
   reward <- outcome[, 1L]
   led_to <- outcome[, 2L]
   over <- outcome[, 3L]
+  tried <- outcome[, 4L]
+  bonus <- agent$bonus
+  enter <- function(pair, won, after, terminated, taken) {
+    if (is.na(reward[[pair]])) {
+      count <<- count + 1L
+      pairs[[count]] <<- pair
+    }
+    reward[[pair]] <<- won
+    led_to[[pair]] <<- after
+    over[[pair]] <<- terminated
+    tried[[pair]] <<- taken
+  }
   discount <- agent$discount
   rate <- rate_of(agent$learning_rate)
   list(
-    remember = function(x, column, won, after, terminated) {
-      pair <- x + rows * (column - 1L)
-      if (is.na(reward[[pair]])) {
-        count <<- count + 1L
-        pairs[[count]] <<- pair
+    remember = function(x, column, won, after, terminated, taken) {
+      if (bonus > 0) {
+        for (other in which(store$row(x) > -Inf)) {
+          pair <- x + rows * (other - 1L)
+          # As if it had been tried when the training began.
+          if (is.na(reward[[pair]])) enter(pair, 0, x, FALSE, 0)
+        }
       }
-      reward[[pair]] <<- won
-      led_to[[pair]] <<- after
-      over[[pair]] <<- terminated
+      enter(x + rows * (column - 1L), won, after, terminated, taken)
     },
     plan = function(taken) {
       rate <- rate(taken)
       for (pair in pairs[sample.int(count, agent$planning, replace = TRUE)]) {
         ahead <- if (over[[pair]] == 1) 0 else max(store$row(led_to[[pair]]))
         x <- (pair - 1L) %% rows + 1L
-        store$toward(x, (pair - 1L) %/% rows + 1L, reward[[pair]] + discount * ahead, rate)
+        won <- reward[[pair]]
+        if (bonus > 0) won <- won + bonus * sqrt(taken - tried[[pair]])
+        store$toward(x, (pair - 1L) %/% rows + 1L, won + discount * ahead, rate)
       }
     },
-    get = function() list(pair = pairs, outcome = cbind(reward, led_to, over, deparse.level = 0))
+    get = function() {
+      list(pair = pairs, outcome = cbind(reward, led_to, over, tried, deparse.level = 0))
+    }
   )
 }
 
@@ -202,14 +229,20 @@ action_weights.gym_agent_q <- function(agent) {
 
 #' @export
 format.gym_agent_q <- function(x, ...) {
-  name <- if (x$double) "Double Q-learning" else if (x$planning > 0L) "Dyna-Q" else "Q-learning"
-  learner_text(name, x, if (x$planning > 0L) list(planning = x$planning))
+  plans <- x$planning > 0L
+  curious <- plans && x$bonus > 0
+  name <- if (x$double) "Double Q-learning" else if (plans) "Dyna-Q" else "Q-learning"
+  learner_text(
+    paste0(name, if (curious) "+"), x,
+    c(if (plans) list(planning = x$planning), if (curious) list(bonus = x$bonus))
+  )
 }
 
 #' @rdname agent_q
 #' @export
 learn_q <- function(env, iterations = NULL, total_steps = NULL, target = NULL, episodes = 10,
                     discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                    initial = 0, features = NULL, double = FALSE, planning = 0, mask = NULL, ...) {
+                    initial = 0, features = NULL, double = FALSE, planning = 0, bonus = 0,
+                    mask = NULL, ...) {
   make_and_train("agent_q", rlang::current_env(), ...)
 }

@@ -7,7 +7,12 @@
 #'
 #' @inheritParams agent_sarsa
 #' @param policy The policy whose values are learned, and which plays: any that [rollout()] plays.
-#' @param initial The value that all states have at first, a number; the default is 0.
+#' @param initial The value that all states have at first, a number; the default is 0. With features
+#'   of a function the first weight of all features, or a number for each.
+#' @param behavior Another policy, which plays in the place of `policy`: then each step counts as
+#'   many times as much as `policy` is more likely to act so (off-policy learning by importance
+#'   sampling; sections 5.5 and 11.1). Both must say how likely their actions are: a
+#'   [policy_table()] or a [policy_random()]. `NULL`, the default, for none.
 #' @param iterations,total_steps The budget, as for [train_agent()]. An iteration are `episodes`
 #'   episodes.
 #' @param target The mean return at which training ends; the default is none, as learning values has
@@ -27,13 +32,15 @@
 #' learned <- learn_td(walk, policy_random(), iterations = 50, discount = 1, seed = 1)
 #' rbind(learned = state_values(learned), exact = solve_mdp(walk, policy_random())$values)
 agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL,
-                     n = 1, lambda = 0) {
+                     n = 1, lambda = 0, behavior = NULL) {
   check_policy(policy)
   check_one_policy(policy, "policy", rlang::current_env())
   check_count(n)
   check_number(lambda, min = 0, max = 1)
+  if (!is.null(behavior)) check_behavior(policy, behavior, n, lambda)
   settings <- list(
-    plays = policy, discount = discount, learning_rate = learning_rate, initial = initial,
+    plays = behavior %||% policy, learns = if (!is.null(behavior)) policy, discount = discount,
+    learning_rate = learning_rate, initial = initial,
     features = features, n = as.integer(n), lambda = lambda
   )
   check_learner(settings)
@@ -41,10 +48,28 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   new_learner("gym_agent_td", settings)
 }
 
+# Both must say how likely they act so, and what counts is one step.
+check_behavior <- function(policy, behavior, n, lambda, call = rlang::caller_env()) {
+  for (arg in c("policy", "behavior")) {
+    value <- get(arg)
+    if (!inherits(value, c("gym_policy_table", "gym_policy_random"))) {
+      must <- "a table or a random policy, whose probabilities are known"
+      abort_argument(value, must, arg, call)
+    }
+  }
+  if (n > 1 || lambda > 0) {
+    gym_abort(
+      "`behavior` is for one step: leave out `n` and `lambda`.",
+      class = "gym_error_argument", argument = "behavior", value = behavior, call = call
+    )
+  }
+}
+
 #' @export
 agent_start.gym_agent_td <- function(agent, policy) {
   agent <- NextMethod()
   agent$plays <- policy_bind(agent$plays, policy)
+  if (!is.null(agent$learns)) agent$learns <- policy_bind(agent$learns, policy)
   agent
 }
 
@@ -56,14 +81,25 @@ value_columns_of.gym_agent_td <- function(agent) 1L
 learner_of.gym_agent_td <- function(agent) {
   learning <- learning_of(agent)
   value <- learning$store$row
-  learn <- learning$learn
   act <- policy_chooser(agent, learning$uniform$draw)
-  asked <- is.null(chooser_probabilities(agent))
+  ratio <- if (!is.null(agent$learns)) importance_ratio(agent)
+  learn <- if (is.null(ratio)) learning$learn else weighted_lookahead(agent, learning$store)
   taken <- agent$taken
-  new_steps(
-    agent, learning, begin = act,
+  from <- list()
+  steps <- new_steps(
+    agent, learning,
+    begin = function(x, sub_env, observation) {
+      if (!is.null(ratio)) from[[sub_env]] <<- observation
+      act(x, sub_env, observation)
+    },
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
-      learn(x, 1L, reward, if (terminated) 0 else value(after), ended, sub_env, taken)
+      ahead <- if (terminated) 0 else value(after)
+      if (is.null(ratio)) {
+        learn(x, 1L, reward, ahead, ended, sub_env, taken)
+      } else {
+        learn(x, reward, ahead, ratio(from[[sub_env]], column), taken)
+        from[[sub_env]] <<- observation
+      }
       taken <<- taken + 1
       if (ended) NA_integer_ else act(after, sub_env, observation)
     },
@@ -71,8 +107,45 @@ learner_of.gym_agent_td <- function(agent) {
       agent$taken <- taken
       agent
     },
-    act = if (asked) function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
+    act = if (is.null(chooser_probabilities(agent))) {
+      function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
+    }
   )
+  steps$sees <- !is.null(ratio)
+  steps
+}
+
+# How much more likely the policy that is learned about acts so than the one that plays: a function
+# of an observation, a batch of one, and the number of an action.
+importance_ratio <- function(agent) {
+  space <- agent$spaces$observation_space
+  index <- table_index(space, "observations", NULL)$index
+  target <- state_probabilities(agent, agent$learns)
+  plays <- state_probabilities(agent, agent$plays)
+  function(observation, column) {
+    row <- index(observation, 1L)
+    target(row, column) / plays(row, column)
+  }
+}
+
+state_probabilities <- function(agent, policy) {
+  agent$plays <- policy
+  agent["features"] <- list(NULL)
+  probabilities <- chooser_probabilities(agent)
+  if (is.matrix(probabilities)) {
+    sums <- rowSums(probabilities)
+    function(row, column) probabilities[[row, column]] / sums[[row]]
+  } else {
+    function(row, column) probabilities[[column]] / sum(probabilities)
+  }
+}
+
+weighted_lookahead <- function(agent, store) {
+  rate <- rate_of(agent$learning_rate)
+  discount <- agent$discount
+  function(x, reward, ahead, ratio, taken) {
+    store$toward(x, 1L, reward + discount * ahead, ratio * rate(taken))
+  }
 }
 
 #' Make the function by which a given policy acts, one observation at a time
@@ -117,11 +190,12 @@ chooser_probabilities <- function(agent) {
 }
 
 #' @export
-agent_policy.gym_agent_td <- function(agent) agent$plays
+agent_policy.gym_agent_td <- function(agent) agent$learns %||% agent$plays
 
 #' @export
 format.gym_agent_td <- function(x, ...) {
   name <- if (x$lambda > 0) "TD(lambda)" else if (x$n > 1L) paste0(x$n, "-step TD") else "TD"
+  if (!is.null(x$learns)) name <- paste("Off-policy", name)
   learner_text(name, x, if (x$lambda > 0) list(lambda = x$lambda))
 }
 
@@ -129,6 +203,6 @@ format.gym_agent_td <- function(x, ...) {
 #' @export
 learn_td <- function(env, policy, iterations = NULL, total_steps = NULL, episodes = 10,
                      discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL, n = 1,
-                     lambda = 0, target = Inf, ...) {
+                     lambda = 0, behavior = NULL, target = Inf, ...) {
   make_and_train("agent_td", rlang::current_env(), ...)
 }

@@ -37,13 +37,14 @@ least_trace <- 1e-8
 #' Replacing traces for tables and tiles, accumulating ones for a user's features (Sutton and Barto
 #' 2018, sections 12.2 and 12.7).
 #' @param decay By how much a trace fades with each step.
+#' @param sparse Whether features are 1 or 0, so that small traces can be left out.
 #' @return A list of functions: `pass(cells, gradient, by)`, which enters these weights and moves
 #'   all that have a trace by `by` times that, and `clear()`, for the end of an episode.
 #' @noRd
-new_trace <- function(store, decay, replacing) {
+new_trace <- function(store, decay, replacing, sparse = replacing) {
   strength <- numeric()
   active <- numeric()
-  least <- if (replacing) least_trace else 0
+  least <- if (sparse) least_trace else 0
   list(
     pass = function(cells, gradient, by) {
       faded <- decay * strength[active]

@@ -21,7 +21,7 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   if (!is.null(settings$temperature)) {
     check_schedule(settings$temperature, "temperature", lowest_temperature, Inf, call)
   }
-  check_number(settings$initial, arg = "initial", call = call)
+  check_initial(settings, call)
   features <- settings$features
   if (!is.null(features) && !is.function(features) && !inherits(features, "gym_features")) {
     must <- "NULL, what `tile_coding()` makes, or a function of observations"
@@ -34,6 +34,16 @@ check_learner <- function(settings, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "mask", value = settings$mask, call = call
     )
   }
+}
+
+# With features of a function it may be a number for each.
+check_initial <- function(settings, call) {
+  initial <- plain_numbers(settings$initial, "initial", call)
+  several <- is.function(settings$features) && length(initial) > 1L
+  if (several && !(is.numeric(initial) && all(is.finite(initial)))) {
+    abort_argument(initial, "finite numbers", "initial", call)
+  }
+  if (!several) check_number(initial, arg = "initial", call = call)
 }
 
 # Beginning ---------------------------------------------------------------------------
@@ -274,13 +284,17 @@ rate_of <- function(rate, name = "learning_rate") {
 
 #' @export
 agent_policy.gym_value_learner <- function(agent) {
+  weights_policy(agent, value_columns_of(agent))
+}
+
+weights_policy <- function(agent, columns) {
   weights <- action_weights(agent)
   if (is.null(agent$features)) {
     policy <- policy_table(weights)
     policy[c("observation_space", "action_space")] <- agent$spaces
     policy
   } else {
-    weights <- weights %||% matrix(0, 0L, value_columns_of(agent))
+    weights <- weights %||% matrix(0, 0L, columns)
     new_feature_policy(agent$basis, weights, agent$spaces)
   }
 }
@@ -290,11 +304,15 @@ agent_policy.gym_value_learner <- function(agent) {
 #' Get the values that were learned
 #'
 #' @param x What `learn_q()` and the others returned, or their agent.
-#' @return A numeric vector with an element for each state, in the order of the table's rows: the
-#'   value of its best action, or, from [learn_td()], that of the state. The elements are named by
-#'   the numbers of the states where observations are Discrete. States that were never left, such as
-#'   ends, have the value that all had at first.
-#' @section Errors: `gym_error_argument` for what was not learned by a table.
+#' @param actions Get the value of each action? `FALSE`, the default, or `TRUE`.
+#' @return Where observations are Discrete, a numeric vector with an element for each state, named
+#'   by its number: the value of its best action, or, from [learn_td()], that of the state. Where
+#'   they have several parts, as those of Blackjack, a data frame with a column for each part, under
+#'   its name, and `value`. With `actions = TRUE` a data frame with a row for each state and action:
+#'   the column `state`, or one for each part, `action` (its number) and `value`. States that were
+#'   never left, such as ends, have the value that all had at first.
+#' @section Errors: `gym_error_argument` for what was not learned by a table, nor by features of
+#'   Discrete observations.
 #' @export
 #' @examples
 #' walk <- gym_model(data.frame(
@@ -303,17 +321,46 @@ agent_policy.gym_value_learner <- function(agent) {
 #' ), start = 1)
 #' learned <- learn_td(walk, policy_random(), iterations = 50, seed = 1)
 #' state_values(learned)
-state_values <- function(x) {
+state_values <- function(x, actions = FALSE) {
+  check_flag(actions)
   agent <- if (inherits(x, "gym_training")) x$agent else x
-  if (!inherits(agent, "gym_value_learner") || is.null(agent$weights) ||
-        !is.null(agent$features)) {
+  space <- if (inherits(agent, "gym_value_learner")) agent$spaces$observation_space
+  discrete <- inherits(space, "gym_space_discrete")
+  if (is.null(space) || is.null(agent$weights) || !is.null(agent$features) && !discrete) {
     must <- "what was learned by a table, as `learn_q()` returns it"
     abort_argument(x, must, "x", rlang::current_env())
   }
-  values <- row_max(action_weights(agent))
-  space <- agent$spaces$observation_space
-  if (inherits(space, "gym_space_discrete")) names(values) <- state_numbers(space)
-  values
+  q <- value_table(agent)
+  if (actions) {
+    states <- all_values(space)
+    row <- rep(seq_len(nrow(q)), each = ncol(q))
+    numbers <- state_numbers(agent$spaces$action_space)[seq_len(ncol(q))]
+    return(data.frame(
+      states[row, , drop = FALSE], action = rep(numbers, nrow(q)), value = as.vector(t(q)),
+      row.names = NULL
+    ))
+  }
+  # Of a policy that was given, over what it does.
+  values <- if (is.null(agent$learns) || ncol(q) == 1L) {
+    row_max(q)
+  } else {
+    mean_values(q, row_probabilities(agent$learns, agent$learns$q))
+  }
+  if (discrete) {
+    stats::setNames(values, state_numbers(space))
+  } else {
+    data.frame(all_values(space), value = values)
+  }
+}
+
+# The values of the actions in each state.
+value_table <- function(agent) {
+  weights <- action_weights(agent)
+  if (is.null(agent$features)) {
+    return(weights)
+  }
+  states <- state_numbers(agent$spaces$observation_space)
+  linear_values(agent$basis, weights, agent$basis$of(states, length(states)))
 }
 
 # The table of values that the greedy policy is by.

@@ -17,6 +17,11 @@
 #' make no difference. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake,
 #' CliffWalking or Taxi.
 #'
+#' Where observations have several parts with few values each, as those of Blackjack, the map has
+#' the action in each state, and of a table its value; `x` and `y` are the first two parts unless
+#' others are named, `at` holds a part still, and each value of any other part has a panel of its
+#' own: `plot(decision_map("Blackjack-v1", policy, "dealer_card", "player_sum"))`.
+#'
 #' # Ranges
 #'
 #' `xlim` and `ylim` where they are given. Otherwise CartPole's parts have the ranges in
@@ -56,7 +61,8 @@
 #'       names, and `output` (double, from 0 to 1, where `kind` is `"output"`) or `action`
 #'       (integer or double). `as.data.frame()` gives it.}
 #'     \item{x, y}{The names of the two parts, strings.}
-#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"` or `"state"`.}
+#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"`, `"state"` or
+#'       `"parts"`. A map of parts has `panels`, too, the names of the parts on no axis.}
 #'     \item{at}{Where the other parts are held, a named numeric vector.}
 #'     \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
 #'     \item{actions}{The names of the actions, strings; of a Box the name of the number.}
@@ -106,7 +112,12 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   check_seed(seed)
   place <- mapped_place(env, policy, client)
   if (inherits(place$observation_space, "gym_space_discrete")) {
+    check_discrete_actions(place, rlang::current_env())
     return(new_state_map(place, rlang::current_env()))
+  }
+  if (is_counted_parts(place$observation_space)) {
+    check_discrete_actions(place, rlang::current_env())
+    return(new_parts_map(place, x, y, xlim, ylim, plain_numbers(at), rlang::current_env()))
   }
   observed <- mapped_observation(place)
   axes <- mapped_axes(observed, x, y)
@@ -135,6 +146,11 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
     ),
     class = "gym_decision_map"
   )
+}
+
+# Several numbers, each of which has few values, as those of Blackjack.
+is_counted_parts <- function(space) {
+  !is.null(space) && !is.null(space_index(space)) && length(digit_values(space)) > 1L
 }
 
 check_mappable <- function(policy, call = rlang::caller_env()) {

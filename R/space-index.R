@@ -103,6 +103,54 @@ rows_of_table <- function(index, space, observation, n, call) {
 # The numbers of a Discrete's values, in order.
 state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
 
+#' List all values of a space that can be counted
+#' @return A data frame with a row for each, in the order of its numbers, and a column for each
+#'   number of a value, under the name of this part: `state` for a Discrete.
+#' @noRd
+all_values <- function(space) {
+  columns <- digit_values(space)
+  if (inherits(space, "gym_space_discrete")) {
+    names(columns) <- "state"
+  } else {
+    names(columns) <- space$names %||% names(space$spaces) %||% paste0("obs_", seq_along(columns))
+  }
+  # The last one changes first.
+  rev(do.call(expand.grid, c(rev(columns), KEEP.OUT.ATTRS = FALSE)))
+}
+
+# A list of the values that each number of a value has.
+digit_values <- function(space) {
+  if (inherits(space, "gym_space_discrete")) {
+    list(state_numbers(space))
+  } else if (inherits(space, "gym_space_multidiscrete")) {
+    # Row by row, as its table is.
+    Map(function(first, n) as.integer(first + seq_len(n) - 1), as.vector(space$start %||% 0),
+        as.vector(space$nvec))
+  } else if (inherits(space, "gym_space_multibinary")) {
+    rep(list(0:1), prod(space$shape))
+  } else {
+    unlist(lapply(unname(space$spaces), digit_values), recursive = FALSE)
+  }
+}
+
+#' Make a batch of values of a space from the table of their numbers
+#' @param columns A data frame as [all_values()] returns it.
+#' @noRd
+values_batch <- function(space, columns) {
+  if (inherits(space, "gym_space_discrete")) {
+    return(columns[[1L]])
+  }
+  if (!has_parts(space)) {
+    return(unname(as.matrix(columns)))
+  }
+  sizes <- vapply(space$spaces, function(part) length(digit_values(part)), 0L)
+  part <- rep(seq_along(sizes), sizes)
+  batches <- lapply(seq_along(sizes), function(i) {
+    values_batch(space$spaces[[i]], columns[part == i])
+  })
+  stats::setNames(batches, space$names %||% names(space$spaces))
+}
+
 # The index of a space that a table is to have rows for.
 table_index <- function(space, what, call) {
   index <- space_index(space)

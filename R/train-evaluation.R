@@ -5,9 +5,6 @@
 # has seen, and the final one none that any has.
 last_training_seed <- 2^30
 
-# How many episodes make a point of the learning curve.
-curve_episodes <- 10L
-
 draw_training_seeds <- function(n) sample.int(last_training_seed, n, replace = TRUE)
 
 #' Does training end after the last iteration, because the target is reached?
@@ -20,8 +17,8 @@ training_ends <- function(state, vector_env, settings) {
   if (settings$search) {
     return(state$solved <- reached)
   }
-  if (!reached && state$iteration %% settings$eval_every == 0) {
-    episodes <- min(curve_episodes, settings$eval_episodes)
+  episodes <- min(settings$curve_episodes, settings$eval_episodes)
+  if (!reached && episodes > 0 && state$iteration %% settings$eval_every == 0) {
     curve <- evaluate_agent(state, vector_env, settings, "curve", episodes)
     reached <- reaches(curve$mean_return, settings$target)
   }

@@ -133,7 +133,8 @@ learn_episodes <- function(state, vector_env, settings, call) {
 
 # Whether a learner learns between episodes, and nothing but a policy is needed to play them.
 plays_whole <- function(agent) {
-  inherits(agent, "gym_agent_monte_carlo") && !agent$exploring_starts && is.null(agent$mask)
+  inherits(agent, "gym_agent_monte_carlo") && !agent$exploring_starts && is.null(agent$mask) &&
+    agent$importance == "none"
 }
 
 # Whether the server's processes play whole episodes for a learner.

@@ -11,7 +11,8 @@
 #'   where a policy acts that must be asked about all sub-environments together, else `NULL`;
 #'   `whole`, of a learner that learns between episodes, a list of the functions `policy()`, with
 #'   which the next episodes can be played, and `learn(x, column, reward, episode)`, of all steps;
-#'   `export()`, the agent as it is now; `forbid(x, forbidden)`, after which these actions are never
+#'   `sees`, whether both must get the observation, which else may be `NULL`; `export()`, the agent
+#'   as it is now; `forbid(x, forbidden)`, after which these actions are never
 #'   taken, and which returns the values; `renew()`, before an iteration, as [uniform_draws()] has
 #'   it, and `uniform()`, which draws.
 #' @noRd
@@ -146,6 +147,7 @@ model_world <- function(model, basis, draw) {
 #' @noRd
 side_by_side <- function(learner, agent, call) {
   basis <- agent$basis
+  space <- agent$spaces$observation_space
   first <- as.integer(agent$spaces$action_space$start) - 1L
   pick <- if (identical(basis$each, 1L)) {
     function(present, i) present[[i]]
@@ -163,8 +165,10 @@ side_by_side <- function(learner, agent, call) {
       } else {
         learner$act(observation, n) - first
       }
-      for (i in which(is.na(column))) {
-        column[[i]] <<- learner$begin(pick(present, i), sub_env[[i]], NULL)
+      for (i in which(is.na(next_column[sub_env]))) {
+        seen <- if (isTRUE(learner$sees)) batch_rows(space, observation, i)
+        begun <- learner$begin(pick(present, i), sub_env[[i]], seen)
+        if (is.na(column[[i]])) column[[i]] <<- begun
       }
       column + first
     },
@@ -176,11 +180,19 @@ side_by_side <- function(learner, agent, call) {
       terminated <- transitions$terminated
       ended <- terminated | transitions$truncated
       for (i in seq_along(reward)) {
+        seen <- if (isTRUE(learner$sees)) batch_rows(space, transitions$next_observation, i)
         following <- learner$observe(
           pick(present, i), column[[i]], reward[[i]], pick(after, i), terminated[[i]], ended[[i]],
-          sub_env[[i]], NULL
+          sub_env[[i]], seen
         )
-        next_column[[sub_env[[i]]]] <<- if (ended[[i]]) NA_integer_ else following
+        # Of a policy that acts for all 0 says that the episode goes on.
+        next_column[[sub_env[[i]]]] <<- if (ended[[i]]) {
+          NA_integer_
+        } else if (is.na(following)) {
+          0L
+        } else {
+          following
+        }
       }
     }
   )

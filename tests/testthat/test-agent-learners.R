@@ -225,6 +225,108 @@ test_that("planning learns again from what is remembered, and counts no steps", 
   expect_error(agent_q(planning = 1, double = TRUE), class = "gym_error_argument")
 })
 
+test_that("a bonus draws planning to what was not tried for long", {
+  # Everything is worth 0, so that a bonus alone moves values.
+  agent <- started(agent_q(discount = 1, learning_rate = 1, planning = 50, bonus = 0.1), 0 * q)
+  after <- withr::with_seed(1, observe(agent, step_of(0, 1, 0, 1, terminated = TRUE)))
+  # In state 0 action 1 was just tried, and action 0 never.
+  expect_identical(sort(after$memory$pair), c(1L, 4L))
+  expect_equal(after$weights[1, 2], 0)
+  # Trying action 0 is taken to stay there.
+  expect_gt(after$weights[1, 1], 0.1 * sqrt(1))
+  expect_identical(after$weights[2:3, ], 0 * q[2:3, ])
+  expect_error(agent_q(bonus = 0.1), "give `planning`", class = "gym_error_argument")
+})
+
+test_that("off-policy Monte Carlo weighs returns by what the policy would have done", {
+  # The policy takes action 1 with certainty; with epsilon 1 each action has probability 1/2.
+  sticks <- policy_table(cbind(rep(0, 3), 1))
+  episode <- function(how) {
+    agent <- agent_monte_carlo(discount = 1, epsilon = 1, importance = how, target_policy = sticks)
+    learner <- learner_of(started(agent, 0 * q))
+    play <- function(actions, rewards) {
+      # What is drawn is put in the place of what the test does.
+      withr::with_seed(1, learner$renew())
+      column <- learner$begin(1L, 1L, NULL)
+      for (i in seq_along(rewards)) {
+        last <- i == length(rewards)
+        following <- learner$observe(i, column, rewards[[i]], i + 1L, last, last, 1L, NULL)
+        actions <- c(actions, column)
+        column <- following
+      }
+      actions
+    }
+    taken <- withr::with_seed(2, lapply(1:400, function(k) play(integer(), c(1, 2, 4))))
+    list(agent = learner$export(), taken = do.call(rbind, taken))
+  }
+  for (how in c("weighted", "ordinary")) {
+    came <- episode(how)
+    # Only episodes whose later actions are the policy's count, twice for each of these.
+    own <- came$taken[, 1] == 2L
+    ratio <- 4 * (came$taken[own, 2] == 2L & came$taken[own, 3] == 2L)
+    expected <- if (how == "weighted") 7 else sum(ratio * 7) / sum(own)
+    expect_equal(came$agent$weights[1, 2], expected)
+    expect_equal(state_values(came$agent)[["0"]], expected)
+    visits <- if (how == "weighted") sum(ratio) else sum(own)
+    expect_equal(came$agent$visited[1, 2], visits)
+  }
+  expect_identical(agent_policy(came$agent)$q, sticks$q)
+  expect_error(agent_monte_carlo(target_policy = sticks), "give `importance`",
+               class = "gym_error_argument")
+})
+
+test_that("off-policy TD moves a value as far as the policy is more likely to act so", {
+  often <- policy_table(cbind(rep(log(3), 3), 0), temperature = 1)
+  agent <- agent_td(policy_table(cbind(rep(0, 3), 1)), discount = 0.5, learning_rate = 0.1,
+                    initial = 2, behavior = often)
+  learner <- learner_of(agent_start(agent, spaces()))
+  column <- learner$begin(1L, 1L, 0L)
+  learner$observe(1L, 2L, 10, 2L, FALSE, FALSE, 1L, 1L)
+  # Probabilities of 1 and 1/4.
+  once <- 2 + 4 * 0.1 * (10 + 0.5 * 2 - 2)
+  expect_equal(state_values(learner$export())[["0"]], once)
+  learner$observe(2L, 1L, 10, 1L, FALSE, FALSE, 1L, 0L)
+  expect_equal(state_values(learner$export())[["1"]], 2)
+  expect_error(agent_td(often, behavior = function(state) 0L), "whose probabilities are known",
+               class = "gym_error_argument")
+})
+
+test_that("an actor moves towards what came to more than its critic had expected", {
+  agent <- agent_start(
+    agent_actor_critic(discount = 0.5, learning_rate = 0.1, actor_rate = 0.2, lambda = 0.8,
+                       actor_lambda = 0.4), spaces()
+  )
+  learner <- learner_of(agent)
+  learner$observe(1L, 2L, 10, 2L, FALSE, FALSE, 1L, NULL)
+  one <- learner$export()
+  expect_equal(one$weights[, 1], c(1, 0, 0))
+  expect_equal(one$preferences[1, ], 0.2 * 10 * c(-0.5, 0.5))
+  learner$observe(2L, 1L, 4, 1L, FALSE, TRUE, 1L, NULL)
+  error <- 4 + 0.5 * 1
+  two <- learner$export()
+  expect_equal(two$weights[, 1], c(1 + 0.1 * 0.4 * error, 0.1 * error, 0))
+  expect_equal(two$preferences[2, ], 0.2 * error * c(0.5, -0.5))
+  expect_equal(two$preferences[1, ], (2 + 0.2 * error * 0.2) * c(-0.5, 0.5))
+  expect_equal(predict(agent_policy(two), 0L, type = "output")[1, ], two$preferences[1, ])
+  expect_identical(agent_policy(two)$temperature, 1)
+})
+
+test_that("values have the names of an observation's parts, and each action's a row", {
+  policy <- spaces()
+  policy$observation_space <- space_dict(hand = space_discrete(2, 5), last = space_discrete(2))
+  policy$q <- cbind(1:4, 4:1)
+  agent <- agent_start(agent_q(), policy)
+  expect_equal(
+    state_values(agent),
+    data.frame(hand = c(5L, 5L, 6L, 6L), last = c(0L, 1L, 0L, 1L), value = c(4, 3, 3, 4))
+  )
+  expect_equal(
+    utils::head(state_values(agent, actions = TRUE), 3),
+    data.frame(hand = rep(5L, 3), last = c(0L, 0L, 1L), action = c(0L, 1L, 0L), value = c(1, 4, 2))
+  )
+  expect_identical(state_values(started(agent_q()), actions = TRUE)$state, rep(0:2, each = 2))
+})
+
 test_that("planning takes no steps of a schedule", {
   asked <- c()
   rate <- function(taken) {

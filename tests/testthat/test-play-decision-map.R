@@ -163,8 +163,8 @@ test_that("what cannot be mapped says why", {
   one <- fake_environment(observation_space = box_space(-1, 1),
                           action_space = box_space(-1, 1))
   bad(policy_network(c(1, 1), c("tanh", "tanh")), one, 1, 1, message = "observes only one")
-  pairs <- fake_environment(observation_space = space_multi_discrete(c(4, 4)), id = "Pairs-v0")
-  bad(function(observation) rep(0L, nrow(observation)), pairs,
+  pairs <- fake_environment(observation_space = space_text(3), id = "Pairs-v0")
+  bad(function(observation) 0L, pairs,
       message = "what is observed in Pairs-v0 is of")
   several <- fake_environment(action_space = new_space(
     list(name = "MultiBinary", shape = list(2L), dtype = "int8")
@@ -198,4 +198,27 @@ test_that("a network that draws is mapped by its probabilities, or its most like
   map <- decision_map(policy = three, xlim = c(-1, 1), ylim = c(-1, 1), size = 5)
   expect_identical(map$grid$action, act(three, as.matrix(map$grid[1:2]), draw = FALSE))
   expect_identical(.Random.seed, before)
+})
+
+test_that("several parts with few values each have a map, of a table with its values", {
+  parts <- space_dict(a = space_discrete(3, 5), b = space_discrete(2), c = space_discrete(2))
+  env <- gym_env(
+    reset = function(self) list(a = 5L, b = 0L, c = 0L), step = function(self, action) NULL,
+    observation_space = parts, action_space = space_discrete(2)
+  )
+  policy <- policy_table(cbind(1:12, 7))
+  map <- decision_map(env, policy)
+  expect_identical(map[c("x", "y", "panels")], list(x = "a", y = "b", panels = "c"))
+  expect_identical(map$grid$action, rep(1:0, c(6, 6)))
+  expect_identical(map$grid$value, pmax(1:12, 7))
+  asks <- decision_map(env, function(observation) as.integer(observation[[1]] == 6), "c", "a",
+                       at = c(b = 1), ylim = c(6, 7))
+  expect_identical(asks$panels, character())
+  expect_identical(asks$grid, data.frame(
+    a = c(6L, 6L, 7L, 7L), b = 1L, c = c(0L, 1L, 0L, 1L), action = c(1L, 1L, 0L, 0L)
+  ))
+  expect_output(print(map), "the action by a and b, for each c, 12 states", fixed = TRUE)
+  skip_if_not_installed("ggplot2")
+  local_device()
+  expect_identical(plot(map), map)
 })
