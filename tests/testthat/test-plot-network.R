@@ -107,6 +107,8 @@ test_that("any network is drawn, positive weights solid and negative ones dashed
   expect_identical(sum(lines$linetype == "31"), 4L)
   expect_identical(lines$linetype == "31", lines$colour == gym_colours[["gold"]])
   expect_identical(picture$labels$subtitle, "network 4-2-1, wider lines are further from 0")
+  left <- ggplot2::ggplot_build(picture)$layout$panel_params[[1]]$y$get_labels()
+  expect_identical(sort(left), paste0("obs_", 1:4))
   drawn(autoplot(policy_network(c(1, 1))))
   drawn(autoplot(policy_network(c(100, 50, 20, 18)), neurons = 30, digits = 3))
   drawn(autoplot(policy_network(c(2, 1), weights = list(matrix(0, 1, 2)))))
