@@ -2,9 +2,9 @@
 #'
 #' Shows how a training went over the steps of the environment: the range of the returns that the
 #' agent played in each iteration as a band (those of its candidates; of an agent that learns from
-#' steps those of its episodes), their median as a line, the mean return of the agent's own policy, where it was
-#' evaluated, as points, and the target as a dashed line. The final evaluation is the filled point
-#' at the end, with its interval.
+#' steps those of its episodes), their median as a line, the mean return of the agent's own policy,
+#' where it was evaluated, as points, and the target as a dashed line. The final evaluation is the
+#' filled point at the end, with its interval.
 #'
 #' Several trainings that are given together are compared as [plot.gym_trainings()] draws them.
 #'

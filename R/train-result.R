@@ -133,8 +133,9 @@ print.summary.gym_training <- function(x, ...) {
   several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
   cat(
     "",
-    paste0("The ", returned_unit(training$agent), " of the last iteration: mean return ", number_text(last$mean_return), ", from ",
-           number_text(last$min_return), " to ", number_text(last$max_return)),
+    paste0("The ", returned_unit(training$agent), " of the last iteration: mean return ",
+           number_text(last$mean_return), ", from ", number_text(last$min_return), " to ",
+           number_text(last$max_return)),
     if (length(stopping$iteration)) {
       paste0("Stopping evaluation", several, ": ",
              evaluation_text(stopping[nrow(stopping), ]))
