@@ -6,6 +6,11 @@
 #' where it was evaluated, as points, and the target as a dashed line. The final evaluation is the
 #' filled point at the end, with its interval.
 #'
+#' `type = "diagnostics"` shows what the agent logs of its learning (see [agent_log()]), a panel for
+#' each number. Of PPO (see [agent_ppo()]) the policy moves too far in an iteration where
+#' `approx_kl` is far above 0.02, has given up exploring where `entropy_loss` has come near 0, and
+#' its values predict nothing where `explained_variance` stays near 0.
+#'
 #' Several trainings that are given together are compared as [plot.gym_trainings()] draws them.
 #'
 #' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
@@ -15,6 +20,8 @@
 #' @param x,object A training, as [train_agent()] returns it. It may have another name, that of its
 #'   line, as in `plot(ARS = first, CEM = second)`.
 #' @param main The title; `NULL`, the default, names the environment and the agent.
+#' @param type What is shown, a string: `"returns"`, the default, or `"diagnostics"`, of a single
+#'   training.
 #' @param ... Further trainings to compare, with the names of their lines or without.
 #' @return A ggplot; of `plot()` invisibly.
 #' @section Errors: `gym_error_argument` when no iteration was played to its end.
@@ -23,13 +30,18 @@
 #' @examplesIf gym:::can_start_server()
 #' trained <- train_agent(agent_ars(), "CartPole-v1", iterations = 20, seed = 1)
 #' plot(trained)
-autoplot.gym_training <- function(object, ...) {
+autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics")) {
+  type <- check_choice(type[1L], c("returns", "diagnostics"), arg = "type")
   trainings <- given_trainings(arguments_as_written(quote(object)))
-  if (length(trainings) > 1L) {
+  if (length(trainings) > 1L && type == "returns") {
     return(trainings_picture(trainings))
   }
+  check_one_training(trainings, type)
   x <- trainings[[1L]]
   check_has_history(x)
+  if (type == "diagnostics") {
+    return(diagnostics_picture(x))
+  }
   evaluations <- placed_evaluations(x)
   final <- evaluations[evaluations$kind == "final", ]
   target <- finite_target(x$target)
@@ -64,6 +76,15 @@ autoplot.gym_training <- function(object, ...) {
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
     picture_labels(trainings_title(list(x)), x = training_steps_label, y = "return") +
     theme_gym()
+}
+
+check_one_training <- function(trainings, type, call = rlang::caller_env()) {
+  if (length(trainings) > 1L) {
+    gym_abort(
+      paste0("A picture of ", type, " shows one training, not ", length(trainings), "."),
+      class = "gym_error_argument", argument = "type", value = type, call = call
+    )
+  }
 }
 
 check_has_history <- function(x, call = rlang::caller_env()) {

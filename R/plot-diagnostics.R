@@ -1,0 +1,27 @@
+# What an agent logs of its learning, by which one sees why it does not learn: a panel for each
+# number over the steps of the training.
+
+diagnostics_picture <- function(x, call = rlang::caller_env()) {
+  names <- names(agent_log(x$agent))
+  if (!length(names)) {
+    gym_abort(
+      c(paste0("The training has no diagnostics: ", training_label(x), " logs none."),
+        i = "`agent_ppo()` and other agents with a method of `agent_log()` do."),
+      class = "gym_error_argument", argument = "type", value = "diagnostics", call = call
+    )
+  }
+  rows <- do.call(rbind, lapply(names, function(name) {
+    data.frame(steps = x$history$steps, name = name, value = x$history[[name]])
+  }))
+  rows$name <- factor(rows$name, names)
+  # Random episodes, which made the first moments of observations, taught nothing.
+  rows <- rows[is.finite(rows$value), ]
+  ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +
+    ggplot2::geom_line(colour = gym_colours[["blue"]], linewidth = 0.6) +
+    ggplot2::geom_point(colour = gym_colours[["blue"]], size = 0.6) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$name), scales = "free_y") +
+    number_axis(ggplot2::scale_x_continuous, limits = c(0, NA), n.breaks = 4) +
+    number_axis(ggplot2::scale_y_continuous, n.breaks = 4) +
+    picture_labels(trainings_title(list(x)), x = training_steps_label, y = NULL) +
+    theme_gym()
+}
