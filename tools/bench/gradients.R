@@ -4,7 +4,7 @@
 #
 # Optional, as torch is large. GYM_SB3_PYTHON names a Python that has it:
 #
-#   python3 -m venv sb3 && sb3/bin/pip install stable-baselines3
+#   python3 -m venv sb3 && sb3/bin/pip install stable-baselines3 'gymnasium[box2d]'
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS=gradients
 
 gradient_names <- c(gym = "gym, learn_ppo()", sb3 = "Stable-Baselines3, PPO")
