@@ -99,9 +99,21 @@ book_facts[["book-08-planning"]] <- function(made) {
   expect_equal(made$early[[2]]$start_value, 0.95^13)
   # Figure 8.4: after the change no reward comes for a while.
   reward <- made$rewards[c(1000, 1300, 3000), ]
-  expect_true(all(reward[1, ] > 50))
+  expect_true(all(reward[1, ] > 40))
   expect_true(all(reward[2, ] - reward[1, ] < 5))
-  expect_identical(sum(reward[3, ] - reward[2, ] > 20), 2L)
+  # Dyna-Q+ finds the new gap sooner.
+  expect_gt(mean(made$last_rewards(made$curious)), mean(made$last_rewards(made$blocking)))
+}
+
+book_facts[["book-09-approximation"]] <- function(made) {
+  # Figure 9.2: the values rise from -1 to 1; ten groups come near.
+  expect_lt(max(abs(made$grouped - made$exact)), 0.3)
+  expect_identical(length(unique(made$grouped)), 10L)
+  expect_true(all(made$errors < 0.3))
+  # Figure 11.2: the weights grow without an end.
+  expect_gt(max(made$weights[100, ]), 100)
+  # Example 13.1: the best is to go right in 59 of 100 steps, which is worth -11.6.
+  expect_lt(abs(made$right - 0.59), 0.12)
 }
 
 book_facts[["book-10-mountain-car"]] <- function(made) {
