@@ -137,7 +137,9 @@ test_that("what cannot travel is played here, which is said once", {
   })
   expect_message(rollout("Acrobot-v1", pointing, 2, max_steps = 5), "connection or a pointer")
   expect_message(
-    train_agent(agent_q(), "FrozenLake-v1", iterations = 1, eval_episodes = 2, seed = 1),
+    train_agent(
+      agent_q(), "FrozenLake-v1", iterations = 1, eval_episodes = 2, seed = 1, model = FALSE
+    ),
     "learns from each step"
   )
 })
