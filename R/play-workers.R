@@ -111,6 +111,10 @@ refers_to_process <- function(x) {
   found
 }
 
+inform_learner_plays_here <- function() {
+  inform_plays_here("a learner learns from each step before it takes the next one")
+}
+
 # Can batches go to workers? Says why not where there are some.
 plays_on_workers <- function(vector_env, policy_of, learner) {
   kind <- plan_kind()
@@ -123,7 +127,7 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
       "`train_agent(seeds = )` gives each worker a training of its own."
     )
   } else if (!is.null(learner)) {
-    inform_plays_here("a learner learns from each step before it takes the next one")
+    inform_learner_plays_here()
   } else if (!is.list(vector_env$recipe)) {
     inform_plays_here(vector_env$recipe %||% "the environment cannot be made there")
   } else if (refers_to_process(policy_of(1L))) {

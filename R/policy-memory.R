@@ -110,7 +110,7 @@ asked_with_memory <- function(policy, observation, memory, call) {
     abort_memory(said, "a list of `action` and `memory`", call)
   }
   same <- identical(dim(new), dim(memory)) && is.data.frame(new) == is.data.frame(memory) &&
-    identical(colnames(new), colnames(memory))
+    (is.null(colnames(memory)) || identical(colnames(new), colnames(memory)))
   if (!same) {
     must <- paste0(
       "a `memory` of ", size_text(memory), ", as it was given",

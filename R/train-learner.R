@@ -122,6 +122,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
     vector_env <- with_masks(vector_env, state$agent$mask, note, call)
   }
   played <- if (vector_env$num_envs == 1L) {
+    if (is.null(settings$sampled) && plan_kind() != "none") inform_learner_plays_here()
     learn_alone(learner, state, vector_env, settings, call)
   } else {
     learner_episodes(

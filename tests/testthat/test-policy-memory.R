@@ -25,6 +25,14 @@ test_that("every episode has a memory of its own, whatever plays beside it and b
   sums(1)
 })
 
+test_that("a memory without names may come back with some", {
+  named <- policy_memory(function(observation, memory) {
+    last <- observation[, 1]
+    list(action = memory[, 1], memory = cbind(last))
+  }, 0)
+  expect_identical(unname(act(named, c(2, 0), rbind(3))$action), 3)
+})
+
 test_that("by hand the memory goes from call to call, and begins with the initial one", {
   first <- act(summing, c(2, 0))
   expect_equal(first, list(action = 2, memory = cbind(sum = 2)), ignore_attr = TRUE)
