@@ -2,9 +2,15 @@
 # which is loaded by the first picture and not with this package.
 
 show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL) {
-  # By its name, which is what errors show.
   arguments <- arguments_as_written(quote(x))
-  picture <- rlang::exec("autoplot", !!!arguments, .env = asNamespace("ggplot2"))
+  # Results go as variables: a name such as `episode` would be taken for autoplot()'s argument.
+  named <- vapply(arguments, is_comparable, NA)
+  names(arguments) <- rlang::names2(arguments)
+  names <- make.unique(names(arguments)[named], " ")
+  results <- list2env(stats::setNames(arguments[named], names), parent = asNamespace("ggplot2"))
+  arguments[named] <- lapply(names, as.name)
+  names(arguments)[named] <- ""
+  picture <- eval(as.call(c(quote(autoplot), arguments)), results)
   labels <- list(title = if (!is.null(main)) broken_text(main, 38), x = xlab, y = ylab)
   given <- c(!is.null(main), !is.null(xlab), !is.null(ylab))
   picture <- picture + rlang::exec(ggplot2::labs, !!!labels[given])

@@ -113,7 +113,9 @@ inform_resumed <- function(text, .envir = parent.frame()) {
 # What must be the same in two runs of one training. The budget may be another, but for a search,
 # whose rounds are cut into batches by it.
 training_arguments <- function(settings) {
-  numbers <- c("episodes", "target", "max_steps", "eval_every", "eval_episodes", "curve_episodes", "seed")
+  numbers <- c(
+    "episodes", "target", "max_steps", "eval_every", "eval_episodes", "curve_episodes", "seed"
+  )
   c(
     list(
       env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),

@@ -135,7 +135,9 @@ test_that("an action outside the space is an error and the environment has not m
   env$reset()
   twin$reset()
   for (bad in list(2, -1, 0.5, NA, NULL, "1", c(0, 1))) {
-    expect_error(env$step(bad), if (is.character(bad)) "no action" else "Discrete", class = "gym_error_space")
+    expect_error(
+      env$step(bad), if (is.character(bad)) "no action" else "Discrete", class = "gym_error_space"
+    )
   }
   expect_identical(env$step(1), twin$step(1))
 })

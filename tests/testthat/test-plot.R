@@ -60,3 +60,11 @@ test_that("library(gym) loads neither ggplot2 nor grid, a picture does", {
   said <- processx::run(file.path(R.home("bin"), "Rscript"), c("-e", code))$stdout
   expect_match(said, "^0 2 gg")
 })
+
+test_that("a result may have the name of an argument of its picture", {
+  local_device()
+  episode <- rollout(fake_environment(), policy_random(), seed = 1, steps = TRUE)
+  n <- episode
+  expect_s3_class(plot(episode, type = "trajectory"), "ggplot")
+  expect_identical(plot(episode, n)$labels, plot(episode, other = n)$labels)
+})
