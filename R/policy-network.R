@@ -227,6 +227,7 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
 
 # From an observation to an action -------------------------------------------------
 
+#' @rdname act
 #' @export
 act.gym_policy_network <- function(policy, observation, draw = TRUE, ...) {
   check_network(policy)
