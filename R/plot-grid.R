@@ -125,7 +125,7 @@ grid_cells <- function(cells, columns, call) {
 # A step down adds as many to the state's number as there are columns: the most common difference
 # above 1.
 grid_columns <- function(model) {
-  further <- with(model$transitions, next_state - state)
+  further <- model$transitions$next_state - model$transitions$state
   further <- further[further > 1L]
   if (length(further)) as.integer(names(which.max(table(further))))
 }
