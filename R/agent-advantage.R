@@ -3,9 +3,9 @@
 #' Sum what comes after each step, backwards
 #' @param values What a step adds.
 #' @param decay What the sum is multiplied by for each step.
-#' @param last Whether a step is the last of its episode.
+#' @param last Whether a step is the last of its episode; by default all are of one.
 #' @noRd
-sum_backwards <- function(values, decay, last) {
+sum_backwards <- function(values, decay, last = seq_along(values) == length(values)) {
   sum <- 0
   for (t in rev(seq_along(values))) {
     sum <- values[[t]] + if (last[[t]]) 0 else decay * sum
@@ -13,6 +13,9 @@ sum_backwards <- function(values, decay, last) {
   }
   values
 }
+
+# Whether each step is the last of its episode, by the episodes' numbers.
+ends_of <- function(episode) c(episode[-1L] != episode[-length(episode)], TRUE)
 
 # The value of the state after each step: 0 where the episode terminated. One that was truncated
 # would have gone on, so its last state keeps its value.

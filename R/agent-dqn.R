@@ -167,26 +167,23 @@ learn_from_memory <- function(agent, memory, updates, steps, settings) {
 #' @noRd
 dqn_update <- function(policy, state, rows, settings) {
   n <- length(rows$reward)
-  values_after <- outputs_of(policy, state$target, rows$next_inputs)
+  values_after <- forward_network(policy, state$target, rows$next_inputs)$outputs
   best <- if (settings$double) {
-    own <- outputs_of(policy, state$weights, rows$next_inputs)
+    own <- forward_network(policy, state$weights, rows$next_inputs)$outputs
     values_after[places_of_actions(nrow(own), max.col(t(own), "first"))]
   } else {
     column_max(values_after)
   }
   wanted <- rows$reward + settings$gamma * ifelse(rows$terminated, 0, best)
 
-  layers <- layers_of(policy, state$weights)
-  signals <- forward_layers(layers, policy$activation, rows$inputs)
-  outputs <- signals[[length(signals)]]
+  forward <- forward_network(policy, state$weights, rows$inputs)
+  outputs <- forward$outputs
   taken <- places_of_actions(nrow(outputs), rows$action)
   error <- outputs[taken] - wanted
   # Huber's loss: the slope of the squared error up to 1, and then no steeper.
   slopes <- matrix(0, nrow(outputs), n)
   slopes[taken] <- pmax(-1, pmin(error, 1)) / n
-  gradient <- clip_norm(
-    backward_layers(layers, policy$activation, signals, slopes), settings$max_grad_norm
-  )
+  gradient <- clip_norm(backward_network(forward, slopes), settings$max_grad_norm)
   moved <- adam_step(state$weights, gradient, state$adam, settings$learning_rate)
   size <- abs(error)
   state[c("weights", "adam")] <- moved

@@ -56,8 +56,7 @@ agent_behavior.gym_agent_gradient <- function(agent) {
 #'   action in each column; `reward`, `terminated`; `last`, whether a step is an episode's last.
 #' @noRd
 iteration_rows <- function(policy, trajectories) {
-  n <- length(trajectories$reward)
-  last <- c(trajectories$episode[-1L] != trajectories$episode[-n], TRUE)
+  last <- ends_of(trajectories$episode)
   observations <- number_rows(trajectories$observation)
   after <- number_rows(trajectories$next_observation)
   list(
@@ -120,11 +119,8 @@ value_network <- function(policy) {
   value
 }
 
-expected_values <- function(value, inputs) outputs_of(value, weight_vector(value), inputs)[1L, ]
-
-outputs_of <- function(policy, weights, inputs) {
-  signals <- forward_layers(layers_of(policy, weights), policy$activation, inputs)
-  signals[[length(signals)]]
+expected_values <- function(value, inputs) {
+  forward_network(value, weight_vector(value), inputs)$outputs[1L, ]
 }
 
 #' Cut rows into minibatches of nearly equal size, in a random order
@@ -157,7 +153,7 @@ check_iteration <- function(batch_steps, min_episodes, call = rlang::caller_env(
 
 # An agent that follows the gradient of log-probabilities needs a policy that has them.
 check_has_log_prob <- function(policy, name) {
-  if (!policy$output %in% c("softmax", "gaussian")) {
+  if (!has_log_prob(policy)) {
     box <- inherits(policy$action_space, "gym_space_box")
     gym_abort(
       c(paste0(name, " needs a policy that draws its actions",

@@ -167,7 +167,7 @@ off_policy_steps <- function(agent) {
   }
   learn <- function(episode, ratio) {
     cell <- store$cells(episode$x, episode$column)
-    returns <- discounted_returns(episode$reward, discount)
+    returns <- sum_backwards(episode$reward, discount)
     weight <- 1
     for (i in rev(seq_along(cell))) {
       at <- cell[[i]]
@@ -210,9 +210,7 @@ target_probabilities <- function(agent, row) {
       replace(numeric(length(values)), which.max(values), 1)
     })
   }
-  q <- agent$learns$q
-  q[row_max(q) == -Inf, ] <- 0
-  probabilities <- row_probabilities(agent$learns, q)
+  probabilities <- table_probabilities(agent$learns)
   function(x) probabilities[x, ]
 }
 
@@ -225,7 +223,7 @@ agent_policy.gym_agent_monte_carlo <- function(agent) {
 iteration_policy <- function(agent, weights, taken) {
   heat <- agent$temperature
   if (is.null(heat)) {
-    best <- best_column(ifelse(weights == row_max(weights), stats::runif(length(weights)), -1))
+    best <- any_best_column(weights)
     weights[] <- ifelse(weights == -Inf, -Inf, 0)
     weights[cbind(seq_along(best), best)] <- 1
   } else {
@@ -272,7 +270,7 @@ new_returns <- function(agent, store) {
   list(
     learn = function(episode, taken) {
       cell <- store$cells(episode$x, episode$column)
-      returns <- discounted_returns(episode$reward, discount)
+      returns <- sum_backwards(episode$reward, discount)
       counted <- if (first_only) which(!duplicated(cell)) else rev(seq_along(cell))
       for (i in counted) {
         at <- cell[[i]]
@@ -283,7 +281,7 @@ new_returns <- function(agent, store) {
     },
     learn_many = function(x, column, reward, episode, taken) {
       cell <- store$cells(x, column)
-      returns <- discounted_returns(reward, discount, episode)
+      returns <- sum_backwards(reward, discount, ends_of(episode))
       if (first_only) {
         counted <- !duplicated(cell + length(visited) * (episode - 1))
         cell <- cell[counted]
@@ -305,20 +303,6 @@ new_returns <- function(agent, store) {
     },
     visited = function() visited
   )
-}
-
-# What followed on each step: its reward, and those after it, discounted.
-discounted_returns <- function(rewards, discount, episode = rep(1L, length(rewards))) {
-  later <- 0
-  own <- 0L
-  for (i in rev(seq_along(rewards))) {
-    if (episode[[i]] != own) {
-      own <- episode[[i]]
-      later <- 0
-    }
-    rewards[[i]] <- later <- rewards[[i]] + discount * later
-  }
-  rewards
 }
 
 #' @export

@@ -221,12 +221,8 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   )
   error <- both$value - batch$return
   gradient <- c(
-    backward_layers(both$policy_layers, policy$activation, both$policy_signals, slopes$outputs),
-    slopes$log_std,
-    backward_layers(
-      both$value_layers, value$activation, both$value_signals,
-      matrix(2 * settings$value_weight / n * error, 1L)
-    )
+    backward_network(both$of_policy, slopes$outputs), slopes$log_std,
+    backward_network(both$of_value, matrix(2 * settings$value_weight / n * error, 1L))
   )
   policy_loss <- -mean(objective)
   value_loss <- mean(error * error)
@@ -241,17 +237,13 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
 # Both networks, forwards.
 ppo_forward <- function(policy, value, weights, inputs, action) {
   count <- count_weights(policy)
-  policy_layers <- layers_of(policy, weights)
-  value_layers <- layers_of(value, weights[-seq_len(count)])
-  policy_signals <- forward_layers(policy_layers, policy$activation, inputs)
-  value_signals <- forward_layers(value_layers, value$activation, inputs)
-  outputs <- policy_signals[[length(policy_signals)]]
+  of_policy <- forward_network(policy, weights, inputs)
+  of_value <- forward_network(value, weights[-seq_len(count)], inputs)
+  outputs <- of_policy$outputs
   log_std <- if (is_gaussian(policy)) weights[(count - length(policy$log_std) + 1L):count]
   list(
     draws = log_prob_of(policy, outputs, log_std, places_of_actions(nrow(outputs), action)),
-    value = value_signals[[length(value_signals)]][1L, ],
-    policy_layers = policy_layers, value_layers = value_layers,
-    policy_signals = policy_signals, value_signals = value_signals
+    value = of_value$outputs[1L, ], of_policy = of_policy, of_value = of_value
   )
 }
 

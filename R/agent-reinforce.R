@@ -104,16 +104,13 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
   # A step up the gradient of mean(advantage * log-probability).
   policy <- agent$policy
   weights <- weight_vector(policy)
-  layers <- layers_of(policy, weights)
-  signals <- forward_layers(layers, policy$activation, rows$inputs)
-  outputs <- signals[[length(signals)]]
+  forward <- forward_network(policy, weights, rows$inputs)
   draws <- log_prob_of(
-    policy, outputs, policy$log_std, places_of_actions(nrow(outputs), rows$action)
+    policy, forward$outputs, policy$log_std,
+    places_of_actions(nrow(forward$outputs), rows$action)
   )
   slopes <- log_prob_slopes(policy, draws, -advantage / n, -now$entropy / n)
-  gradient <- c(
-    backward_layers(layers, policy$activation, signals, slopes$outputs), slopes$log_std
-  )
+  gradient <- c(backward_network(forward, slopes$outputs), slopes$log_std)
   moved <- adam_step(
     weights, clip_norm(gradient, agent$max_grad_norm), agent$adam, now$learning_rate
   )
@@ -135,10 +132,9 @@ fit_baseline <- function(agent, inputs, return, learning_rate) {
   value <- agent$value
   weights <- weight_vector(value)
   for (update in seq_len(agent$value_updates)) {
-    layers <- layers_of(value, weights)
-    signals <- forward_layers(layers, value$activation, inputs)
-    error <- signals[[length(signals)]] - return
-    gradient <- backward_layers(layers, value$activation, signals, 2 / length(return) * error)
+    forward <- forward_network(value, weights, inputs)
+    error <- forward$outputs - return
+    gradient <- backward_network(forward, 2 / length(return) * error)
     moved <- adam_step(weights, gradient, agent$value_adam, learning_rate)
     weights <- moved$weights
     agent$value_adam <- moved$adam

@@ -81,7 +81,10 @@ value_columns_of.gym_agent_td <- function(agent) 1L
 learner_of.gym_agent_td <- function(agent) {
   learning <- learning_of(agent)
   value <- learning$store$row
-  act <- policy_chooser(agent, learning$uniform$draw)
+  probabilities <- chooser_probabilities(
+    agent$plays, agent$spaces$action_space, is.null(agent$features)
+  )
+  act <- policy_chooser(agent, probabilities, learning$uniform$draw)
   ratio <- if (!is.null(agent$learns)) importance_ratio(agent)
   learn <- if (is.null(ratio)) learning$learn else weighted_lookahead(agent, learning$store)
   taken <- agent$taken
@@ -107,7 +110,7 @@ learner_of.gym_agent_td <- function(agent) {
       agent$taken <- taken
       agent
     },
-    act = if (is.null(chooser_probabilities(agent))) {
+    act = if (is.null(probabilities)) {
       function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
     }
   )
@@ -120,18 +123,16 @@ learner_of.gym_agent_td <- function(agent) {
 importance_ratio <- function(agent) {
   space <- agent$spaces$observation_space
   index <- table_index(space, "observations", NULL)$index
-  target <- state_probabilities(agent, agent$learns)
-  plays <- state_probabilities(agent, agent$plays)
+  target <- state_probabilities(agent$learns, agent$spaces$action_space)
+  plays <- state_probabilities(agent$plays, agent$spaces$action_space)
   function(observation, column) {
     row <- index(observation, 1L)
     target(row, column) / plays(row, column)
   }
 }
 
-state_probabilities <- function(agent, policy) {
-  agent$plays <- policy
-  agent["features"] <- list(NULL)
-  probabilities <- chooser_probabilities(agent)
+state_probabilities <- function(policy, action_space) {
+  probabilities <- chooser_probabilities(policy, action_space, by_state = TRUE)
   if (is.matrix(probabilities)) {
     sums <- rowSums(probabilities)
     function(row, column) probabilities[[row, column]] / sums[[row]]
@@ -153,8 +154,7 @@ weighted_lookahead <- function(agent, store) {
 #' Of a table, and of chance, the probabilities of the actions are known beforehand. Any other is
 #' asked; where there are several sub-environments it was asked about all of them together.
 #' @noRd
-policy_chooser <- function(agent, draw) {
-  probabilities <- chooser_probabilities(agent)
+policy_chooser <- function(agent, probabilities, draw) {
   if (is.null(probabilities)) {
     policy <- agent$plays
     first <- agent$spaces$action_space$start - 1L
@@ -173,17 +173,13 @@ policy_chooser <- function(agent, draw) {
 
 # How likely a policy takes each action: a matrix with a row for each state, a vector where the
 # state makes no difference, `NULL` where that is not known beforehand.
-chooser_probabilities <- function(agent) {
-  policy <- agent$plays
-  if (inherits(policy, "gym_policy_table") && is.null(agent$features)) {
-    q <- policy$q
-    q[row_max(q) == -Inf, ] <- 0
-    row_probabilities(policy, q)
+chooser_probabilities <- function(policy, action_space, by_state) {
+  if (inherits(policy, "gym_policy_table") && by_state) {
+    table_probabilities(policy)
   } else if (inherits(policy, "gym_policy_random")) {
     if (is.null(policy$possible)) {
-      numbers <- state_numbers(agent$spaces$action_space)
-      (numbers %in% state_numbers(policy$action_space)) + 0
-    } else if (is.null(agent$features)) {
+      (state_numbers(action_space) %in% state_numbers(policy$action_space)) + 0
+    } else if (by_state) {
       policy$possible + 0
     }
   }

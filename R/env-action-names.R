@@ -55,9 +55,13 @@ numbered_actions <- function(instance, action, call) {
   if (!is.character(action) || !inherits(space, "gym_space_discrete")) {
     return(action)
   }
-  names <- action_names(instance$spec$id, space$n, space$start)
-  number <- match(sub("^[0-9]+: ", "", action), sub("^[0-9]+: ", "", names))
+  meaning <- action_meaning(instance$spec$id, space$n)
+  if (is.null(meaning)) {
+    return(action)
+  }
+  number <- match(sub("^[0-9]+: ", "", action), meaning)
   if (anyNA(number)) {
+    names <- action_names(instance$spec$id, space$n, space$start)
     gym_abort(
       c(paste0("There is no action ", describe_value(action[is.na(number)][[1L]]), " in ",
                instance$spec$id, "."),

@@ -102,8 +102,5 @@ policy_probabilities.gym_policy_random <- function(policy, model, call) {
 
 #' @exportS3Method
 policy_probabilities.gym_policy_table <- function(policy, model, call) {
-  # A row without an action is that of a state in which none is taken.
-  q <- policy$q
-  q[row_max(q) == -Inf, ] <- 0
-  row_probabilities(policy, q)
+  table_probabilities(policy)
 }

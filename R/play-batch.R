@@ -114,9 +114,7 @@ play_episodes <- function(batch, first, last) {
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
     }
-    if (!is.null(changed) && playing$taken == 1L) {
-      if (length(changed())) warn_of_memory(changed(), vector_env$call)
-    }
+    if (!is.null(changed) && playing$taken == 1L) warn_of_memory(changed(), vector_env$call)
     stepped <- if (batch$clips) clip_actions(vector_env$action_space, action) else action
     out <- step(stepped, playing$rows$sub_env)
     if (!is.null(batch$learner)) {

@@ -54,11 +54,10 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   row.names(grid) <- NULL
   place$call <- call
   n <- nrow(grid)
-  grid$action <- as.integer(keep_random_state(
-    act_batch(place$policy, values_batch(space, grid), n, place)
-  ))
+  states <- values_batch(space, grid)
+  grid$action <- as.integer(keep_random_state(act_batch(place$policy, states, n, place)))
   if (inherits(place$policy, "gym_policy_table")) {
-    row <- space_index(space)$index(values_batch(space, grid[names(all_values(space))]), n)
+    row <- space_index(space)$index(states, n)
     grid$value <- row_max(place$policy$q)[row]
   }
   structure(

@@ -49,9 +49,8 @@ policy_log_prob <- function(policy, observation, action) {
   check_draws_known(policy)
   seen <- seen_columns(policy, observation)
   chosen <- action_places(policy, action, ncol(seen))
-  layers <- layers_of(policy, weight_vector(policy))
-  signals <- forward_layers(layers, policy$activation, seen)
-  log_prob_of(policy, signals[[length(signals)]], policy$log_std, chosen)$log_prob
+  outputs <- forward_network(policy, weight_vector(policy), seen)$outputs
+  log_prob_of(policy, outputs, policy$log_std, chosen)$log_prob
 }
 
 #' @rdname policy_log_prob
@@ -62,11 +61,10 @@ policy_log_prob_gradient <- function(policy, observation, action, weights = 1) {
   n <- ncol(seen)
   chosen <- action_places(policy, action, n)
   weights <- check_row_weights(weights, n, 1L)[, 1L]
-  layers <- layers_of(policy, weight_vector(policy))
-  signals <- forward_layers(layers, policy$activation, seen)
-  parts <- log_prob_of(policy, signals[[length(signals)]], policy$log_std, chosen)
+  forward <- forward_network(policy, weight_vector(policy), seen)
+  parts <- log_prob_of(policy, forward$outputs, policy$log_std, chosen)
   slopes <- log_prob_slopes(policy, parts, weights)
-  c(backward_layers(layers, policy$activation, signals, slopes$outputs), slopes$log_std)
+  c(backward_network(forward, slopes$outputs), slopes$log_std)
 }
 
 #' @rdname policy_log_prob
@@ -75,9 +73,9 @@ policy_output_gradient <- function(policy, observation, weights = 1) {
   check_is_network(policy)
   seen <- seen_columns(policy, observation)
   weights <- check_row_weights(weights, ncol(seen), policy$sizes[[length(policy$sizes)]])
-  layers <- layers_of(policy, weight_vector(policy))
-  signals <- forward_layers(layers, policy$activation, seen)
-  gradient <- backward_layers(layers, policy$activation, signals, t(weights))
+  gradient <- backward_network(
+    forward_network(policy, weight_vector(policy), seen), t(weights)
+  )
   # The outputs do not depend on standard deviations.
   c(gradient, if (is_gaussian(policy)) numeric(length(policy$log_std)))
 }
@@ -203,7 +201,7 @@ check_is_network <- function(policy, call = rlang::caller_env()) {
 
 check_draws_known <- function(policy, call = rlang::caller_env()) {
   check_is_network(policy, call)
-  if (!policy$output %in% c("softmax", "gaussian")) {
+  if (!has_log_prob(policy)) {
     gym_abort(
       c(paste0("Actions have a probability where a network draws them by it, not in ",
                policy_text(policy), "."),

@@ -28,10 +28,15 @@ layers_of <- function(policy, weights) {
 }
 
 #' Compute what each layer gives
+#' @inheritParams layers_of
 #' @param inputs A matrix with an observation in each column, as network_columns() returns it.
-#' @return A list of matrices: the inputs, then the outputs of each layer.
+#' @return A list: `outputs`, a matrix with a column for each observation, and what
+#'   backward_network() needs, `layers`, `activation` and `signals` (the inputs, then the outputs of
+#'   each layer).
 #' @noRd
-forward_layers <- function(layers, activation, inputs) {
+forward_network <- function(policy, weights, inputs) {
+  layers <- layers_of(policy, weights)
+  activation <- policy$activation
   signals <- vector("list", length(layers) + 1L)
   signals[[1L]] <- inputs
   for (i in seq_along(layers)) {
@@ -43,18 +48,24 @@ forward_layers <- function(layers, activation, inputs) {
       activate(sums, activation[[i]])
     }
   }
-  signals
+  list(
+    outputs = signals[[length(signals)]], layers = layers, activation = activation,
+    signals = signals
+  )
 }
 
 # In half the time of tanh(), which is a third of an update's, and 4e-16 from it at most.
 quick_tanh <- function(x) 1 - 2 / (exp(x + x) + 1)
 
 #' Compute the derivatives of the weights
-#' @param signals As forward_layers() returns them.
+#' @param forward As forward_network() returns it.
 #' @param slopes The derivatives of the outputs, a matrix as they are.
 #' @return A vector in the order of `coef()`: the sums over all observations.
 #' @noRd
-backward_layers <- function(layers, activation, signals, slopes) {
+backward_network <- function(forward, slopes) {
+  layers <- forward$layers
+  activation <- forward$activation
+  signals <- forward$signals
   gradient <- vector("list", length(layers))
   ones <- rep(1, ncol(slopes))
   for (i in rev(seq_along(layers))) {

@@ -90,11 +90,7 @@ format.gym_policy_memory <- function(x, ...) {
 #'   step before.
 #' @export
 act.gym_policy_memory <- function(policy, observation, memory = NULL, ...) {
-  if (is.data.frame(observation)) {
-    observation <- as.matrix(observation)
-  } else if (is.atomic(observation) && is.null(dim(observation))) {
-    observation <- matrix(observation, 1L, dimnames = list(NULL, names(observation)))
-  }
+  observation <- function_rows(observation)
   n <- if (is.array(observation)) nrow(observation)
   memory <- memory %||% fresh_memory(policy, n %||% 1L)
   asked_with_memory(policy, observation, memory, rlang::current_env())
@@ -222,6 +218,9 @@ variables_now <- function(place, names) {
 }
 
 warn_of_memory <- function(changed, call) {
+  if (!length(changed)) {
+    return()
+  }
   rlang::warn(
     c(paste0("The policy changes `", changed[[1L]], "` outside of itself from call to call: ",
              "episodes that are played together, or one after the other, share it."),

@@ -71,7 +71,10 @@ box_action <- function(space, outputs, policy, one) {
 
 is_gaussian <- function(policy) identical(policy$output, "gaussian")
 
-draws_by_probability <- function(policy) policy$output %in% c("softmax", "gaussian", NA)
+# Whether each action has a log-probability. An output that is the environment's own will have one.
+has_log_prob <- function(policy) policy$output %in% c("softmax", "gaussian")
+
+draws_by_probability <- function(policy) is.na(policy$output) || has_log_prob(policy)
 
 # The policy that takes the most likely action, or that of the largest value.
 greedy_policy <- function(policy) {

@@ -100,6 +100,14 @@ draw_table_actions <- function(policy, rows) {
   choice
 }
 
+# How likely a table takes each action in each state. A state without an action is an end, where
+# none is taken: its row may have any.
+table_probabilities <- function(policy) {
+  q <- policy$q
+  q[row_max(q) == -Inf, ] <- 0
+  row_probabilities(policy, q)
+}
+
 # How likely each action is, a row for each state.
 row_probabilities <- function(policy, rows) {
   if (!is.null(policy$temperature)) {

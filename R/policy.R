@@ -83,14 +83,10 @@ act.default <- function(policy, observation, ...) {
 
 #' @export
 act.function <- function(policy, observation, ...) {
-  if (is.data.frame(observation)) {
-    observation <- as.matrix(observation)
+  if (!is_one_vector(observation)) {
+    return(policy(function_rows(observation)))
   }
-  if (!is.atomic(observation) || !is.null(dim(observation))) {
-    return(policy(observation))
-  }
-  row <- matrix(observation, nrow = 1L, dimnames = list(NULL, names(observation)))
-  action <- policy(row)
+  action <- policy(function_rows(observation))
   if (is.list(action)) {
     return(action)
   }
@@ -101,6 +97,19 @@ act.function <- function(policy, observation, ...) {
   shape <- dim(action)
   dim(action) <- if (length(shape) > 2L) shape[-1L]
   action
+}
+
+is_one_vector <- function(observation) is.atomic(observation) && is.null(dim(observation))
+
+# Observations as functions get them: a vector is one, in a matrix of one row.
+function_rows <- function(observation) {
+  if (is.data.frame(observation)) {
+    as.matrix(observation)
+  } else if (is_one_vector(observation)) {
+    matrix(observation, nrow = 1L, dimnames = list(NULL, names(observation)))
+  } else {
+    observation
+  }
 }
 
 #' @export

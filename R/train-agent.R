@@ -154,6 +154,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   kwargs <- list(...)
   solved_by <- check_choice(solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
   online <- learns_online(agent)
+  check_flag(model)
   settings <- list(
     agent = agent, env = env, kwargs = kwargs,
     # A learner makes its own.
@@ -170,7 +171,6 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   check_training(settings, call)
   check_flag(progress)
   check_flag(resume)
-  check_flag(model)
   check_string(log, allow_null = TRUE)
   check_string(checkpoint, allow_null = TRUE)
   seeds <- plain_numbers(seeds)
@@ -334,10 +334,9 @@ check_no_steps <- function(names, call) {
 # An argument that is misspelt would be taken for one of the environment's own. One that only
 # resembles another may be that: it is refused where training cannot begin anyway.
 check_spelling <- function(names, choices, can_begin, call) {
-  plain <- function(x) lower_case(gsub("[._]", "", x))
   for (name in names) {
     near <- nearest_name(name, choices)
-    if (length(near) && (plain(near) == plain(name) || !can_begin)) {
+    if (length(near) && (plain_name(near) == plain_name(name) || !can_begin)) {
       gym_abort(
         c(paste0("There is no argument `", name, "`."), i = paste0("Did you mean `", near, "`?")),
         class = "gym_error_argument", argument = name, call = call
@@ -380,8 +379,9 @@ check_agent <- function(agent, call) {
         i = if (is.character(agent)) {
           paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",
                  "`agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables ",
-                 "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`. Others, such ",
-                 "as SAC, are left to Stable-Baselines3 or torch.")
+                 "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`, ",
+                 "`agent_actor_critic()`. Others, such as SAC, are left to Stable-Baselines3 or ",
+                 "torch.")
         }),
       class = "gym_error_argument", argument = "agent", value = agent, call = call
     )

@@ -125,9 +125,8 @@ learn_episodes <- function(state, vector_env, settings, call) {
     if (is.null(settings$sampled) && plan_kind() != "none") inform_learner_plays_here()
     learn_alone(learner, state, vector_env, settings, call)
   } else {
-    learner_episodes(
-      side_by_side(learner, state$agent, call), state, vector_env, settings
-    )
+    playing <- side_by_side(learner, state$agent, call)
+    episode_results(play_iteration(state, vector_env, settings, learner = playing))
   }
   c(list(agent = learner$export()), played)
 }
@@ -146,13 +145,8 @@ learns_beside <- function(learner, agent, vector_env, settings) {
 }
 
 learn_beside <- function(learner, state, vector_env, settings) {
-  history <- new_history(1L, settings$episodes, state$streams)
-  history$draw_seeds <- draw_training_seeds
   policy <- with_generator(state$streams$agent, learner$whole$policy())
-  play_batches(
-    vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf,
-    report = function(ended) state$report(history$played_episodes + ended), keep_steps = TRUE
-  )
+  history <- play_iteration(state, vector_env, settings, policy, keep_steps = TRUE)
   before <- 0L
   for (batch in history$batches) {
     for (steps in batch$steps) {
@@ -164,7 +158,7 @@ learn_beside <- function(learner, state, vector_env, settings) {
     }
     before <- before + length(batch$return)
   }
-  played_of(history, learner$export())
+  c(list(agent = learner$export()), episode_results(history))
 }
 
 # One sub-environment plays one episode after the other.
@@ -194,26 +188,19 @@ learn_by_methods <- function(state, vector_env, settings, call) {
       check_is_agent(agent, "agent_observe()", call)
     }
   )
-  played <- learner_episodes(learner, state, vector_env, settings)
-  c(list(agent = agent), played)
+  history <- play_iteration(state, vector_env, settings, learner = learner)
+  c(list(agent = agent), episode_results(history))
 }
 
 # The episodes of an iteration in the loop of all that plays.
-learner_episodes <- function(learner, state, vector_env, settings) {
+play_iteration <- function(state, vector_env, settings, policy = NULL, ...) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
   play_batches(
-    vector_env, history, function(which) NULL, learner = learner,
-    report = function(ended) state$report(history$played_episodes + ended),
-    max_steps = settings$max_steps %||% Inf
+    vector_env, history, function(which) policy, ..., max_steps = settings$max_steps %||% Inf,
+    report = function(ended) state$report(history$played_episodes + ended)
   )
-  played_of(history)
-}
-
-played_of <- function(history, agent = NULL) {
-  each <- function(name) unlist(lapply(history$batches, function(batch) batch[[name]]))
-  c(if (!is.null(agent)) list(agent = agent),
-    list(returns = each("return"), lengths = each("length")))
+  history
 }
 
 # A value that has become infinite stays so.

@@ -104,6 +104,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
   episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
+  # An agent that learns from steps is told by its episodes, not by the means of candidates.
   if ("trajectories" %in% needs) results[c("returns", "lengths")] <- episode_results(history)
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
@@ -121,9 +122,9 @@ asked_candidates <- function(state, agent, call) {
   list(candidates = policy_candidates(policy, asked), weights = asked)
 }
 
-# An agent that learns from steps is told by its episodes, not by the means of candidates.
+# The returns and lengths of all episodes that were played.
 episode_results <- function(history) {
-  lapply(c("return", "length"), function(name) {
+  lapply(c(returns = "return", lengths = "length"), function(name) {
     unlist(lapply(history$batches, `[[`, name))
   })
 }

@@ -36,14 +36,16 @@ seconds_text <- function(seconds) {
   }
 }
 
+# A name without what people mix up in names.
+plain_name <- function(x) gsub("[._]", "", lower_case(x))
+
 # The one of `choices` that `name` seems to be a misspelling of; character(0) for none.
 nearest_name <- function(name, choices) {
-  plain <- function(x) gsub("[._]", "", lower_case(x))
   ordered <- function(x) {
     vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
   }
-  distance <- function(form) utils::adist(form(plain(name)), form(plain(choices)))[1L, ]
-  begins <- nchar(name) > 3L & startsWith(plain(choices), plain(name))
+  distance <- function(form) utils::adist(form(plain_name(name)), form(plain_name(choices)))[1L, ]
+  begins <- nchar(name) > 3L & startsWith(plain_name(choices), plain_name(name))
   close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins
   # Of equally near names the one with the same letters is better.
   best <- order(distance(identity), distance(ordered))

@@ -38,3 +38,11 @@ test_that("an action may be given by what it means, one or one for each sub-envi
   })
   expect_identical(results[[1]], results[[2]])
 })
+
+test_that("text is no action where the meaning of actions is not known", {
+  env <- local_env("Blackjack-v1")
+  env$reset(seed = 1)
+  expect_error(env$step("1"), class = "gym_error_space")
+  names <- list(spec = list(id = "Own-v0"), single_action_space = discrete_space(2L))
+  expect_identical(numbered_actions(names, "1", NULL), "1")
+})
