@@ -27,16 +27,18 @@ def describe(space: Space) -> dict[str, object]:
 def _check(space: Space, whole: Space, depth: int) -> None:
     if description.dispatch(type(space)) is description.dispatch(object):
         raise _unsupported(
-            whole,
+            brief_space(whole),
             f"spaces of kind {type(space).__name__} are not supported",
             "supported are " + ", ".join(sorted(_supported())),
         )
     if depth + len(space.shape or ()) > DEEPEST:
-        raise _unsupported(whole, f"it is nested deeper than {DEEPEST} levels")
+        # Its text would be as deep: a destructor that Python runs there would fail.
+        raise _unsupported(type(whole).__name__, f"it is nested deeper than {DEEPEST} levels")
     if isinstance(space, Box) and space.dtype.kind == "f" and space.dtype.itemsize > 8:
-        raise _unsupported(whole, f"its dtype {space.dtype.name} has more digits than the wire")
+        wide = f"its dtype {space.dtype.name} has more digits than the wire"
+        raise _unsupported(brief_space(whole), wide)
     if isinstance(space, Dict) and len(set(map(str, space.spaces))) < len(space.spaces):
-        raise _unsupported(whole, "two of its keys are the same as text")
+        raise _unsupported(brief_space(whole), "two of its keys are the same as text")
     for part in _parts(space):
         _check(part, whole, depth + (2 if isinstance(space, Graph) else 1))
 
@@ -59,9 +61,9 @@ def _supported() -> list[str]:
     return [kind.__name__ for kind in description.registry if kind is not object]
 
 
-def _unsupported(space: Space, reason: str, hint: str | None = None) -> GymServerError:
+def _unsupported(space: str, reason: str, hint: str | None = None) -> GymServerError:
     return GymServerError(
         "unsupported_space",
-        f"This server does not support the space {brief_space(space)}: {reason}",
+        f"This server does not support the space {space}: {reason}",
         hint,
     )
