@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo bench test test-all soak check lint document clean
+.PHONY: help demo bench test test-all soak check lint document site clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -22,6 +22,7 @@ help:
 	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
 	@echo 'make lint      lintr and the order of the files for R; ruff, import-linter and mypy for Python'
+	@echo 'make site      the site (pkgdown) in site/, its links checked; ten minutes'
 	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
 	@echo 'make clean     remove everything that these made'
 	@echo
@@ -31,6 +32,8 @@ help:
 demo:
 	@tools/setup demo
 	@tools/in-env Rscript --no-init-file tools/demo.R
+	@tools/setup pages
+	@tools/in-env Rscript --no-init-file tools/pages.R
 
 bench:
 	@tools/setup bench
@@ -61,7 +64,11 @@ document:
 	@tools/setup document
 	@tools/in-env Rscript --no-init-file -e 'roxygen2::roxygenise()'
 
+site:
+	@tools/setup site
+	@tools/in-env Rscript --no-init-file tools/site.R
+
 clean:
-	rm -rf .venv .r-library .cran-library pictures gym.Rcheck gym_*.tar.gz
+	rm -rf .venv .r-library .cran-library pictures site gym.Rcheck gym_*.tar.gz
 	find inst -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf inst/server/.pytest_cache inst/server/.ruff_cache inst/server/.mypy_cache

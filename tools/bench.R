@@ -4,8 +4,7 @@
 # step. All in one run, turn by turn.
 #
 #   make bench              half an hour; writes vignettes/bench.csv, vignettes/bench.md,
-#                           vignettes/bench.png, vignettes/bench-environments.png and
-#                           the figures in README.md
+#                           vignettes/bench.png and vignettes/bench-environments.png
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
@@ -18,7 +17,7 @@
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
                "rollouts", "beside", "wire", "gradients", "results", "goals", "table", "figure",
-               "figure-environments", "readme")) {
+               "figure-environments")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
 source("vignettes/pictures.R")
@@ -151,4 +150,3 @@ report(
   result, csv = at(".csv"), text = at(".md"), figure = at(".png"),
   environments = at("-environments.png")
 )
-if (whole) write_readme(result$rows, result$run)

@@ -7,17 +7,7 @@ excusable <- c(
   "Packages? suggested but not available for checking: *'sigmoid' *$"
 )
 
-# What R CMD build would copy before it drops it: the tools' own folders are left behind at once.
-copy_of_checkout <- function(into) {
-  left_behind <- c(".git", ".venv", ".r-library", ".cran-library", "pictures", "server")
-  files <- setdiff(list.files(all.files = TRUE, no.. = TRUE), left_behind)
-  dir.create(into)
-  stopifnot(file.copy(files, into, recursive = TRUE))
-}
-
-r_cmd <- function(...) {
-  system2(file.path(R.home("bin"), "R"), c("CMD", ...), stdout = "", stderr = "", stdin = "")
-}
+source("tools/tarball.R")
 
 inexcusable <- function(log) {
   found <- tools::check_packages_in_dir_details(logs = log, drop_ok = TRUE)
@@ -27,11 +17,9 @@ inexcusable <- function(log) {
 }
 
 check_package <- function(folder) {
-  copy_of_checkout(file.path(folder, "gym"))
+  tarball <- build_tarball(folder)
   here <- setwd(folder)
   on.exit(setwd(here))
-  if (r_cmd("build", "gym") != 0) stop("R CMD build failed", call. = FALSE)
-  tarball <- list.files(pattern = "^gym_.*[.]tar[.]gz$")
   Sys.setenv("_R_CHECK_FORCE_SUGGESTS_" = "false")
   status <- r_cmd("check", "--no-manual", "--no-vignettes", tarball)
   log <- file.path("gym.Rcheck", "00check.log")

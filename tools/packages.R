@@ -28,6 +28,8 @@ goal_packages <- function(goal) {
     bench = list(need = c(imports, benchmarks)),
     test = list(need = c(imports, "testthat"), want = optional),
     check = list(need = c(imports, "testthat", vignettes, "codetools"), want = optional),
+    pages = list(need = imports, want = c(vignettes, "magick")),
+    site = list(need = c(imports, vignettes, "pkgdown"), want = optional),
     lint = list(need = c("lintr", "codetools")),
     document = list(need = c(imports, "roxygen2"))
   )

@@ -6,11 +6,9 @@
 #     [methods=METHOD,...]
 #
 # It takes hours. What the tables have already is not trained again, so that it may be stopped at
-# any time; a row that is to be made anew is deleted from both first. At the end the short table of
-# README.md is written.
+# any time; a row that is to be made anew is deleted from both first.
 source("tools/processes.R")
 source("tools/solve/jobs.R")
-source("tools/solve/readme.R")
 
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
 methods <- strsplit(option("methods", paste(unique(solve_jobs$method), collapse = ",")), ",")[[1L]]
@@ -57,4 +55,3 @@ run_side_by_side(
     ))
   }
 )
-write_readme_rows()

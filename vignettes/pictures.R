@@ -11,12 +11,14 @@ fewer_colours <- function(files, max = 32) {
   }
 }
 
-# The options of a vignette's chunks. What they draw has fewer colours, where magick is there.
+# The options of a vignette's chunks. What they draw has fewer colours, where magick is there; on the
+# site, where there is room, pictures are as pkgdown draws them.
 set_up_pictures <- function(height) {
-  knitr::opts_chunk$set(
-    collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height, dpi = 64,
-    dev.args = list(antialias = "none")
-  )
+  knitr::opts_chunk$set(collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height)
+  if (identical(Sys.getenv("IN_PKGDOWN"), "true")) {
+    return(invisible())
+  }
+  knitr::opts_chunk$set(dpi = 64, dev = "png", dev.args = list(antialias = "none"))
   write_link <- knitr::knit_hooks$get("plot")
   knitr::knit_hooks$set(plot = function(x, options) {
     was_drawn <- startsWith(x, options$fig.path) && grepl("[.]png$", x)

@@ -1,0 +1,48 @@
+# Builds the site into site/, with no network and no server but the one that the articles start, and
+# checks that what its pages link to in the site is there.
+options(pkgdown.internet = FALSE)
+folder <- "site"
+
+# Where a page's links lead: files of the site, each with the place in it, if one is named.
+local_links <- function(page) {
+  html <- xml2::read_html(page)
+  links <- c(
+    xml2::xml_attr(xml2::xml_find_all(html, "//a[@href]"), "href"),
+    xml2::xml_attr(xml2::xml_find_all(html, "//*[@src]"), "src")
+  )
+  links <- unique(grep("^([a-z]+:|//|#$|$)", links, value = TRUE, invert = TRUE))
+  to <- utils::URLdecode(sub("#.*", "", links))
+  data.frame(
+    link = links, to = ifelse(nzchar(to), file.path(dirname(page), to), page),
+    place = ifelse(grepl("#", links), sub(".*#", "", links), "")
+  )
+}
+
+broken_links <- function(page) {
+  links <- local_links(page)
+  is_there <- function(to, place) {
+    if (dir.exists(to)) to <- file.path(to, "index.html")
+    file.exists(to) && (!nzchar(place) || place %in% places(to))
+  }
+  links$link[!mapply(is_there, links$to, links$place, USE.NAMES = FALSE)]
+}
+
+known_places <- new.env()
+places <- function(page) {
+  page <- normalizePath(page)
+  if (is.null(known_places[[page]])) {
+    known_places[[page]] <- xml2::xml_text(xml2::xml_find_all(xml2::read_html(page), "//@id"))
+  }
+  known_places[[page]]
+}
+
+pkgdown::build_site(
+  preview = FALSE, install = FALSE, devel = FALSE, lazy = FALSE, new_process = FALSE,
+  override = list(destination = folder)
+)
+pages <- list.files(folder, "[.]html$", recursive = TRUE, full.names = TRUE)
+broken <- Filter(length, sapply(pages, broken_links, simplify = FALSE))
+for (page in names(broken)) cat(page, ": ", toString(broken[[page]]), "\n", sep = "")
+cat(sprintf("%d pages, %d broken links; open %s/index.html\n", length(pages),
+            length(unlist(broken)), folder))
+quit(status = if (length(broken) > 0) 1 else 0)

@@ -1,0 +1,22 @@
+# Builds the package with its vignettes.
+
+r_cmd <- function(...) {
+  system2(file.path(R.home("bin"), "R"), c("CMD", ...), stdout = "", stderr = "", stdin = "")
+}
+
+# What R CMD build would copy before it drops it: the tools' own folders are left behind at once.
+copy_of_checkout <- function(into) {
+  left_behind <- c(".git", ".venv", ".r-library", ".cran-library", "pictures", "site", "server")
+  files <- setdiff(list.files(all.files = TRUE, no.. = TRUE), left_behind)
+  dir.create(into)
+  stopifnot(file.copy(files, into, recursive = TRUE))
+}
+
+# Builds the checkout in `folder`; returns the tarball's path.
+build_tarball <- function(folder) {
+  copy_of_checkout(file.path(folder, "gym"))
+  here <- setwd(folder)
+  on.exit(setwd(here))
+  if (r_cmd("build", "gym") != 0) stop("R CMD build failed", call. = FALSE)
+  file.path(folder, list.files(pattern = "^gym_.*[.]tar[.]gz$"))
+}
