@@ -36,11 +36,34 @@ places <- function(page) {
   known_places[[page]]
 }
 
+# README.md and SECURITY.md link to the repository's files; the site has pages of them.
+link_to_pages <- function(text) {
+  text <- gsub('href="vignettes/(articles/)?([^"/]*)[.]Rmd"', 'href="articles/\\2.html"', text)
+  gsub('href="NEWS[.](md|html)"', 'href="news/index.html"', text)
+}
+
+# pkgdown's pages load scripts from the network. pkgdown/extra.js does what is needed of them.
+without_network <- function(text) {
+  text <- gsub('<script src="(https?:|file:)[^>]*></script>', "", text)
+  text <- gsub('<link rel="stylesheet" href="https?:[^>]*>', "", text)
+  sub('<script src="((../)*)pkgdown[.]js"></script>', '<script src="\\1search.js"></script>', text)
+}
+
+change_page <- function(page) {
+  text <- without_network(readLines(page, encoding = "UTF-8"))
+  if (dirname(page) == folder) text <- link_to_pages(text)
+  writeLines(text, page, useBytes = TRUE)
+}
+
 pkgdown::build_site(
   preview = FALSE, install = FALSE, devel = FALSE, lazy = FALSE, new_process = FALSE,
   override = list(destination = folder)
 )
+places_found <- readLines(file.path(folder, "search.json"), encoding = "UTF-8", warn = FALSE)
+writeLines(c("const searchPlaces =", places_found, ";"), file.path(folder, "search.js"),
+           useBytes = TRUE)
 pages <- list.files(folder, "[.]html$", recursive = TRUE, full.names = TRUE)
+for (page in pages) change_page(page)
 broken <- Filter(length, sapply(pages, broken_links, simplify = FALSE))
 for (page in names(broken)) cat(page, ": ", toString(broken[[page]]), "\n", sep = "")
 cat(sprintf("%d pages, %d broken links; open %s/index.html\n", length(pages),
