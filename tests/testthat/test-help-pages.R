@@ -63,3 +63,13 @@ test_that("texts name the tutorial, and do not take it for known as a post", {
     }
   }
 })
+
+test_that("the cheat sheet's functions are there", {
+  sheet <- paste(readLines(source_tree("tools/cheatsheet/cheatsheet.html")), collapse = "\n")
+  every <- function(pattern, text) regmatches(text, gregexpr(pattern, text, perl = TRUE))[[1L]]
+  code <- gsub("<[^>]*>", "", every("(?s)<pre>.*?</pre>", sheet))
+  called <- unique(unlist(lapply(code, every, pattern = "(?<![$:[:alnum:]_.])[A-Za-z_]+(?=\\()")))
+  base <- c("function", "list", "c", "abs", "library", "plot", "summary", "coef")
+  expect_gt(length(called), 30L)
+  expect_identical(setdiff(called, c(getNamespaceExports("gym"), base)), character())
+})
