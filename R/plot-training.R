@@ -99,7 +99,7 @@ check_has_history <- function(x, call = rlang::caller_env()) {
 # The evaluations with the steps that had been taken. Of several final ones the last counts.
 placed_evaluations <- function(x) {
   evaluations <- x$evaluations
-  evaluations$steps <- x$history$steps[evaluations$iteration]
+  evaluations$steps <- evaluation_steps(x)
   earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
   evaluations[!earlier, ]
 }

@@ -7,9 +7,10 @@
 #' a band, of a single training its evaluations as a line; the target is a dashed line. Several that
 #' are given together are compared in one picture.
 #'
-#' Between two evaluations a training's return is taken from the straight line between them, and
-#' from its end on it stays what its final evaluation found. A picture begins where all seeds were
-#' evaluated once.
+#' Between two evaluations a training's return is taken from the straight line between them. The line
+#' of several seeds is thick as long as all of them train. From where the first one has ended it is
+#' thin, as that of a training that has ended is: a seed that has ended counts with its last
+#' evaluation. A picture begins where all seeds were evaluated once.
 #'
 #' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
 #' `plot()` prints it, too.
@@ -35,7 +36,9 @@ autoplot.gym_trainings <- function(object, ...) {
 }
 
 trainings_picture <- function(trainings, call = rlang::caller_env()) {
-  curves <- do.call(rbind, Map(trainings_curve, trainings, names(trainings), list(call)))
+  each <- Map(evaluation_curves, trainings, names(trainings), list(call))
+  last <- max(vapply(unlist(each, recursive = FALSE), function(curve) max(curve$steps), 0))
+  curves <- do.call(rbind, Map(trainings_curve, each, names(trainings), last))
   curves$label <- factor(curves$label, names(trainings))
   target <- common_target(trainings)
   alone <- curves[curves$label %in% names(which(table(curves$label) == 1L)), ]
@@ -49,7 +52,13 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
       linetype = "blank", show.legend = FALSE
     ) +
     target_line(target) +
-    ggplot2::geom_line(ggplot2::aes(y = .data$median), linewidth = 0.8) +
+    ggplot2::geom_line(
+      ggplot2::aes(y = .data$median), lines_of(curves, !curves$ended), linewidth = 0.8
+    ) +
+    ggplot2::geom_line(
+      ggplot2::aes(y = .data$median), lines_of(curves, curves$steps >= curves$first_end),
+      linewidth = 0.3, show.legend = FALSE
+    ) +
     # A line of one point is not seen.
     ggplot2::geom_pointrange(
       ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper), alone,
@@ -61,9 +70,24 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     picture_labels(
       trainings_title(trainings),
       if (seeds) "line: median of the seeds, band: their middle half",
-      x = training_steps_label, y = "mean return of the policy"
+      x = training_steps_label, y = "mean return of the policy",
+      caption = if (any(curves$ended)) ended_caption(seeds)
     ) +
     theme_gym()
+}
+
+# The rows of those labels of which these are more than a point.
+lines_of <- function(curves, rows) {
+  curves <- curves[rows, ]
+  curves[curves$label %in% names(which(table(curves$label) > 1L)), ]
+}
+
+ended_caption <- function(seeds) {
+  if (seeds) {
+    "thin line: a seed has ended, and counts with its last evaluation"
+  } else {
+    "thin line: the training has ended, with this evaluation"
+  }
 }
 
 given_trainings <- function(values, call = rlang::caller_env()) {
@@ -87,7 +111,8 @@ common_target <- function(trainings) {
 # At how many places along the axis the seeds are compared.
 curve_places <- 200L
 
-trainings_curve <- function(x, label, call) {
+# The evaluations of each seed.
+evaluation_curves <- function(x, label, call) {
   each <- lapply(if (inherits(x, "gym_trainings")) x$trainings else list(x), evaluation_curve)
   each <- each[vapply(each, nrow, 0L) > 0L]
   if (!length(each)) {
@@ -96,13 +121,32 @@ trainings_curve <- function(x, label, call) {
       class = "gym_error_argument", argument = "x", value = x, call = call
     )
   }
+  each
+}
+
+# The evaluations of a training; of several at one place the last, which had the most episodes.
+evaluation_curve <- function(training) {
+  steps <- evaluation_steps(training)
+  last <- !duplicated(steps, fromLast = TRUE)
+  data.frame(steps = steps[last], mean_return = training$evaluations$mean_return[last])
+}
+
+#' Compute the line and the band of one training or several seeds
+#' @param each What [evaluation_curves()] returned.
+#' @param last Where the picture ends, in steps.
+#' @return A data frame with a row for each place: `label`, `steps`, `median`, `lower`, `upper` of
+#'   the seeds, `ended`, whether a seed had ended before, and `first_end`, where the first one did.
+#' @noRd
+trainings_curve <- function(each, label, last) {
   from <- max(vapply(each, function(curve) min(curve$steps), 0))
-  to <- max(vapply(each, function(curve) max(curve$steps), 0))
+  ends <- vapply(each, function(curve) max(curve$steps), 0)
+  first_end <- max(from, min(ends))
   steps <- if (length(each) == 1L) {
     each[[1L]]$steps
   } else {
-    unique(seq(min(from, to), to, length.out = curve_places))
+    seq(min(from, max(ends)), max(ends), length.out = curve_places)
   }
+  steps <- sort(unique(c(steps, first_end, if (length(steps) > 1L) last)))
   values <- vapply(each, function(curve) {
     # With a single evaluation it stays what it was.
     if (nrow(curve) == 1L) {
@@ -115,16 +159,8 @@ trainings_curve <- function(x, label, call) {
   quantile <- function(p) apply(values, 1L, stats::quantile, probs = p, names = FALSE)
   data.frame(
     label = label, steps = steps, median = quantile(0.5), lower = quantile(0.25),
-    upper = quantile(0.75), row.names = NULL
+    upper = quantile(0.75), ended = steps > first_end, first_end = first_end, row.names = NULL
   )
-}
-
-# The evaluations of a training; of several at one place the last, which had the most episodes.
-evaluation_curve <- function(training) {
-  evaluations <- training$evaluations
-  steps <- training$history$steps[evaluations$iteration]
-  last <- !duplicated(steps, fromLast = TRUE)
-  data.frame(steps = steps[last], mean_return = evaluations$mean_return[last])
 }
 
 trainings_title <- function(trainings) {

@@ -6,13 +6,16 @@
 #'
 #' # When training ends
 #'
-#' Every `eval_every` iterations the agent's own policy plays `curve_episodes` episodes, which make
-#' the learning curve. When these, or the candidates of an iteration, reach the target in the mean,
+#' Before the first iteration and every `eval_every` iterations the agent's own policy plays
+#' `eval_episodes_curve` episodes, which make the learning curve. When these, or the candidates of an iteration, reach the target in the mean,
 #' the policy plays `eval_episodes` fresh ones, and these decide whether training ends. That may
 #' happen several times, and the time at which it ends is then one at which the policy was lucky. So
 #' at the end the policy plays `eval_episodes` further episodes, once, whose seeds nothing has seen
 #' before: their mean return is what the training has come to. Steps of evaluations are not counted
 #' as steps of the training.
+#'
+#' Where episodes have no limit of steps, neither the environment's nor `max_steps`, the policy is not
+#' evaluated before the first iteration: untrained, it might never end an episode.
 #'
 #' A learner's policy is calculated instead of played where the model of the environment is known
 #' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
@@ -63,12 +66,13 @@
 #'   least 1; the default is 10.
 #' @param eval_episodes How many episodes decide whether training ends, and make the final
 #'   evaluation, a whole number of at least 2; the default is 100.
+#' @param eval_episodes_curve How many episodes make a point of the learning curve, a whole number,
+#'   at most `eval_episodes` of which are played; the default is 10. With 0 there is no curve, and no
+#'   time is spent on it.
 #' @param evaluate How evaluations play a network that draws its actions, as agents that follow
 #'   gradients have: `"greedy"`, the default, by its most likely actions, or `"draw"`, as it is. The
 #'   same policy decides when training ends, is evaluated at the end, and is returned. Training
 #'   plays the agent's [behavior policy][agent_behavior()].
-#' @param curve_episodes How many episodes make a point of the learning curve, a whole number; the
-#'   default is 10. With 0 there is no curve, and a learner without a model spends no time on it.
 #' @param seed A whole number that fixes all that is drawn, as for [rollout()].
 #' @param seeds `NULL`, the default, or different whole numbers: then the agent is trained anew with
 #'   each of them, and all trainings are returned. Each is the one that `train_agent(seed = )` gives
@@ -111,7 +115,8 @@
 #'       from steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean
 #'       return of the agent's policy, `NA` where it was not looked at), `elapsed` (seconds, `NA`
 #'       for the rounds of a search) and what [agent_log()] gives.}
-#'     \item{evaluations}{A data frame with a row for each evaluation: `iteration`, `kind`
+#'     \item{evaluations}{A data frame with a row for each evaluation: `iteration` (0 before the
+#'       first), `kind`
 #'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
 #'       `mean_return` on.}
 #'     \item{final}{The last of these rows, the final evaluation. `NULL` where training was
@@ -139,12 +144,12 @@
 #' trained$final
 train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_steps = NULL,
                         episodes = 1, target = NULL, max_steps = NULL, eval_every = 10,
-                        eval_episodes = 100, evaluate = c("greedy", "draw"), seed = NULL,
-                        seeds = NULL, ...,
+                        eval_episodes = 100, eval_episodes_curve = 10,
+                        evaluate = c("greedy", "draw"), seed = NULL, seeds = NULL, ...,
                         solved_by = c("evaluation", "candidate"), callback = NULL, log = NULL,
                         checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
                         num_envs = NULL, num_workers = NULL, model = TRUE,
-                        curve_episodes = 10, client = gym_client()) {
+                        client = gym_client()) {
   call <- rlang::current_env()
   check_agent(agent, call)
   check_no_steps(...names(), call)
@@ -162,8 +167,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
     iterations = iterations, total_steps = total_steps, episodes = episodes, target = target,
     max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes,
     evaluate = check_choice(evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
-    curve_episodes = curve_episodes, seed = seed,
-    callback = callback,
+    eval_episodes_curve = eval_episodes_curve, seed = seed, callback = callback,
     # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
     search = solved_by == "candidate",
     may_sample = online && model
@@ -306,7 +310,9 @@ check_training <- function(settings, call) {
   for (name in c("episodes", "eval_every")) {
     check_count(settings[[name]], arg = name, call = call)
   }
-  check_count(settings$curve_episodes, min = 0, arg = "curve_episodes", call = call)
+  check_count(
+    settings$eval_episodes_curve, min = 0, arg = "eval_episodes_curve", call = call
+  )
   check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
   if (is.null(settings$iterations) && is.null(settings$total_steps)) {
     abort_no_budget(call = call)

@@ -2,7 +2,7 @@
 # not at all.
 
 # The version of the file's format. Files with another version are refused.
-checkpoint_format <- 7L
+checkpoint_format <- 8L
 
 #' Read the file of a training
 #' @return What [training_checkpoint()] wrote, `NULL` where there is no file.

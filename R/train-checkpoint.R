@@ -114,7 +114,7 @@ inform_resumed <- function(text, .envir = parent.frame()) {
 # whose rounds are cut into batches by it.
 training_arguments <- function(settings) {
   numbers <- c(
-    "episodes", "target", "max_steps", "eval_every", "eval_episodes", "curve_episodes", "seed"
+    "episodes", "target", "max_steps", "eval_every", "eval_episodes", "eval_episodes_curve", "seed"
   )
   c(
     list(

@@ -17,9 +17,8 @@ training_ends <- function(state, vector_env, settings) {
   if (settings$search) {
     return(state$solved <- reached)
   }
-  episodes <- min(settings$curve_episodes, settings$eval_episodes)
-  if (!reached && episodes > 0 && state$iteration %% settings$eval_every == 0) {
-    curve <- evaluate_agent(state, vector_env, settings, "curve", episodes)
+  if (!reached && state$iteration %% settings$eval_every == 0) {
+    curve <- evaluate_for_curve(state, vector_env, settings)
     reached <- reaches(curve$mean_return, settings$target)
   }
   if (reached) {
@@ -27,6 +26,19 @@ training_ends <- function(state, vector_env, settings) {
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
+}
+
+# The untrained policy, where its episodes are sure to end.
+evaluate_start <- function(state, vector_env, settings) {
+  limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
+  if (!settings$search && !state$iteration && !length(state$evaluations) && !is.null(limit)) {
+    evaluate_for_curve(state, vector_env, settings)
+  }
+}
+
+evaluate_for_curve <- function(state, vector_env, settings) {
+  episodes <- min(settings$eval_episodes_curve, settings$eval_episodes)
+  if (episodes > 0) evaluate_agent(state, vector_env, settings, "curve", episodes)
 }
 
 #' Evaluate the agent's policy: in fresh episodes, or exactly where it is judged by a model
@@ -58,9 +70,9 @@ judged_policy <- function(settings, agent) {
 
 play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {
   # The final evaluation draws from copies: a training that goes on with a larger budget evaluates
-  # as one that had it from the start.
+  # as one that had it from the start. So does the first one, which changes no later one.
   streams <- state$evaluation_streams
-  if (final) streams <- restore_streams(saved_streams(streams))
+  if (final || !state$iteration) streams <- restore_streams(saved_streams(streams))
   half <- last_training_seed / 2
   before <- last_training_seed + if (final) half - 1 else 0
   history <- new_history(1L, episodes, streams)

@@ -27,6 +27,7 @@ new_state <- function(settings) {
 run_training <- function(state, vector_env, settings, progress, call) {
   show <- training_progress(settings, state, progress)
   play <- function() {
+    evaluate_start(state, vector_env, settings)
     while (!is_over(settings, state)) {
       train_iteration(state, vector_env, settings, call)
       state$ended <- training_ends(state, vector_env, settings)

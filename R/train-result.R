@@ -110,6 +110,9 @@ coef.gym_training <- function(object, ...) {
   stats::coef(object$policy)
 }
 
+# How many steps of the training had been taken at each evaluation.
+evaluation_steps <- function(x) c(0, x$history$steps)[x$evaluations$iteration + 1L]
+
 # Whose returns an iteration's row is about: an agent that learns from steps plays one policy.
 returned_unit <- function(agent) {
   by_steps <- learns_online(agent) || "trajectories" %in% agent_needs(agent)

@@ -64,6 +64,29 @@ test_that("trainings that are given together are compared, by their names", {
   expect_error(autoplot(ars, col = 3), "no argument for `col`", class = "gym_error_argument")
 })
 
+test_that("from where a seed has ended the line is thin, and the caption says so", {
+  ends <- trainings_of(training_of(c(10, 40), c(1, 4)), training_of(c(10, 20), c(3, 6)))
+  picture <- drawn(autoplot(A = ends, B = training_of(c(10, 60), c(0, 5))))
+  line <- layers_of(picture, "GeomLine")
+  of_first <- function(line) range(line$x[line$colour == series_colours[[1]]])
+  expect_identical(of_first(line[[1]]), c(10, 20))
+  expect_identical(of_first(line[[2]]), c(20, 60))
+  expect_lt(line[[2]]$linewidth[[1]], line[[1]]$linewidth[[1]])
+  expect_false(series_colours[[2]] %in% line[[2]]$colour)
+  expect_match(picture$labels$caption, "a seed has ended, and counts with its last evaluation")
+  curve <- picture$data[picture$data$label == "A", ]
+  expect_identical(curve$median[nrow(curve)], 5)
+  whole <- autoplot(trainings_of(training_of(c(10, 40), c(1, 4)), training_of(c(10, 40), c(3, 6))))
+  expect_null(whole$labels$caption)
+})
+
+test_that("a curve begins before the first iteration", {
+  trained <- training_of(c(10, 20), c(4, 6))
+  trained$evaluations <- rbind(data.frame(iteration = 0, kind = "curve", mean_return = 1),
+                               trained$evaluations)
+  expect_identical(autoplot(trained, trained)$data$steps[1:3], c(0, 10, 20))
+})
+
 test_that("trainings that were evaluated once are a point and a bar", {
   once <- trainings_of(training_of(10, 1), training_of(10, 3), training_of(10, 2))
   bar <- layers_of(suppressMessages(autoplot(once)), "GeomPointrange")[[1]]

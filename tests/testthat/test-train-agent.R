@@ -47,6 +47,38 @@ test_that("evaluations change nothing of the training, and play episodes of thei
   expect_identical(which(parts == levels(parts)[[3]]), 127:131)
 })
 
+test_that("the untrained policy is evaluated where episodes have a limit, and changes nothing", {
+  play <- function(...) {
+    quiet_training(agent_ars(), iterations = 6, target = Inf, ...,
+                   env = fake_environment(reward = first_action))
+  }
+  trained <- play(max_steps = 3)
+  expect_identical(trained$evaluations$iteration, c(0L, 3L, 6L, 6L))
+  expect_identical(trained$evaluations$kind, c("curve", "curve", "curve", "final"))
+  # Without it, and without a curve at all, the same is trained and later evaluations are the same.
+  without <- play()
+  expect_identical(without$evaluations, trained$evaluations[-1, ], ignore_attr = TRUE)
+  no_curve <- play(max_steps = 3, eval_episodes_curve = 0)
+  expect_identical(no_curve$evaluations$kind, "final")
+  for (other in list(without, no_curve)) {
+    expect_identical(other$policy, trained$policy)
+    expect_identical(other$history$mean_return, trained$history$mean_return)
+  }
+  expect_identical(evaluation_steps(trained), c(0, trained$history$steps[c(3, 6, 6)]))
+})
+
+test_that("a checkpoint from before the first iteration goes on to the same evaluations", {
+  kept <- local_kept_files()
+  play <- function(path) {
+    quiet_training(agent_ars(), iterations = 3, target = Inf, max_steps = 3, checkpoint = path)
+  }
+  first <- play(local_checkpoint())
+  expect_identical(first$evaluations$iteration[[1]], 0L)
+  for (bytes in kept$list[1:2]) {
+    expect_identical(play(local_checkpoint(bytes))$evaluations, first$evaluations)
+  }
+})
+
 test_that("fresh episodes decide whether a training ends, and further ones what it has come to", {
   lucky <- function(seed, step, action) if (seed <= 2^30) 10 else 1
   trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,

@@ -54,7 +54,7 @@ curve <- cbind(
   job[c("env_id", "kwargs", "method")],
   data.frame(
     seed = training$seed, iteration = evaluations$iteration,
-    steps = training$history$steps[evaluations$iteration], kind = evaluations$kind,
+    steps = c(0, training$history$steps)[evaluations$iteration + 1L], kind = evaluations$kind,
     mean_return = round(evaluations$mean_return, 2), episodes = evaluations$episodes
   )
 )
