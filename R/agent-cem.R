@@ -21,7 +21,7 @@
 #'   a row for, the settings that are not given are taken from there, with a message.
 #' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
 #' @param iterations,total_steps,target The budget and the target, as for [train_agent()]; `NULL`,
-#'   the default, takes the preset's.
+#'   the default, takes the preset's budget, and the environment's target.
 #' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
 #'   environment's own, such as `continuous = TRUE` for LunarLander.
 #' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains

@@ -16,9 +16,7 @@
 #'   neurons a network has, which are tanh and see normalised observations, `NA` for a linear
 #'   policy) and `bias` (a logical), of the others `normalize` (whether their network sees
 #'   normalised observations), of the training `episodes`,
-#'   `total_steps` (its budget) and `target` (the mean return at which it stops, which lies above
-#'   the one that the environment counts as solved, so that the final evaluation reaches that), and
-#'   where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how
+#'   `total_steps` (its budget), and where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how
 #'   many settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
 #'   `vignette("solved")` reports other seeds. Where `linear` is `TRUE`, `learning_rate` and `clip`
 #'   go from their numbers to 0 in `total_steps`; `epsilon` goes from 1 to its number in
@@ -120,7 +118,7 @@ make_and_train <- function(make, frame, ...) {
     abort_no_budget(preset_hints(env, kwargs), frame)
   }
   if (!is.null(preset)) {
-    from_preset <- setdiff(c("episodes", "target", if (!budget) "total_steps"), names(training))
+    from_preset <- setdiff(c("episodes", if (!budget) "total_steps"), names(training))
     training[from_preset] <- preset[from_preset]
     training$policy <- training$policy %||% preset_policy(preset, agent)
     inform_of_preset(preset, env)

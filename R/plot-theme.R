@@ -56,12 +56,13 @@ theme_gym_bare <- function() {
 # Text above a picture is broken into lines that fit into four inches: ggplot2 cuts off what is
 # longer than the picture is wide.
 # The parts of a subtitle that are too long for one line have a line each.
-picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54) {
+picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, caption = NULL) {
   joined <- paste(subtitle, collapse = ", ")
   lines <- unlist(lapply(if (nchar(joined) > width) subtitle else joined, broken_text, width))
   ggplot2::labs(
     title = broken_text(title, 38),
-    subtitle = if (length(lines)) paste(lines, collapse = "\n"), ...
+    subtitle = if (length(lines)) paste(lines, collapse = "\n"),
+    caption = if (length(caption)) paste(strwrap(caption, 1.3 * width), collapse = "\n"), ...
   )
 }
 

@@ -10,7 +10,8 @@
 #' Between two evaluations a training's return is taken from the straight line between them. The line
 #' of several seeds is thick as long as all of them train. From where the first one has ended it is
 #' thin, as that of a training that has ended is: a seed that has ended counts with its last
-#' evaluation. A picture begins where all seeds were evaluated once.
+#' evaluation. A picture begins where all seeds were evaluated once. Where targets, budgets or rules
+#' of evaluation differ in one environment, the caption names them.
 #'
 #' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
 #' `plot()` prints it, too.
@@ -71,7 +72,7 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
       trainings_title(trainings),
       if (seeds) "line: median of the seeds, band: their middle half",
       x = training_steps_label, y = "mean return of the policy",
-      caption = if (any(curves$ended)) ended_caption(seeds)
+      caption = c(if (any(curves$ended)) ended_caption(seeds), unequal_rules(trainings))
     ) +
     theme_gym()
 }

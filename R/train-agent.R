@@ -20,6 +20,21 @@
 #' A learner's policy is calculated instead of played where the model of the environment is known
 #' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
 #'
+#' # Targets
+#'
+#' The target of an environment is the reward threshold that Gymnasium registers, or that an
+#' environment in R was given, but for these four:
+#'
+#' | environment | target | where it comes from |
+#' |---|---|---|
+#' | `"HalfCheetah-v5"` | 3430 | Mania, Guy and Recht (2018); registered: 4800 |
+#' | `"Hopper-v5"` | 3120 | Mania, Guy and Recht (2018); registered: 3800 |
+#' | `"Pendulum-v1"` | -200 | ours; none is registered |
+#' | `"Swimmer-v5"` | 325 | Mania, Guy and Recht (2018); registered: 360 |
+#'
+#' A training stops at a lucky moment. So a target somewhat above makes it more likely that the final
+#' evaluation reaches the environment's; trainings that are compared need the same.
+#'
 #' # Sampling from a model
 #'
 #' FrozenLake, CliffWalking and Taxi have a model. A learner that names one of them by its id gets
@@ -60,7 +75,8 @@
 #' @param episodes How many episodes each candidate, or the learner, plays in an iteration, a whole
 #'   number of at least 1; the default is 1. Agents that follow gradients choose it themselves.
 #' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
-#'   environment's own, where it has one; `Inf` goes on until the budget is used up.
+#'   environment's, the same for every agent, where it has one (see below); `Inf` goes on until the
+#'   budget is used up.
 #' @param max_steps After how many steps to cut an episode short, as for [rollout()].
 #' @param eval_every After how many iterations the agent's policy is looked at, a whole number of at
 #'   least 1; the default is 10.
@@ -125,6 +141,9 @@
 #'     \item{env}{The environment as given: its id, or the object.}
 #'     \item{kwargs}{The environment's own arguments, a named list.}
 #'     \item{provenance}{What [provenance()] tells.}
+#'     \item{rules}{The budget and the rules of evaluation, a list of the arguments `iterations`,
+#'       `total_steps`, `max_steps`, `eval_every`, `eval_episodes`, `eval_episodes_curve` and
+#'       `evaluate`.}
 #'     \item{steps, elapsed}{All steps of the training, and its seconds, doubles.}
 #'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the iterations that
 #'       were finished.}
@@ -260,7 +279,7 @@ do_run <- function(run, in_env, max_steps, client, progress, call) {
 # Trains in an environment that was made.
 train_in <- function(vector_env, run, progress, call) {
   settings <- run$settings
-  settings["target"] <- list(settings$target %||% vector_env$spec$reward_threshold)
+  settings["target"] <- list(training_target(settings, vector_env$spec))
   settings$env_id <- environment_label(vector_env)
   settings[c("num_envs", "batch_size", "client")] <-
     unclass(vector_env)[c("num_envs", "batch_size", "client")]

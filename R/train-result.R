@@ -25,6 +25,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
         elapsed = proc.time()[["elapsed"]] - state$started,
         interrupted = interrupted,
         max_steps = settings$max_steps,
+        rules = settings[kept_rules],
         provenance = settings$provenance
       ),
       if (search) search_parts(settings, state, history)

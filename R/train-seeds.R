@@ -66,7 +66,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
 
 # Without a target no search is solved, whatever its seed.
 check_has_target <- function(settings, vector_env, call) {
-  if (is.null(settings$target %||% vector_env$spec$reward_threshold)) {
+  if (is.null(training_target(settings, vector_env$spec))) {
     gym_abort(
       c(paste(environment_label(vector_env), "has no reward threshold, so that nothing says when a",
               "search has solved it."),

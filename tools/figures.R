@@ -34,6 +34,6 @@ draw("filmstrip.png", played, type = "filmstrip", height = 1.5)
 # Every second frame is smooth enough, at the same pace.
 print(animate(played, "man/figures/cartpole.gif", width = 300, every = 2))
 
-lander <- search_ars("LunarLander-v3", continuous = TRUE, seed = 1001)
+lander <- search_ars("LunarLander-v3", continuous = TRUE, target = 220, seed = 1001)
 print(lander)
 print(animate(lander, "man/figures/lander.gif", seed = 3, width = 300, every = 5))

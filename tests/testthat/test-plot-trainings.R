@@ -1,14 +1,14 @@
 autoplot <- ggplot2::autoplot
 
 # A training as it would be, with these evaluations.
-training_of <- function(steps, returns, target = 5, agent = agent_ars(), ...) {
+training_of <- function(steps, returns, target = 5, agent = agent_ars(), rules = NULL, ...) {
   evaluations <- data.frame(
     iteration = seq_along(steps), kind = c(rep("curve", length(steps) - 1L), "final"),
     mean_return = returns, ...
   )
   structure(
     list(history = data.frame(steps = steps), evaluations = evaluations, agent = agent,
-         target = target, env_id = "Fake-v0"),
+         target = target, env_id = "Fake-v0", rules = rules),
     class = "gym_training"
   )
 }
@@ -57,9 +57,10 @@ test_that("trainings that are given together are compared, by their names", {
   expect_identical(key_of(picture), c("A", "cem", "target 5"))
   expect_identical(unique(layers_of(picture, "GeomLine")[[1]]$colour), series_colours[1:2])
   expect_identical(levels(autoplot(cem, A = ars)$data$label), c("cem", "A"))
-  # Different targets are no line.
-  other <- training_of(1:2, 1:2, target = 9)
+  # Different targets are no line, and the caption says so.
+  other <- training_of(c(10, 30), 1:2, target = 9)
   expect_identical(key_of(autoplot(ars, other)), c("ars", "other"))
+  expect_match(autoplot(ars, other)$labels$caption, "targets differ: ars 5; other 9", fixed = TRUE)
   expect_error(plot(ars, 3), class = "gym_error_argument")
   expect_error(autoplot(ars, col = 3), "no argument for `col`", class = "gym_error_argument")
 })
@@ -78,6 +79,27 @@ test_that("from where a seed has ended the line is thin, and the caption says so
   expect_identical(curve$median[nrow(curve)], 5)
   whole <- autoplot(trainings_of(training_of(c(10, 40), c(1, 4)), training_of(c(10, 40), c(3, 6))))
   expect_null(whole$labels$caption)
+})
+
+test_that("a comparison names other budgets and rules of evaluation", {
+  one <- function(...) training_of(c(10, 20), 1:2, rules = list(...))
+  captions <- function(...) gsub("\n", " ", autoplot(...)$labels$caption)
+  short <- one(total_steps = 2e4, eval_episodes = 100)
+  long <- one(total_steps = 5e4, eval_episodes = 100)
+  expect_null(autoplot(short, again = short)$labels$caption)
+  expect_identical(captions(short, long),
+                   "budgets differ: short total_steps 20,000; long total_steps 50,000")
+  seldom <- one(total_steps = 2e4, eval_episodes = 20, max_steps = 9)
+  expect_identical(
+    captions(short, seldom),
+    paste("rules of evaluation differ: short max_steps none, eval_episodes 100; seldom max_steps 9,",
+          "eval_episodes 20")
+  )
+  # Targets of several environments are different ones.
+  elsewhere <- short
+  elsewhere$env_id <- "Other-v0"
+  elsewhere$target <- 9
+  expect_null(autoplot(short, elsewhere)$labels$caption)
 })
 
 test_that("a curve begins before the first iteration", {

@@ -101,6 +101,15 @@ test_that("the environment's own threshold is the target", {
   expect_true(quiet_training(agent_cem(), iterations = 2, env = env())$solved)
   expect_null(quiet_training(agent_cem(), iterations = 2)$target)
   expect_false(quiet_training(agent_cem(), iterations = 2, target = 4, env = env())$solved)
+  # Whatever the agent, and whether or not there is a preset.
+  expect_false("target" %in% names(agent_presets()))
+  pendulum <- function(train, ...) {
+    env <- fake_environment(reward_threshold = 3, id = "Pendulum-v1")
+    train(env = env, ..., iterations = 1, seed = 1, eval_episodes = 2)$target
+  }
+  expect_identical(pendulum(search_ars), -200)
+  expect_identical(pendulum(search_cem), -200)
+  expect_identical(pendulum(train_agent, agent = agent_cem()), -200)
 })
 
 test_that("a training ends when its steps are used up, or its callback says so", {

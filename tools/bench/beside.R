@@ -59,7 +59,8 @@ lander_seconds <- function(client) {
 
 preset_seconds <- function(client) {
   seconds_of(
-    search_ars("LunarLander-v3", continuous = TRUE, seed = 1001, client = client, progress = FALSE)
+    search_ars("LunarLander-v3", continuous = TRUE, target = 220, seed = 1001, client = client,
+               progress = FALSE)
   )
 }
 

@@ -17,7 +17,7 @@ before <- used()
 # One core for each seed: the sub-environments stay in the server's own process.
 training <- suppressMessages(do.call(search, c(
   list(env = job$env_id), job_kwargs(job$kwargs),
-  list(seed = as.integer(given[[2L]]), num_workers = 0, progress = FALSE)
+  list(target = job$train_target, seed = as.integer(given[[2L]]), num_workers = 0, progress = FALSE)
 )))
 processor <- round(used() - before, 1)
 

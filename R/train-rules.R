@@ -1,0 +1,42 @@
+# What makes a comparison of trainings unequal: other targets, budgets or rules of evaluation.
+
+# What is kept of a training's arguments for that, beside the target.
+kept_rules <- c("iterations", "total_steps", "max_steps", "eval_every", "eval_episodes",
+                "eval_episodes_curve", "evaluate")
+
+#' Name what differs between trainings in one environment
+#' @param trainings A list of trainings, or of trainings with many seeds, with names.
+#' @return A string for each kind of difference, such as `"targets differ: A 475; B 490"`.
+#' @noRd
+unequal_rules <- function(trainings) {
+  by_env <- split(trainings, vapply(trainings, function(x) x$env_id, ""))
+  unlist(lapply(unname(by_env), function(those) {
+    rules <- lapply(those, function(x) {
+      one <- if (inherits(x, "gym_trainings")) x$trainings[[1L]] else x
+      c(list(target = one$target %||% Inf), one$rules)
+    })
+    c(
+      unequal_text("targets", rules, "target"),
+      unequal_text("budgets", rules, c("total_steps", "iterations")),
+      unequal_text("rules of evaluation", rules, kept_rules[-(1:2)])
+    )
+  }))
+}
+
+# `NULL` where these rules are the same everywhere.
+unequal_text <- function(what, rules, names) {
+  value <- function(of_one, name) {
+    value <- of_one[[name]] %||% "none"
+    if (is.numeric(value)) marked_text(value, scientific = FALSE) else value
+  }
+  differ <- Filter(function(name) {
+    length(unique(vapply(rules, value, "", name))) > 1L
+  }, names)
+  if (length(differ)) {
+    texts <- vapply(rules, function(of_one) {
+      values <- vapply(differ, value, "", of_one = of_one)
+      paste(if (!identical(names, "target")) differ, values, collapse = ", ")
+    }, "")
+    paste0(what, " differ: ", paste(names(rules), texts, collapse = "; "))
+  }
+}
