@@ -52,5 +52,6 @@ class Policy(ABC):
         """Return an actor.
 
         Args:
-            candidate: which one plays, numbered from 0; for a group int[rows], one for each row.
+            candidate: which one plays, numbered from 0; for a group int[rows], one for each row,
+                and -1 for a row whose actions nobody looks at.
         """

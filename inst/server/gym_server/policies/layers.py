@@ -1,8 +1,8 @@
 """Compute the outputs of networks, for one observation or for a batch, in arrays laid out once.
 
-A row's outputs must not depend, to the last bit, on who plays the other rows. So all rows are
-always computed, and only the sizes decide how: a matrix product of all rows adds in another order
-than one of some rows, and both in another order than a sum of products.
+A row's outputs must not depend, to the last bit, on who plays the other rows. So only the sizes
+decide how they are computed: a matrix product of many rows adds in another order than one of few
+rows, and both in another order than a sum of products.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ from gym_server.policies.activation import Steps, in_place, middle
 from gym_server.policies.network_plan import NetworkPlan
 from gym_server.policies.states import NOT_A_STATE, states_of
 
-# With so many weights a row's own matrices are multiplied number by number; with more, all rows are
-# multiplied by the matrices of each candidate.
+# With so many weights a row's own matrices are multiplied number by number; with more, the rows of
+# a block are multiplied together by the matrices of each candidate that plays one of them. Blocks
+# are always cut at the same rows, and a block that nobody plays is left out.
 _FEW_WEIGHTS = 512
+_BLOCK = 32
 
 Forward = Callable[[Any], np.ndarray]
 
@@ -36,7 +38,7 @@ def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray)
     Args:
         plan: what the networks have in common.
         weights: float64[candidates, weights].
-        candidate: whose network it is; for a group int[rows].
+        candidate: whose network it is; for a group int[rows], see ``Policy.actor()``.
     """
     if isinstance(candidate, int):
         return _layers(plan, _matrices(plan, weights[candidate]), ())
@@ -46,16 +48,22 @@ def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray)
 
 
 def _by_candidate(plan: NetworkPlan, weights: np.ndarray, candidates: np.ndarray) -> Forward:
-    """Return what computes all rows by each candidate, and takes each row's own."""
+    """Return what computes the blocks of each candidate, and takes its own rows of them."""
+    rows = len(candidates)
     parts = []
-    for candidate in np.unique(candidates):
+    for candidate in np.unique(candidates[candidates >= 0]):
         matrices = _matrices(plan, weights[candidate])
-        parts.append((candidates == candidate, _layers(plan, matrices, candidates.shape)))
+        for first in range(0, rows, _BLOCK):
+            block = slice(first, min(first + _BLOCK, rows))
+            own = candidates[block] == candidate
+            if own.any():
+                of_block = _layers(plan, matrices, own.shape)
+                parts.append((block, slice(None) if own.all() else own, of_block))
+    result = np.zeros((plan.num_values, rows))
 
     def outputs(observation: Any) -> np.ndarray:
-        result = np.empty((plan.num_values, len(candidates)))
-        for own, of_all in parts:
-            result[:, own] = of_all(observation)[:, own]
+        for block, own, of_block in parts:
+            result[:, block][:, own] = of_block(observation[block])[:, own]
         return result
 
     return outputs

@@ -126,13 +126,15 @@ class PolicyList(Policy):
     def actor(self, candidate: int | np.ndarray) -> Actor:
         """Return an actor of a policy; for a group one in which each row takes its own policy's.
 
-        Each policy of a group acts for all rows and draws from a generator of its own, so that one
-        that draws does not move the draws of another.
+        Each policy of a group draws for all rows and from a generator of its own, so that one that
+        draws does not move the draws of another.
         """
         if isinstance(candidate, int):
             return self.policies[candidate].actor(0)
-        alone = np.zeros_like(candidate)
-        actors = {one: self.policies[one].actor(alone) for one in np.unique(candidate).tolist()}
+        actors = {
+            one: self.policies[one].actor(np.where(candidate == one, 0, -1))
+            for one in np.unique(candidate[candidate >= 0]).tolist()
+        }
 
         def act(observation: Any) -> Any:
             actions = {one: actor.act(observation) for one, actor in actors.items()}

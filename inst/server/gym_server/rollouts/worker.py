@@ -159,8 +159,7 @@ class _Playing:
 
     def _play_group(self, env: RolloutEnv, unit: Unit) -> dict[str, Tensor]:
         group = env.for_a_group
-        # Rows that nobody asked for are played by the last candidate.
-        candidates = np.full(group.num_envs, unit.candidates[-1])
+        candidates = np.full(group.num_envs, -1)
         candidates[list(unit.rows or ())] = unit.candidates
         actor = self._policy.actor(candidates)
         return play_group(group, actor, unit, self._task.max_steps, self._task.keep)

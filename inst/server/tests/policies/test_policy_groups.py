@@ -72,6 +72,23 @@ def test_a_row_does_not_depend_on_the_others(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_row_does_not_depend_on_which_others_are_played(kind):
+    policy = KINDS[kind]
+    candidates = np.random.default_rng(2).integers(5, size=ROWS)
+    some = np.where(np.isin(np.arange(ROWS), [3, 4, 20]), candidates, -1)
+    together, few = started(policy, candidates), started(policy, some)
+    for batch in observations(20):
+        np.testing.assert_array_equal(few.act(batch)[some >= 0], together.act(batch)[some >= 0])
+
+
+def test_rows_that_nobody_plays_are_not_computed():
+    group = started(KINDS["many weights"], np.where(np.arange(ROWS) < 40, 0, -1))
+    batch = observations(1)[0]
+    batch[40:] = np.nan
+    assert (group.act(batch)[40:] == 1).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_group_is_drawn_from_its_seed_alone(kind):
     policy, batches = KINDS[kind], observations(10)
     group = started(policy, np.arange(ROWS) % 5)
