@@ -5,9 +5,9 @@
 #' is learned from an episode before it has ended, and no value rests on another one.
 #'
 #' In an environment of the server that is named by its id, the server's processes play all episodes
-#' of an iteration with the table as it is, and the learner learns from them when they have ended;
-#' so give `episodes` in the hundreds. With exploring starts or a `mask` R plays them, in several
-#' sub-environments. In a model, or an environment in R, it learns after each episode.
+#' of an iteration with the table as it is, and the learner learns from them when they have ended.
+#' With exploring starts or a `mask` R plays them, in several sub-environments. In a model, or an
+#' environment in R, it learns after each episode.
 #'
 #' With `exploring_starts = TRUE` the first action of each episode is drawn from all, each equally
 #' likely (section 5.3); the environment draws the first state.
@@ -16,6 +16,8 @@
 #' in its return.
 #'
 #' @inheritParams agent_q
+#' @param episodes How many episodes an iteration has, a whole number of at least 1. `NULL`, the
+#'   default, for 1,000 where the server's processes play them, and else 10.
 #' @param visits Which visits of a state and action count: `"first"`, the default, only the first
 #'   one of each episode, or `"every"` one.
 #' @param exploring_starts Draw the first action of each episode? `FALSE`, the default, or `TRUE`.
@@ -39,7 +41,7 @@
 #' @examples
 #' agent_monte_carlo(discount = 1)
 #' @examplesIf gym:::can_start_server()
-#' learn_monte_carlo("Blackjack-v1", iterations = 10, discount = 1, seed = 1, sab = TRUE)
+#' learn_monte_carlo("Blackjack-v1", iterations = 2, discount = 1, seed = 1, sab = TRUE)
 agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL, initial = 0,
                               visits = c("first", "every"), exploring_starts = FALSE,
                               learning_rate = NULL, mask = NULL,
@@ -319,10 +321,18 @@ format.gym_agent_monte_carlo <- function(x, ...) {
 #' @rdname agent_monte_carlo
 #' @export
 learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target = NULL,
-                              episodes = 10, discount = 0.99, epsilon = 0.1, temperature = NULL,
+                              episodes = NULL, discount = 0.99, epsilon = 0.1, temperature = NULL,
                               initial = 0, visits = c("first", "every"), exploring_starts = FALSE,
                               learning_rate = NULL, mask = NULL,
                               importance = c("none", "weighted", "ordinary"),
                               target_policy = NULL, ...) {
+  episodes <- episodes %||% default_episodes(env, mask, exploring_starts, importance)
   make_and_train("agent_monte_carlo", rlang::current_env(), ...)
+}
+
+# Where the server's processes play the episodes, each iteration costs a request.
+default_episodes <- function(env, mask, exploring_starts, importance) {
+  on_server <- rlang::is_string(env) && !is_registered(env) && !grepl(modelled_ids, env)
+  whole <- is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")
+  if (on_server && whole) 1000 else 10
 }

@@ -111,7 +111,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
     return(learn_by_methods(state, vector_env, settings, call))
   }
   learner$renew()
-  if (learns_beside(learner, state$agent, vector_env, settings)) {
+  if (learns_beside(state, vector_env, settings)) {
     return(learn_beside(learner, state, vector_env, settings))
   }
   vector_env <- stepped(vector_env)
@@ -137,27 +137,29 @@ plays_whole <- function(agent) {
     agent$importance == "none"
 }
 
-# Whether the server's processes play whole episodes for a learner.
-learns_beside <- function(learner, agent, vector_env, settings) {
-  plays_whole(agent) && plays_beside(
-    vector_env, learner$whole$policy(), settings$max_steps %||% Inf, keep_steps = TRUE
-  )
+# Whether the server's processes play whole episodes for a learner, asked once for a training.
+learns_beside <- function(state, vector_env, settings) {
+  state$beside <- state$beside %||% (plays_whole(state$agent) && plays_beside(
+    vector_env, agent_policy(state$agent), settings$max_steps %||% Inf, keep_steps = TRUE
+  ))
+  state$beside
 }
 
 learn_beside <- function(learner, state, vector_env, settings) {
   policy <- with_generator(state$streams$agent, learner$whole$policy())
   history <- play_iteration(state, vector_env, settings, policy, keep_steps = TRUE)
-  before <- 0L
-  for (batch in history$batches) {
-    for (steps in batch$steps) {
-      check_rewards(steps$reward, NULL)
-      x <- state$agent$basis$of(steps$observation, length(steps$reward))[, 1L]
-      learner$whole$learn(
-        x, action_columns(state$agent$spaces, steps$action), steps$reward, before + steps$at
-      )
-    }
-    before <- before + length(batch$return)
-  }
+  batches <- history$batches
+  steps <- unlist(lapply(batches, `[[`, "steps"), recursive = FALSE)
+  each <- function(name) lapply(steps, `[[`, name)
+  reward <- unlist(each("reward"))
+  check_rewards(reward, NULL)
+  spaces <- state$agent$spaces
+  observation <- bind_batches(spaces$observation_space, each("observation"))
+  # All at once: how the episodes were cut into requests must not change a sum's last bit.
+  learner$whole$learn(
+    state$agent$basis$of(observation, length(reward))[, 1L],
+    action_columns(spaces, unlist(each("action"))), reward, step_rows(batches)
+  )
   c(list(agent = learner$export()), episode_results(history))
 }
 

@@ -72,6 +72,25 @@ test_that("Tuples have tables, too, and are judged by playing", {
   expect_identical(sum(learned$agent$visited > 0) > 50, TRUE)
 })
 
+test_that("how episodes are cut into requests changes nothing that Monte Carlo learns from them", {
+  learn <- function() {
+    learn_monte_carlo("Blackjack-v1", iterations = 3, discount = 1, seed = 1, eval_episodes = 2,
+                      client = test_client())
+  }
+  learned <- learn()
+  # By default an iteration has many episodes.
+  expect_gt(learned$steps, 3000)
+  local_functions(
+    next_size = function(units, seconds, wanted) 70L, first_size = function(play) 70L
+  )
+  set.seed(1)
+  before <- .Random.seed
+  again <- learn()
+  expect_identical(again$policy$q, learned$policy$q)
+  expect_identical(again$history[-9L], learned$history[-9L])
+  expect_identical(.Random.seed, before)
+})
+
 test_that("`max_steps` truncates, and the value of what follows counts", {
   skip_unless_all()
   # Going on pays 1 each step without an end: the value is 1 / (1 - 0.5).

@@ -112,6 +112,8 @@ class Rollouts:
         self._changed = threading.Condition()
         self._requests: deque[Request] = deque()
         self._players: list[_Player] = []
+        # The environment that was played last, and how long a unit of it has taken.
+        self._last_played: tuple[str, float] | None = None
         self._stopping = False
 
     def describe(self, task: Task, trusted: bool) -> dict:
@@ -159,6 +161,8 @@ class Rollouts:
         request = Request(next(_numbers), task, function, key, units)
         request.waiting.append(range(len(units)))
         with self._changed:
+            if self._last_played is not None and self._last_played[0] == task.env_key:
+                request.seconds = self._last_played[1]
             if self._stopping:
                 raise shutting_down()
             if self.most_processes < 1:
@@ -292,6 +296,7 @@ class Rollouts:
                 if request.function == "play":
                     request.size += sum(len(tensor.data) for tensor in result.values())
                     request.seconds = (time.monotonic() - began) / done
+                    self._last_played = (request.task.env_key, request.seconds)
             if error is not None:
                 self._enter_error(player, request, units[done:], error)
             else:

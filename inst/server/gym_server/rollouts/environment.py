@@ -17,6 +17,7 @@ from gym_server.budget import Budget
 from gym_server.envs import make, registry, wrappers
 from gym_server.envs.drawing_on_demand import save_drawing
 from gym_server.envs.memory_reservation import MemoryReservation
+from gym_server.envs.quick_choice import choose_quickly
 from gym_server.instances.local import env_id_of
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
@@ -79,6 +80,7 @@ class RolloutEnv:
         env = make.call_env(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
         # Some work for drawing in each step.
         save_drawing(env)
+        choose_quickly(env)
         return env
 
     @cached_property

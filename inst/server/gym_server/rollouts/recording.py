@@ -20,6 +20,8 @@ from gym_server.spaces.stacking import ARRAYS
 # a rule of the observation's size alone, so that moments do not depend on anything else.
 _NUMBERS_AT_ONCE = 2**20
 
+_NUMBERS = (int, float, np.number, np.bool_)
+
 
 def check_keep(keep: Keep, observation_space: Space, action_space: Space) -> None:
     """Refuse to keep what has no arrays.
@@ -206,4 +208,15 @@ def step_tensors(
 
 def _copier(space: Space) -> Callable[[Any], Any]:
     """Return what keeps a value as it is now; an environment may change it in place later."""
-    return np.array if isinstance(space, ARRAYS) else copy.deepcopy
+    return _copy_number if isinstance(space, ARRAYS) else _copy_parts
+
+
+def _copy_number(value: Any) -> Any:
+    # A number never changes, and to make an array of it takes longer than a step of a table.
+    return value if isinstance(value, _NUMBERS) else np.array(value)
+
+
+def _copy_parts(value: Any) -> Any:
+    if type(value) is tuple and all(isinstance(part, _NUMBERS) for part in value):
+        return value
+    return copy.deepcopy(value)
