@@ -12,7 +12,8 @@
 #
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
 #                                vignettes/bench-gradients.csv and vignettes/bench-gradients.md.
-#                                Only this part needs torch; see tools/bench/gradients.R
+#                                Only this part needs torch; see tools/bench/gradients.R, also for
+#                                how it is measured bit by bit
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
@@ -60,7 +61,9 @@ bench <- function(parts, quick) {
     if ("env_rollouts" %in% parts) compare_rollouts(python, scale$rollout_turns, quick),
     if ("beside" %in% parts) compare_beside(python, scale$rollout_turns, quick),
     if ("wire" %in% parts) compare_steps(python, scale$step_turns, scale$turn_steps),
-    if ("gradients" %in% parts) compare_gradients(python, scale),
+    if ("gradients" %in% parts) {
+      compare_gradients(python, utils::modifyList(scale, gradient_scale))
+    },
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
   list(rows = rows, run = c(describe_run(setup, parts), took = paste(round(now() - started), "s")))
@@ -141,11 +144,13 @@ all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", 
 parts <- intersect(c(all_parts, "gradients"), arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts
+if ("gradients" %in% parts) gradient_scale <- chosen_scale(arguments)
 kept <- if (!quick && identical(parts, "gradients")) "bench-gradients" else if (whole) "bench"
 folder <- if (is.null(kept)) "pictures" else "vignettes"
 dir.create(folder, showWarnings = FALSE)
 at <- function(ending) file.path(folder, paste0(if (is.null(kept)) "bench" else kept, ending))
 result <- bench(parts, quick)
+if (identical(kept, "bench-gradients")) result$rows <- with_earlier(result$rows, at(".csv"))
 report(
   result, csv = at(".csv"), text = at(".md"), figure = at(".png"),
   environments = at("-environments.png")

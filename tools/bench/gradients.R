@@ -6,6 +6,12 @@
 #
 #   python3 -m venv sb3 && sb3/bin/pip install stable-baselines3 'gymnasium[box2d]'
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS=gradients
+#
+# All of it takes hours. An environment's id among PARTS measures that one alone, turns=N and seeds=N
+# measure less, and the rows of what is not measured stay in the file: so do those by R's reference
+# BLAS beside those by another one (LD_PRELOAD=/usr/lib/.../libopenblas.so.0 is enough to change it).
+#
+#   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS='gradients LunarLander-v3 turns=5 seeds=0'
 
 gradient_names <- c(gym = "gym, learn_ppo()", sb3 = "Stable-Baselines3, PPO")
 
@@ -27,6 +33,37 @@ out_of_reach <- 1e9
 
 # As many steps of each are timed, so that an update of LunarLander is among them.
 timed_steps <- c("CartPole-v1" = 10000, "LunarLander-v3" = 33000)
+
+# What the arguments leave of the scale.
+chosen_scale <- function(arguments) {
+  number <- function(name) {
+    given <- grep(paste0("^", name, "="), arguments, value = TRUE)
+    if (length(given)) as.integer(sub(".*=", "", given))
+  }
+  of_each <- function(count) lapply(gradient_tasks, function(task) count)
+  only <- intersect(names(gradient_tasks), arguments)
+  chosen <- list(
+    gradient_only = if (length(only)) only else names(gradient_tasks),
+    gradient_turns = if (!is.null(number("turns"))) of_each(number("turns")),
+    gradient_seeds = if (!is.null(number("seeds"))) of_each(number("seeds"))
+  )
+  Filter(Negate(is.null), chosen)
+}
+
+# The rows of what was measured before, and is not in these.
+with_earlier <- function(rows, file) {
+  what <- function(rows) paste(rows$env_id, rows$unit)
+  earlier <- if (file.exists(file)) read_results(file)$rows
+  rows <- rbind(earlier[!what(earlier) %in% what(rows), ], rows)
+  rows[order(rows$env_id, rows$unit, method = "radix"), ]
+}
+
+# R's products of matrices are the slower ones of its own BLAS unless another one was chosen.
+gradient_label <- function(env_id) {
+  if (grepl("openblas", name_of_blas(), ignore.case = TRUE)) env_id else paste0(env_id, reference)
+}
+
+reference <- ", reference BLAS"
 
 start_sb3 <- function() {
   if (!nzchar(Sys.getenv("GYM_SB3_PYTHON"))) {
@@ -54,11 +91,13 @@ compare_gradients <- function(python, scale) {
   )
   for (train in contenders) train(timed_task("CartPole-v1", 0L, 2000))
   rbind(
-    play_gradients(contenders, scale$gradient_turns, "a step", function(env_id, seed) {
-      timed_task(env_id, seed, timed_steps[[env_id]])
-    }, function(took) measured_cpu(took$seconds / took$steps * 1e6, "microseconds")),
     play_gradients(
-      contenders, scale$gradient_seeds, "until the target", gradient_task,
+      contenders, scale$gradient_only, scale$gradient_turns, "a step", function(env_id, seed) {
+        timed_task(env_id, seed, timed_steps[[env_id]])
+      }, function(took) measured_cpu(took$seconds / took$steps * 1e6, "microseconds")
+    ),
+    play_gradients(
+      contenders, scale$gradient_only, scale$gradient_seeds, "until the target", gradient_task,
       function(took) measured_cpu(if (took$reached) took$seconds else Inf, "s")
     )
   )
@@ -77,14 +116,15 @@ timed_task <- function(env_id, seed, steps) {
 }
 
 # `turns` has a number for each environment.
-play_gradients <- function(contenders, turns, called, task_of, measure) {
-  do.call(rbind, lapply(names(turns), function(env_id) {
+play_gradients <- function(contenders, only, turns, called, task_of, measure) {
+  do.call(rbind, lapply(intersect(names(turns), only), function(env_id) {
     do.call(rbind, lapply(seq_len(turns[[env_id]]), function(turn) {
       progress(env_id, ", PPO, ", called, ", turn ", turn, " of ", turns[[env_id]])
       order <- if (turn %% 2L) names(contenders) else rev(names(contenders))
       do.call(rbind, lapply(order, function(name) {
         one <- measure(contenders[[name]](task_of(env_id, 1000L + turn)))
-        measured("gradients", 0, gradient_names[[name]], called, turn, one$value, one$unit, env_id)
+        measured("gradients", 0, gradient_names[[name]], called, turn, one$value, one$unit,
+                 gradient_label(env_id))
       }))
     }))
   }))
