@@ -53,7 +53,7 @@ training_checkpoint <- function(state, file, settings, call) {
     inform_resumed("Going on from {.path {file$path}}, after {played}.")
   }
   state$path <- file$path
-  without_memory <- memory_writer(file$path, max(0, file$saved$training$agent$memory$count))
+  without_memory <- memory_writer(file$path, file$saved$training$agent$memory$key)
   write <- checkpoint_writer(file, function() {
     training <- mget(kept_of_training, state)
     training$agent <- without_memory(training$agent)

@@ -13,7 +13,8 @@
 #' neuron has two inputs or more, the second direction is made perpendicular to the first. (In
 #' their networks of millions of weights any two directions nearly are, in small ones they are
 #' not.) A point at `a` and `b` has the best weights plus `a` times the first and `b` times the
-#' second direction.
+#' second direction. The standard deviations of a network that draws from a Gaussian are those of the
+#' best policy at each point.
 #'
 #' # The same episodes
 #'

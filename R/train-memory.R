@@ -35,40 +35,63 @@ memory_columns <- function(memory, number) (number - 1) %% memory$size + 1
 # In files ---------------------------------------------------------------------------------------
 
 # A file has as many steps as the memory, the next ones are in the next file. So two files have all
-# that is remembered, and older ones are removed.
-memory_file <- function(path, number) paste0(path, ".memory-", number)
+# that is remembered, and older ones are removed. Each process has files of its own, with its key in
+# their names, and the checkpoint has the key: so processes with one checkpoint leave each other's
+# files alone.
+memory_file <- function(path, key, number) paste0(path, ".memory-", key, "-", number)
 
-memory_files <- function(path) {
-  files <- list.files(dirname(path), "[.]memory-[0-9]+$", full.names = TRUE)
-  files[startsWith(basename(files), paste0(basename(path), ".memory-"))]
+memory_files <- function(path, key = "[0-9a-f]+") {
+  files <- list.files(dirname(path), "[.]memory-[0-9a-f]+-[0-9]+$", full.names = TRUE)
+  own <- startsWith(basename(files), paste0(basename(path), ".memory-"))
+  files[own & grepl(paste0("[.]memory-", key, "-[0-9]+$"), files)]
 }
 
 #' Prepare to keep a memory in files
 #' @param path The checkpoint.
-#' @param count How many of its steps the files have.
+#' @param earlier The key of the checkpoint that training goes on from, `NULL` for none.
 #' @return A function of an agent, which appends what is new and returns the agent with a memory
 #'   without steps: what the checkpoint has of it.
 #' @noRd
-memory_writer <- function(path, count = 0) {
-  if (count == 0) unlink(memory_files(path))
+memory_writer <- function(path, earlier = NULL) {
+  # A process that still runs has written to its own not long ago.
+  files <- setdiff(memory_files(path), if (!is.null(earlier)) memory_files(path, earlier))
+  unlink(files[difftime(Sys.time(), file.mtime(files), units = "mins") > 10])
+  # A name that no other process has, drawn without R's generator.
+  key <- sub("^memory", "", basename(tempfile("memory")))
+  count <- 0
   function(agent) {
     memory <- agent$memory
     if (!inherits(memory, "gym_memory") || is.null(memory$steps)) {
       return(agent)
     }
+    if (!is.null(earlier) && identical(key_of_checkpoint(path), key)) {
+      unlink(memory_files(path, earlier))
+      earlier <<- NULL
+    }
     # The file before those that are named stays, in case that a checkpoint could not be written.
-    remove_forgotten(path, count - 2 * memory$size, memory$size)
+    remove_forgotten(path, key, count - 2 * memory$size, memory$size)
+    first <- max(0, memory$count - memory$size) %/% memory$size
+    if (count == 0 || !file.exists(memory_file(path, key, (count - 1) %/% memory$size))) {
+      # All that is remembered is written, also where somebody has removed the files.
+      count <<- first * memory$size
+    }
     while (count < memory$count) {
       number <- count %/% memory$size
       end <- min(memory$count, (number + 1) * memory$size)
-      append_memory(memory, memory_file(path, number), count + 1, end)
+      append_memory(memory, memory_file(path, key, number), count + 1, end)
       count <<- end
     }
+    agent$memory$key <- key
     agent$memory$room <- ncol(memory$steps)
     agent$memory$width <- nrow(memory$steps)
     agent$memory["steps"] <- list(NULL)
     agent
   }
+}
+
+key_of_checkpoint <- function(path) {
+  saved <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
+  saved$training$agent$memory$key
 }
 
 # Steps that are forgotten already are needed no more: zeros keep their place.
@@ -83,9 +106,10 @@ append_memory <- function(memory, file, first, last) {
 }
 
 # Removes files that have only steps up to a number.
-remove_forgotten <- function(path, last, size) {
-  numbers <- as.numeric(sub(".*-", "", memory_files(path)))
-  unlink(memory_file(path, numbers[(numbers + 1) * size <= last]))
+remove_forgotten <- function(path, key, last, size) {
+  files <- memory_files(path, key)
+  numbers <- as.numeric(sub(".*-", "", files))
+  unlink(files[(numbers + 1) * size <= last])
 }
 
 cut_file <- function(file, bytes) replace_content(file, readBin(file, "raw", bytes))
@@ -103,20 +127,19 @@ restore_memory <- function(agent, path, call = NULL) {
   while (first < memory$count) {
     number <- first %/% memory$size
     end <- min(memory$count, (number + 1) * memory$size)
-    values <- read_memory(memory_file(path, number), end - number * memory$size, memory$width, call)
+    file <- memory_file(path, memory$key, number)
+    values <- read_memory(file, end - number * memory$size, memory$width, call)
     numbers <- seq.int(first + 1, end)
     steps[, memory_columns(memory, numbers)] <- values[, numbers - number * memory$size]
     first <- end
   }
-  memory[c("room", "width")] <- NULL
   memory$steps <- steps
   agent$memory <- memory[names(new_memory(1))]
   class(agent$memory) <- "gym_memory"
   agent
 }
 
-# Reads the first steps of a file. What follows them was written after the checkpoint, by a process
-# that came no further, and is cut off.
+# Reads the first steps of a file. What follows them was written after the checkpoint.
 read_memory <- function(file, count, width, call) {
   bytes <- 8 * count * width
   if (!file.exists(file) || file.size(file) < bytes) {
@@ -126,6 +149,5 @@ read_memory <- function(file, count, width, call) {
       class = c("gym_error_checkpoint", "gym_error_argument"), path = file, call = call
     )
   }
-  if (file.size(file) > bytes) cut_file(file, bytes)
   matrix(readBin(file, "double", count * width, endian = "little"), width)
 }

@@ -48,6 +48,34 @@ test_that("a training that was cut goes on bit for bit, the memory of DQN append
   expect_error(learn(10, checkpoint = file), "missing or damaged", class = "gym_error_checkpoint")
 })
 
+test_that("processes with one checkpoint leave each other's memory alone", {
+  path <- withr::local_tempfile(fileext = ".rds")
+  # So many steps that the memory is overwritten again and again.
+  grown <- function(agent, n, of) {
+    agent$memory <- add_to_memory(agent$memory, matrix(of + seq_len(3 * n), 3))
+    agent
+  }
+  kept <- function(agent) restore_memory(agent, path)$memory
+  one <- two <- list(memory = new_memory(10))
+  write_one <- memory_writer(path)
+  write_two <- memory_writer(path)
+  for (n in c(4, 9, 1, 25, 10, 3)) {
+    one <- grown(one, n, 100)
+    two <- grown(two, n + 2, 5000)
+    of_one <- write_one(one)
+    of_two <- write_two(two)
+    expect_identical(kept(of_one), one$memory)
+    expect_identical(kept(of_two), two$memory)
+  }
+  # Files of a process that has long written nothing are removed, and written again by it.
+  Sys.setFileTime(memory_files(path, of_one$memory$key), Sys.time() - 3600)
+  memory_writer(path, of_two$memory$key)
+  expect_identical(memory_files(path, of_one$memory$key), character())
+  one <- grown(one, 2, 0)
+  expect_identical(kept(write_one(one)), one$memory)
+  expect_identical(kept(of_two), two$memory)
+})
+
 # An agent in an environment with one number and two actions, whose networks give 10 for everything.
 started <- function(agent, value = 10) {
   dqn <- inherits(agent, "gym_agent_dqn")

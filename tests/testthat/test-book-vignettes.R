@@ -1,12 +1,6 @@
 # The companion to Sutton and Barto's book: vignettes/book-*.Rmd, a page for each of its chapters.
-# They lie in the source tree, or in an installed package that was built with its vignettes.
 
-book_files <- function() {
-  folders <- c(file.path(test_path(), "../../vignettes"), system.file("doc", package = "gym"))
-  files <- lapply(folders, list.files, pattern = "^book-.*[.]Rmd$", full.names = TRUE)
-  found <- files[lengths(files) > 0L]
-  if (length(found)) found[[1L]] else character()
-}
+book_files <- function() page_files("^book-.*[.]Rmd$")
 
 book_file <- function(name) {
   files <- book_files()
@@ -16,19 +10,6 @@ book_file <- function(name) {
   file
 }
 
-# A list of a vignette's chunks of R: each the header's text and the lines of code.
-book_chunks <- function(file) {
-  lines <- readLines(file, encoding = "UTF-8")
-  fences <- grep("^```", lines)
-  starts <- fences[c(TRUE, FALSE)]
-  ends <- fences[c(FALSE, TRUE)]
-  stopifnot(length(starts) == length(ends), lines[ends] == "```")
-  chunks <- Map(function(start, end) {
-    list(header = lines[[start]], code = lines[seq_len(end - start - 1L) + start])
-  }, starts, ends)
-  chunks[grepl("^```[{]r", lines[starts])]
-}
-
 is_evaluated <- function(chunk) !grepl("eval *= *(FALSE|F)\\b", chunk$header)
 
 # Runs what knitr would run, and returns the environment with what was made.
@@ -36,7 +17,7 @@ run_book <- function(file) {
   skip_if_not_installed("knitr")
   withr::local_pdf(NULL)
   made <- new.env(parent = globalenv())
-  chunks <- Filter(is_evaluated, book_chunks(file))
+  chunks <- Filter(is_evaluated, page_chunks(file))
   # The first one sets up how pictures are made.
   is_of_page <- !grepl("^```[{]r setup", vapply(chunks, `[[`, "", "header"))
   code <- lapply(chunks[is_of_page], `[[`, "code")
@@ -216,7 +197,7 @@ test_that("each page of the book is listed here", {
 for (name in names(book_facts)) {
   test_that(paste(name, "makes each figure by 20 lines of code at most"), {
     file <- book_file(name)
-    chunks <- book_chunks(file)
+    chunks <- page_chunks(file)
     expect_gt(length(chunks), 3L)
     lengths <- vapply(chunks, function(chunk) sum(nzchar(trimws(chunk$code))), 0L)
     headers <- vapply(chunks, `[[`, "", "header")
@@ -238,7 +219,7 @@ for (name in names(book_facts)) {
 
 if (soaks("GYM_TEST_BOOK")) test_that("Gymnasium's car is solved as the page of chapter 10 says", {
   file <- book_file("book-10-mountain-car")
-  shown <- unlist(lapply(Filter(Negate(is_evaluated), book_chunks(file)), `[[`, "code"))
+  shown <- unlist(lapply(Filter(Negate(is_evaluated), page_chunks(file)), `[[`, "code"))
   code <- grep("^#>", shown, value = TRUE, invert = TRUE)
   client <- test_client()
   trained <- eval(parse(text = code), new.env(parent = globalenv()))
