@@ -15,7 +15,8 @@ sitrep_versions <- function() {
 # Rblas; Debian's reference is libblas itself. Measured: an update of PPO of 64 rows, two networks
 # with two hidden layers of 64.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
-  slow <- !nzchar(file) || grepl("Rblas|/blas/libblas|/libblas[.]", file)
+  # A fast one may be a libblas.so.3, too, in a folder that says so.
+  slow <- !nzchar(file) || grepl("Rblas|/libblas[.]", file) && !grepl("openblas|atlas|blis", file)
   if (!slow) {
     return(finding("R", "BLAS", file))
   }

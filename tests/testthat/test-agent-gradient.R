@@ -193,6 +193,24 @@ test_that("learning ends where the policy has moved too far, and where weights a
   }
 })
 
+test_that("a training whose weights become NaN ends with the last good ones", {
+  env <- fake_environment(observation_space = box_space(0, 1))
+  jumps <- function(steps) if (steps < 60) 0.01 else Inf
+  learn <- function(iterations, rate = jumps) {
+    agent <- agent_ppo(batch_steps = 24, batch = 8, epochs = 3, learning_rate = rate)
+    policy <- policy_network(c(NA, NA), "identity", output = NA)
+    quiet_learning(agent, env, policy, iterations = iterations, seed = 1)
+  }
+  # Iterations of 24 steps: the fourth is the first with 60 steps before it.
+  cnd <- expect_error(learn(9), "in iteration 4", class = "gym_error_agent")
+  expect_identical(cnd$iteration, 4L)
+  expect_identical(coef(cnd$result$policy), coef(learn(3)$policy))
+  # Returns that are not finite are found before anything is learned from them.
+  broken <- fake_environment(function(seed, step, action) if (step == 2L) Inf else 1)
+  expect_error(quiet_learning(agent_ppo(), broken, iterations = 1), "no finite number",
+               class = "gym_error_agent")
+})
+
 test_that("agents refuse policies, spaces and settings that they cannot learn with", {
   box <- fake_environment(action_space = box_space(c(-1, -1), c(1, 1)))
   refused <- function(agent, policy, env, words) {

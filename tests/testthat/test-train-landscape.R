@@ -158,3 +158,10 @@ test_that("CartPole: the landscape's middle is the best policy, and nothing stay
   expect_identical(wider$seeds, landscape$seeds)
   expect_identical(wider$best, landscape$best)
 })
+
+test_that("each point of a Gaussian network has the standard deviations of the best policy", {
+  policy <- policy_network(c(3, 2), output = "gaussian", log_std = c(-1, 2))
+  plane <- new_plane(policy, draw_directions(policy$weights), 3, 1)
+  expect_identical(unname(plane$policy$weights[, 7:8]), matrix(c(-1, 2), 9, 2, byrow = TRUE))
+  expect_identical(plane$policy$weights[5, ], coef(policy))
+})
