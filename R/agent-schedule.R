@@ -58,6 +58,18 @@ check_schedule <- function(x, arg, min, max, call) {
   }
 }
 
+# The number 0 is a choice; a schedule that stays there is a slip.
+check_explores <- function(epsilon, call) {
+  is_zero <- function(taken) isTRUE(tryCatch(epsilon(taken) == 0, error = function(cnd) FALSE))
+  if (is.function(epsilon) && all(vapply(c(0, 10^(0:8)), is_zero, NA))) {
+    gym_abort(
+      c("`epsilon` is a schedule that is 0 from the first step on, so that it never explores.",
+        i = "Begin above 0, as `schedule_linear(1, 0.1, duration = 10000)`, or give the number 0."),
+      class = "gym_error_argument", argument = "epsilon", value = epsilon, call = call
+    )
+  }
+}
+
 # A number that may change with the steps that were taken so far.
 scheduled <- function(x, taken, arg, min = 0, max = 1) {
   if (!is.function(x)) {

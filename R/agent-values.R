@@ -21,6 +21,9 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   if (!is.null(settings$temperature)) {
     check_schedule(settings$temperature, "temperature", lowest_temperature, Inf, call)
   }
+  if (is.null(settings$temperature) && !isTRUE(settings$exploring_starts)) {
+    check_explores(settings$epsilon, call)
+  }
   check_initial(settings, call)
   features <- settings$features
   if (!is.null(features) && !is.function(features) && !inherits(features, "gym_features")) {
@@ -75,14 +78,21 @@ value_columns_of.default <- function(agent) as.integer(agent$spaces$action_space
 first_weights <- function(agent, policy) {
   if (!is.null(policy$q)) {
     check_first_table(agent, policy)
-    return(policy$q)
-  }
-  if (is.na(agent$basis$count)) {
+    weights <- policy$q
+  } else if (is.na(agent$basis$count)) {
     # A user's function has not been asked yet.
     return(NULL)
+  } else {
+    rows <- agent$basis$count
+    columns <- value_columns_of(agent)
+    check_fits_memory(
+      as.double(rows) * columns,
+      paste0("Learning a value for each of ", count_of(columns, "action"), " in ",
+             count_of(rows, "state")), NULL, "env",
+      "With `features`, as `tile_coding()` makes them, states share a value."
+    )
+    weights <- matrix(as.double(agent$initial) / agent$basis$each, rows, columns)
   }
-  each <- agent$basis$each
-  weights <- matrix(as.double(agent$initial) / each, agent$basis$count, value_columns_of(agent))
   if (is.null(agent$features) && identical(dim(weights), dim(policy$possible))) {
     # What a state does not have is never taken; of an end no action is.
     weights[!policy$possible & rowSums(policy$possible) > 0] <- -Inf

@@ -65,12 +65,13 @@ with_flow <- function(backup) {
 # The most numbers in a table: 0.8 GB, and several such tables are needed.
 most_cells <- 1e8
 
-check_fits_memory <- function(cells, what, call) {
+check_fits_memory <- function(cells, what, call, arg = "model", hint = NULL) {
   if (cells > most_cells) {
     gym_abort(
-      paste0(what, " takes tables of ", whole_number_text(cells), " numbers, and at most ",
-             whole_number_text(most_cells), " are possible."),
-      class = "gym_error_argument", argument = "model", call = call
+      c(paste0(what, " takes tables of ", whole_number_text(cells), " numbers, and at most ",
+               whole_number_text(most_cells), " are possible."),
+        i = hint),
+      class = "gym_error_argument", argument = arg, value = cells, call = call
     )
   }
 }

@@ -104,6 +104,12 @@ start_in <- function(start, table, states, call = rlang::caller_env()) {
 new_model <- function(table, states, actions, start, spec, call = rlang::caller_env()) {
   table <- table[order(table$state, table$action, method = "radix"), ]
   row.names(table) <- NULL
+  check_fits_memory(
+    as.double(states$n) * as.double(actions$n),
+    paste("A model of", count_of(as.double(states$n), "state"), "with",
+          count_of(as.double(actions$n), "action")),
+    call, "transitions", "Number states and actions without gaps."
+  )
   check_probabilities(table, call)
   check_ends(table, call)
   structure(

@@ -66,14 +66,34 @@ as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
 
 # Is there a way from the start to the end of an episode?
 can_end <- function(model) {
+  moves <- ways_of(model)
+  any(moves$terminated & moves$reached[moves$from])
+}
+
+# The first state that an episode may come to and never end from, whatever is done; NULL for none.
+state_without_end <- function(model) {
+  moves <- ways_of(model)
+  ends <- seq_along(moves$reached) %in% moves$from[moves$terminated]
+  goes_on <- !moves$terminated
+  leads <- function(states) {
+    seq_along(states) %in% moves$from[goes_on & states[moves$to]]
+  }
+  trap <- which(moves$reached & !closure(leads, ends))
+  if (length(trap)) state_numbers(model$observation_space)[[trap[[1L]]]]
+}
+
+# From where to where a model moves, and which states are reached from its start.
+ways_of <- function(model) {
   table <- model$transitions[model$transitions$probability > 0, ]
   from <- state_rows(model, table$state)
   to <- state_rows(model, table$next_state)
   leads <- function(reached) {
     seq_along(reached) %in% to[reached[from] & !table$terminated]
   }
-  reached <- closure(leads, model$start > 0)
-  any(table$terminated & reached[from])
+  list(
+    from = from, to = to, terminated = table$terminated,
+    reached = closure(leads, model$start > 0)
+  )
 }
 
 #' Prepare the drawing of a model's transitions
@@ -118,9 +138,14 @@ draw_transition <- function(moves, pair) {
 check_possible <- function(moves, model, row, action, pair, over) {
   barred <- is.na(moves$first[pair]) & !over
   if (any(barred)) {
+    actions <- state_numbers(model$action_space)
+    at <- row[barred][[1L]]
+    has <- actions[!is.na(moves$first[pair_rows(model, at, actions)])]
     gym_abort(
-      paste0("Action ", action[barred][[1L]], " cannot be taken in state ",
-             moves$states[row[barred]][[1L]], " of ", model$spec$id, "."),
+      c(paste0("Action ", action[barred][[1L]], " cannot be taken in state ",
+               moves$states[[at]], " of ", model$spec$id, "."),
+        i = paste0("What can be taken there: ", toString(has),
+                   ". A `policy_table()` has -Inf for the others.")),
       class = "gym_error_argument", argument = "action", value = action, call = NULL
     )
   }

@@ -161,7 +161,8 @@ policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()
     abort_table(policy, paste0(
       "The policy's table has ", count_of(nrow(policy$q), "row"), " and ",
       count_of(ncol(policy$q), "column"), ", but ", environment_label(env), " has ",
-      count_of(states, "state"), " and ", count_of(actions, "action")
+      count_of(states, "state"), " and ", count_of(actions, "action"),
+      ": a table has a row for each state and a column for each action"
     ), call)
   }
   policy$observation_space <- env$observation_space

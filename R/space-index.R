@@ -164,10 +164,11 @@ table_index <- function(space, what, call) {
   }
   if (index$count > most_values) {
     gym_abort(
-      paste0("A table for ", format(space), " would have ",
-             whole_number_text(index$count),
-             " rows; at most ", whole_number_text(most_values),
-             " are possible."),
+      c(paste0("A table for ", format(space), " would have ",
+               whole_number_text(index$count),
+               " rows; at most ", whole_number_text(most_values),
+               " are possible."),
+        i = "With `features`, as `tile_coding()` makes them, observations share a value."),
       class = "gym_error_argument", value = space, call = call
     )
   }

@@ -284,6 +284,7 @@ train_in <- function(vector_env, run, progress, call) {
   settings[c("num_envs", "batch_size", "client")] <-
     unclass(vector_env)[c("num_envs", "batch_size", "client")]
   online <- learns_online(settings$agent)
+  check_training_ends(vector_env, settings, online, call)
   playing <- if (online && !plays_whole(settings$agent)) stepped(vector_env) else vector_env
   settings$provenance <- run$file$saved$provenance %||% new_provenance(playing, settings)
   bound <- if (online) {
@@ -297,6 +298,26 @@ train_in <- function(vector_env, run, progress, call) {
   if (!is.null(run$file)) state$checkpoint <- training_checkpoint(state, run$file, settings, call)
   if (!is.null(run$log)) state$log <- training_log(run$log, settings, state, call)
   run_training(state, vector_env, settings, progress, call)
+}
+
+# A learner explores, so that it comes to wherever a model leads; but not one that is given its
+# policy.
+check_training_ends <- function(vector_env, settings, online, call) {
+  check_has_end(vector_env, settings$max_steps %||% Inf)
+  model <- settings$model
+  limit <- settings$max_steps %||% model$spec$max_episode_steps
+  if (!online || is.null(model) || !is.null(limit) || inherits(settings$agent, "gym_agent_td")) {
+    return()
+  }
+  state <- state_without_end(model)
+  if (!is.null(state)) {
+    gym_abort(
+      c(paste0("An episode of ", environment_label(vector_env), " that comes to state ", state,
+               " has no end, whatever is done."),
+        i = "Give `max_steps`, after which an episode is cut off, or let the model end there."),
+      class = "gym_error_argument", argument = "max_steps", call = call
+    )
+  }
 }
 
 # Weights that are drawn when the environment's sizes are known follow from the training's seed: a

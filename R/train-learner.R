@@ -82,16 +82,16 @@ learner_envs <- function(env, agent) {
 # What a learner's `agent_start()` gets: a policy that was given, with the spaces, and with a model
 # which actions each state has.
 spaces_policy <- function(policy, vector_env, model, call) {
-  if (!is.null(policy)) {
-    return(policy_bind(policy, vector_env, call = call))
+  bound <- if (is.null(policy)) {
+    structure(
+      unclass(vector_env)[c("observation_space", "action_space")],
+      class = c("gym_policy_unknown", "gym_policy")
+    )
+  } else {
+    policy_bind(policy, vector_env, call = call)
   }
-  structure(
-    list(
-      observation_space = vector_env$observation_space, action_space = vector_env$action_space,
-      possible = if (!is.null(model)) possible_actions(model)
-    ),
-    class = c("gym_policy_unknown", "gym_policy")
-  )
+  bound$possible <- if (!is.null(model)) possible_actions(model)
+  bound
 }
 
 #' @export

@@ -42,7 +42,7 @@ rows_table <- function(rows, none) {
   columns <- lapply(stats::setNames(nm = names(rows[[1L]])), function(name) {
     unlist(lapply(rows, `[[`, name))
   })
-  as.data.frame(columns)
+  list2DF(columns)
 }
 
 no_iterations <- data.frame(

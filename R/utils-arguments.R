@@ -56,8 +56,9 @@ check_seeds <- function(seeds, call = rlang::caller_env()) {
   if (anyDuplicated(seeds)) {
     twice <- seeds[[anyDuplicated(seeds)]]
     gym_abort(
-      paste0("`seeds` must differ, as equal ones give equal results, but ", twice,
-             " is there more than once."),
+      c(paste0("`seeds` must differ, as equal ones give equal results, but ", twice,
+               " is there more than once."),
+        i = "`unique(seeds)` has each of them once."),
       class = "gym_error_argument", argument = "seeds", value = seeds, call = call
     )
   }
