@@ -45,7 +45,10 @@ step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
   } else {
     sub_env$ended <- sub_env$ended | out$terminated | out$truncated
   }
-  step_result(out$observation, out$reward, out$terminated, out$truncated, out$info)
+  list(
+    observation = out$observation, reward = out$reward, done = out$terminated | out$truncated,
+    info = out$info, terminated = out$terminated, truncated = out$truncated
+  )
 }
 
 check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {

@@ -33,13 +33,10 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
 prepare_reset <- function(instance, named, infos) {
   read_observation <- observation_reader(instance, instance$observations, named)
   read <- function(answer) {
-    check_answer_info(answer)
-    list(observation = read_observation(answer), info = info_from(instance, answer))
+    info <- read_info(answer, instance$num_envs)
+    list(observation = read_observation(answer), info = info)
   }
-  finish <- function(tensors) {
-    list(observation = known_observation(tensors, read_observation), info = empty_object)
-  }
-  prepare_instance_request(instance, "reset/", info_field(instance, infos), named, read, finish)
+  prepare_instance_request(instance, "reset/", info_field(instance, infos), named, read)
 }
 
 #' Take a step
@@ -88,14 +85,13 @@ info_field <- function(instance, infos) if (!infos && !instance$classic) c(info 
 #' Prepare the requests of one of an instance's routes
 #' @param body,sends_tensors As [prepare_request()] takes them.
 #' @param read_answer A function of a parsed answer, which returns the result or says what is wrong.
-#' @param finish As that of [new_tensors_reader()].
 #' @noRd
-prepare_instance_request <- function(instance, route, fields, named, read_answer, finish,
+prepare_instance_request <- function(instance, route, fields, named, read_answer,
                                      body = new_json_body(fields), sends_tensors = FALSE) {
   read <- if (instance$takes_tensors) {
     space <- instance$single_observation_space
     labels <- if (named && inherits(space, "gym_space_box")) space$names
-    new_tensors_reader(read_answer, finish, labels)
+    new_tensors_reader(read_answer, labels)
   } else {
     new_json_reader(read_answer)
   }
@@ -113,12 +109,7 @@ prepare_single_step <- function(instance, fields, named) {
   sends <- instance$sends_tensors
   read_observation <- observation_reader(instance, instance$observations, named)
   request <- prepare_instance_request(
-    instance, "step/", fields, named,
-    read_answer = function(answer) read_step(instance, answer, read_observation),
-    finish = function(tensors) {
-      observation <- known_observation(tensors, read_observation)
-      step_result(observation, tensors$reward, tensors$terminated, tensors$truncated, empty_object)
-    },
+    instance, "step/", fields, named, step_reader(instance, read_observation),
     body = if (sends) new_tensors_body(fields) else new_json_body(fields),
     sends_tensors = sends
   )
@@ -138,31 +129,31 @@ prepare_single_step <- function(instance, fields, named) {
   request
 }
 
-step_result <- function(observation, reward, terminated, truncated, info) {
-  list(
-    observation = observation, reward = reward, done = terminated | truncated, info = info,
-    terminated = terminated, truncated = truncated
-  )
-}
-
-read_step <- function(instance, answer, read_observation) {
-  if (!is.null(answer$tensors)) {
-    answer[flags_and_reward] <- answer$tensors[flags_and_reward]
-    check_answer_results(answer, 1L)
-    answer$done <- answer$terminated || answer$truncated
-  } else if (instance$classic) {
-    answer <- classic_flags(answer)
+# Makes the function that reads the answer to a step of a single environment.
+step_reader <- function(instance, read_observation) {
+  classic <- instance$classic
+  function(answer) {
+    if (!is.null(answer$tensors)) {
+      check_answer_results(answer$tensors, 1L)
+      answer[flags_and_reward] <- answer$tensors[flags_and_reward]
+      answer$done <- answer$terminated || answer$truncated
+    } else if (classic) {
+      answer <- classic_flags(answer)
+    }
+    for (name in c("done", "terminated", "truncated")) {
+      flag <- answer[[name]]
+      right <- isTRUE(flag) || isFALSE(flag) || is.null(flag) && name != "done"
+      if (!right) refuse_field(flag, name, "true or false")
+    }
+    info <- read_info(answer, NULL)
+    observation <- read_observation(answer)
+    reward <- answer$reward
+    if (!is.double(reward) || length(reward) != 1L) reward <- number_from(reward, "reward")
+    list(
+      observation = observation, reward = reward, done = answer$done, info = info,
+      terminated = answer$terminated, truncated = answer$truncated
+    )
   }
-  check_answer_flags(answer)
-  check_answer_info(answer)
-  list(
-    observation = read_observation(answer),
-    reward = number_from(answer$reward, "reward"),
-    done = answer$done,
-    info = info_from(instance, answer),
-    terminated = answer$terminated,
-    truncated = answer$truncated
-  )
 }
 
 flags_and_reward <- c("reward", "terminated", "truncated")
@@ -177,29 +168,39 @@ flags_and_reward <- c("reward", "terminated", "truncated")
 observation_reader <- function(instance, space, named, name = "observation") {
   read_json <- json_reader(space)
   name_observation <- if (named) instance$name_observation
-  what <- paste0("Its `", name, "`")
+  in_one <- inherits(space, c("gym_space_array", "gym_space_discrete"))
+  shape <- if (length(space$shape) > 1L) space$shape
+  n <- prod(space$shape)
+  read_any <- function(answer) {
+    if (is.null(answer$tensors)) {
+      decode_value(space, answer[[name]])
+    } else {
+      from_tensors(space, name, answer)
+    }
+  }
   function(answer) {
-    observation <- read_values(
-      if (is.null(answer$tensors)) read_json(answer[[name]]) else from_tensors(space, name, answer),
-      what
-    )
-    if (is.null(name_observation)) observation else name_observation(observation)
+    # As it nearly always is, or NULL.
+    observation <- if (is.null(answer$tensors)) {
+      read_json(answer[[name]])
+    } else if (in_one) {
+      values <- answer$tensors[[name]]
+      if (length(values) == n && identical(dim(values), shape)) values
+    }
+    observation <- observation %||% read_values(read_any(answer), paste0("Its `", name, "`"))
+    if (is.null(name_observation) || isTRUE(answer$named)) {
+      observation
+    } else {
+      name_observation(observation)
+    }
   }
 }
 
-# The observation in tensors of a known layout. An array has its names already.
-known_observation <- function(tensors, read_observation) {
-  # Not with `$`, which would find the only part of a Tuple or Dict, "observation/...".
-  tensors[["observation"]] %||% read_observation(list(tensors = tensors))
-}
-
-info_from <- function(instance, answer) {
+# The info of an answer, `n` that of how many sub-environments, `NULL` for a single environment.
+read_info <- function(answer, n) {
   info <- answer$info
   if (!length(info)) {
-    empty_object
-  } else if (is.null(instance$num_envs)) {
-    info_from_json(info)
-  } else {
-    info_by_sub_env(info, instance$num_envs)
+    return(empty_object)
   }
+  check_optional(answer, "info", is_object, "an object")
+  if (is.null(n)) info_from_json(info) else read_values(info_by_sub_env(info, n), "Its `info`")
 }

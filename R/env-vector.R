@@ -37,13 +37,7 @@ prepare_vector_step <- function(instance, fields, which, named, infos) {
   read_observation <- observation_reader(instance, observed, named)
   request <- prepare_instance_request(
     instance, "step/", fields, named,
-    read_answer = function(answer) {
-      read_vector_step(instance, answer, read_observation, n, named, infos)
-    },
-    finish = function(tensors) {
-      observation <- known_observation(tensors, read_observation)
-      vector_step_result(observation, tensors, empty_object)
-    },
+    vector_step_reader(instance, read_observation, n, named, infos),
     body = if (sends) new_tensors_body(fields, n) else new_json_body(fields),
     sends_tensors = sends
   )
@@ -61,31 +55,30 @@ prepare_vector_step <- function(instance, fields, which, named, infos) {
   request
 }
 
-vector_step_result <- function(observation, parts, info, next_observation = observation) {
-  c(
-    step_result(observation, parts$reward, parts$terminated, parts$truncated, info),
-    list(next_observation = next_observation)
-  )
-}
-
-read_vector_step <- function(instance, answer, read_observation, n, named, infos) {
-  result <- read_values(results_by_sub_env(answer), "Its `reward`")
-  check_answer_results(result, n)
-  check_answer_info(answer)
-  info <- read_values(info_by_sub_env(answer$info, n), "Its `info`")
-  observation <- read_observation(answer)
-  if (!length(answer$final_sub_envs)) {
-    return(vector_step_result(observation, result, info))
-  }
+# Makes the function that reads the answer to a step of `n` sub-environments.
+vector_step_reader <- function(instance, read_observation, n, named, infos) {
   space <- instance$single_observation_space
-  final <- final_observations(instance, answer, n, named)
-  if (infos) info$final_obs <- final_by_sub_env(space, final, n)
-  next_observation <- replace_rows(space, observation, n, final$sub_envs, final$values)
-  vector_step_result(observation, result, info, next_observation)
+  function(answer) {
+    result <- answer$tensors %||% read_values(results_from_json(answer), "Its `reward`")
+    check_answer_results(result, n)
+    info <- read_info(answer, n)
+    observation <- next_observation <- read_observation(answer)
+    if (length(answer$final_sub_envs)) {
+      final <- final_observations(instance, answer, n, named)
+      if (infos) info$final_obs <- final_by_sub_env(space, final, n)
+      next_observation <- replace_rows(space, observation, n, final$sub_envs, final$values)
+    }
+    list(
+      observation = observation, reward = result$reward,
+      done = result$terminated | result$truncated, info = info,
+      terminated = result$terminated, truncated = result$truncated,
+      next_observation = next_observation
+    )
+  }
 }
 
-results_by_sub_env <- function(answer) {
-  answer$tensors %||% list(
+results_from_json <- function(answer) {
+  list(
     reward = as.numeric(numbers_from_json(answer$reward)),
     terminated = unlist(answer$terminated),
     truncated = unlist(answer$truncated)

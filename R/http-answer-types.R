@@ -27,7 +27,7 @@ read_values <- function(expr, what) {
   })
 }
 
-is_flag <- function(x) identical(x, FALSE) || identical(x, TRUE)
+is_flag <- function(x) isTRUE(x) || isFALSE(x)
 
 is_object <- function(x) is.list(x) && (!length(x) || !is.null(names(x)))
 
@@ -48,24 +48,6 @@ number_from <- function(x, name) {
     refuse_field(x, name, "one number")
   }
   number_from_json(x)
-}
-
-# Classic servers send `done` alone.
-check_answer_flags <- function(answer) {
-  if (!is_flag(answer$done)) {
-    refuse_field(answer$done, "done", "true or false")
-  }
-  if (!is_flag(answer$terminated) || !is_flag(answer$truncated)) {
-    check_optional(answer, "terminated", is_flag, "true or false")
-    check_optional(answer, "truncated", is_flag, "true or false")
-  }
-}
-
-# Quick for an empty info, as most are.
-check_answer_info <- function(answer) {
-  if (!identical(answer$info, empty_object)) {
-    check_optional(answer, "info", is_object, "an object")
-  }
 }
 
 #' @param result A list of `reward`, `terminated` and `truncated`, an element for each of `n`.

@@ -1,4 +1,4 @@
-# A client: where a server is, and what this session keeps of the connection to it.
+# A client: where a server is, how it is reached, and what the server says of itself.
 
 new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
   structure(
@@ -37,27 +37,6 @@ client_config <- function(client) {
     session$options <- session$options[!grepl("^proxy", names(session$options))]
   }
   c(session, client$config)
-}
-
-# What a client holds besides its address: its connection to the server and what it knows of the
-# server's instances. It is made anew when the client finds itself in another process or restored
-# from a file: there the connection is void, and its idempotency keys belong to the original.
-client_state <- function(client) {
-  state <- client$state
-  if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
-    connection <- new_connection(client)
-    suspendInterrupts({
-      state$connection <- connection
-      state$instances <- new.env(parent = emptyenv())
-      state$creation_keys <- new_idempotency_keys()
-      state$to_close <- character()
-      state$health <- NULL
-      state$line <- NULL
-      state$pid <- Sys.getpid()
-      state$session <- the_session
-    })
-  }
-  state
 }
 
 # What the server says of itself, a named list; `NULL` where it has no such route, or there is no

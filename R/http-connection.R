@@ -1,4 +1,36 @@
-# A client's connection to its server: idempotency keys, curl's handles, the body that is sent.
+# A client's connection to its server, and what else the session keeps of a client: idempotency
+# keys, curl's handles, the body that is sent.
+
+# What a client holds besides its address: its connection to the server and what it knows of the
+# server's instances. It is made anew when the client finds itself in another process or restored
+# from a file: there the connection is void, and its idempotency keys belong to the original. The
+# handles are made anew when httr::set_config() or httr::reset_config() has changed what the session
+# has.
+client_state <- function(client) {
+  state <- client$state
+  if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
+    connection <- new_connection(client)
+    suspendInterrupts({
+      state$connection <- connection
+      state$session_config <- getOption("httr_config")
+      state$instances <- new.env(parent = emptyenv())
+      state$creation_keys <- new_idempotency_keys()
+      state$to_close <- character()
+      state$health <- NULL
+      state$line <- NULL
+      state$pid <- Sys.getpid()
+      state$session <- the_session
+    })
+  } else if (!identical(state$session_config, getOption("httr_config"))) {
+    suspendInterrupts({
+      state$connection$handles <- new.env(parent = emptyenv())
+      state$connection$inner <- NULL
+      state$line <- NULL
+      state$session_config <- getOption("httr_config")
+    })
+  }
+  state
+}
 
 # Makes a connection: its idempotency keys, the function that performs a request, the body under
 # way, and the handles that were made so far.
@@ -11,7 +43,6 @@ new_connection <- function(client, keys = keys_of_process(client),
   connection$body <- raw()
   connection$sent <- 0L
   connection$handles <- new.env(parent = emptyenv())
-  connection$session_config <- getOption("httr_config")
   connection
 }
 
@@ -114,26 +145,14 @@ handle_kind <- function(method, sends_tensors, takes_tensors) {
   }
 }
 
-# A connection's handle of one kind: curl's handle, and the length of body that is set on it. New
-# ones are made when httr::set_config() or httr::reset_config() has changed what the session has.
-handle_of_kind <- function(client, connection, kind) {
-  if (!identical(connection$session_config, getOption("httr_config"))) {
-    connection$session_config <- getOption("httr_config")
-    connection$handles <- new.env(parent = emptyenv())
-  }
-  connection$handles[[kind]] %||%
-    (connection$handles[[kind]] <- new_handle_of_kind(client, connection, kind))
-}
-
-new_handle_of_kind <- function(client, connection, kind) {
+# Makes a connection's handle of one kind: curl's handle, and the length of body that is set on it.
+add_handle <- function(client, connection, kind) {
   handle <- new.env(parent = emptyenv())
   handle$kind <- kind
   handle$curl <- new_handle(client, kind)
   handle$body_size <- -1
-  if (handle_kinds[[kind]]$post) {
-    set_curl(handle$curl, readfunction = function(nbytes, ...) read_body(connection, nbytes))
-  }
-  handle
+  if (handle_kinds[[kind]]$post) set_curl(handle$curl, readfunction = body_reader(connection))
+  connection$handles[[kind]] <- handle
 }
 
 # Gives a connection new handles and a pool of its own, and returns the new handle of the same kind.
@@ -144,17 +163,9 @@ new_handle_of_kind <- function(client, connection, kind) {
 replace_handle <- function(client, connection, handle) {
   connection$fetch <- fetch_in_own_pool()
   connection$handles <- new.env(parent = emptyenv())
-  fresh <- handle_of_kind(client, connection, handle$kind)
+  fresh <- add_handle(client, connection, handle$kind)
   if (handle$body_size >= 0) set_body_size(fresh, handle$body_size)
   fresh
-}
-
-# Has a connection send this body.
-load_body <- function(connection, handle, bytes) {
-  connection$body <- bytes
-  if (length(bytes) != handle$body_size) {
-    set_body_size(handle, length(bytes))
-  }
 }
 
 set_body_size <- function(handle, size) {
@@ -164,17 +175,20 @@ set_body_size <- function(handle, size) {
   })
 }
 
-# Called by curl when it wants more of the body. When curl repeats a request by itself it asks for
-# the body a second time. Then nothing is left, and curl fails: only repeat_request() may do that.
-read_body <- function(connection, nbytes) {
-  if (connection$sent == 0L && length(connection$body) <= nbytes) {
-    connection$sent <- length(connection$body)
-    return(connection$body)
+# Makes the function that curl calls when it wants more of the body. When curl repeats a request by
+# itself it asks for the body a second time. Then nothing is left, and curl fails: only
+# repeat_request() may do that.
+body_reader <- function(connection) {
+  function(nbytes, ...) {
+    if (connection$sent == 0L && length(connection$body) <= nbytes) {
+      connection$sent <- length(connection$body)
+      return(connection$body)
+    }
+    size <- min(nbytes, length(connection$body) - connection$sent)
+    chunk <- connection$body[connection$sent + seq_len(size)]
+    connection$sent <- connection$sent + size
+    chunk
   }
-  size <- min(nbytes, length(connection$body) - connection$sent)
-  chunk <- connection$body[connection$sent + seq_len(size)]
-  connection$sent <- connection$sent + size
-  chunk
 }
 
 # A handle of curl's with the settings of a client, for requests of one kind.

@@ -54,11 +54,7 @@ hand_over <- function(several, received) {
 # The client's pool and its idle handles, which keep their connections from call to call.
 line_of <- function(client) {
   state <- client_state(client)
-  config <- getOption("httr_config")
-  if (is.null(state$line) || !identical(state$line$config, config)) {
-    state$line <- rlang::env(pool = curl::new_pool(), idle = list(), config = config)
-  }
-  state$line
+  state$line %||% (state$line <- rlang::env(pool = curl::new_pool(), idle = list()))
 }
 
 new_under_way <- function(content) {

@@ -26,13 +26,6 @@ read_tensors <- function(bytes, layout = read_layout(bytes)) {
 # What follows the start of a header, to its end.
 metadata_bytes <- function(bytes, layout) bytes[(length(layout$start) + 1L):layout$data]
 
-# Whether a file is like the one from which a layout was read, up to its metadata and its numbers.
-# `layout` may be `NULL`.
-has_layout <- function(bytes, layout) {
-  !is.null(layout) && length(bytes) == layout$total &&
-    identical(bytes[seq_along(layout$start)], layout$start)
-}
-
 # Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
 # which copies the file once, in much less time for each byte.
 index_up_to <- 8192L

@@ -3,12 +3,12 @@
 # with it.
 
 #' Make the function that reads a space's values from JSON
-#' @return A function as [decode_value()], without the space.
+#' @return A function of what was parsed, `NULL` for a value that [decode_value()] must look at.
 #' @noRd
 json_reader <- function(space) UseMethod("json_reader")
 
 #' @exportS3Method
-json_reader.default <- function(space) function(json) decode_value(space, json)
+json_reader.default <- function(space) function(json) NULL
 
 #' @exportS3Method
 json_reader.gym_space_array <- function(space) {
@@ -18,11 +18,7 @@ json_reader.gym_space_array <- function(space) {
   }
   function(json) {
     values <- unlist(json, use.names = FALSE)
-    if (is.double(values) && length(values) == n && !anyNA(values)) {
-      values
-    } else {
-      decode_value(space, json)
-    }
+    if (is.double(values) && length(values) == n && !anyNA(values)) values
   }
 }
 
@@ -30,7 +26,7 @@ is_float <- function(space) startsWith(space$dtype %||% "", "float")
 
 #' @exportS3Method
 json_reader.gym_space_discrete <- function(space) {
-  function(json) if (is.integer(json) && length(json) == 1L) json else decode_value(space, json)
+  function(json) if (is.integer(json) && length(json) == 1L) json
 }
 
 #' @exportS3Method
@@ -39,10 +35,10 @@ json_reader.gym_space_tuple <- function(space) {
   keys <- names(space$spaces)
   function(json) {
     if (!is.list(json) || length(json) != length(readers) || !identical(names(json), keys)) {
-      return(decode_value(space, json))
+      return(NULL)
     }
     for (i in seq_along(readers)) {
-      json[[i]] <- readers[[i]](json[[i]])
+      json[[i]] <- readers[[i]](json[[i]]) %||% return(NULL)
     }
     json
   }
@@ -67,13 +63,11 @@ json_writer.default <- function(space) function(value) NULL
 #' @exportS3Method
 json_writer.gym_space_discrete <- function(space) {
   function(value) {
-    if (is_plain_whole(value)) sprintf('"action":%.0f,', as.double(value))
+    if (length(value) == 1L && (is.numeric(value) || is.logical(value)) && !is.object(value) &&
+          is.finite(value) && value == trunc(value)) {
+      sprintf('"action":%.0f,', as.double(value))
+    }
   }
-}
-
-is_plain_whole <- function(x) {
-  length(x) == 1L && (is.numeric(x) || is.logical(x)) && !is.object(x) && is.finite(x) &&
-    x == trunc(x)
 }
 
 #' @exportS3Method
@@ -83,14 +77,12 @@ json_writer.gym_space_box <- function(space) {
     return(json_writer.default(space))
   }
   function(value) {
-    if (length(value) == n && is_plain_double(value) && is.null(dim(value)) &&
+    if (length(value) == n && is.double(value) && !is.object(value) && is.null(dim(value)) &&
           all(is.finite(value))) {
       paste0('"action":', json_array(json_number(value)), ",")
     }
   }
 }
-
-is_plain_double <- function(x) is.double(x) && !is.object(x)
 
 #' Make the function that checks a batch of actions and puts it into tensors
 #'
@@ -108,18 +100,15 @@ tensors_writer.gym_space_discrete <- function(space, n) {
   if (space$dtype == "uint64") {
     return(tensors_writer.default(space, n))
   }
-  function(values) if (length(values) == n && is.null(dim(values))) plain_integers(values)
-}
-
-# Whole numbers as integers, `NULL` for what has to be looked at.
-plain_integers <- function(values) {
-  if (is.object(values)) {
-    NULL
-  } else if (is.integer(values) || is.logical(values)) {
-    if (!anyNA(values)) as.integer(values)
-  } else if (is.double(values) && within_integer(values)) {
-    whole <- as.integer(values)
-    if (all(whole == values)) whole
+  function(values) {
+    if (length(values) != n || !is.null(dim(values)) || is.object(values)) {
+      NULL
+    } else if (is.integer(values) || is.logical(values)) {
+      if (!anyNA(values)) as.integer(values)
+    } else if (is.double(values) && within_integer(values)) {
+      whole <- as.integer(values)
+      if (all(whole == values)) whole
+    }
   }
 }
 
@@ -135,11 +124,9 @@ tensors_writer.gym_space_box <- function(space, n) {
   }
   type <- tensor_dtypes[[space$dtype]]
   write <- tensor_types[[type]]$write
-  fits <- function(values) {
-    is_plain_double(values) && identical(dim(values), shape) && isTRUE(max(abs(values)) <= limit)
-  }
   function(values) {
-    if (fits(values)) {
+    if (is.double(values) && !is.object(values) && identical(dim(values), shape) &&
+          isTRUE(max(abs(values)) <= limit)) {
       numbers <- if (shape[[2L]] == 1L) values else t(values)
       list(action = list(dtype = type, shape = shape, bytes = write(as.vector(numbers))))
     }

@@ -269,7 +269,7 @@ test_that("a call inside another call disturbs neither", {
       rm(thrown_away)
       gc()
     }
-    read_body(connection, nbytes)
+    body_reader(connection)(nbytes)
   })
   other <- create_GymClient(server$remote_base)
   for (action in c(1, 0, 1)) {
@@ -288,7 +288,7 @@ test_that("a call of one client inside another's disturbs neither", {
   made <- NULL
   curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {
     if (connection$sent == 0L) made <<- c(made, env_create(other, "CartPole-v1"))
-    read_body(connection, nbytes)
+    body_reader(connection)(nbytes)
   })
   expect_equal(env_step(server, id, 1)$reward, 1)
   expect_equal(env_step(server, id, 0)$reward, 1)
@@ -320,7 +320,7 @@ test_that("an interrupt that jumps out of libcurl leaves a client that works", {
     "interrupted <- works <- 0",
     "for (wait in 1:60) {",
     "  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {",
-    "    body <- gym:::read_body(connection, nbytes)",
+    "    body <- gym:::body_reader(connection)(nbytes)",
     "    suspendInterrupts({",
     "      gctorture2(1e6L, wait)",
     "      tools::pskill(Sys.getpid(), tools::SIGINT)",

@@ -19,17 +19,13 @@ response_of <- function(content, status = 200L, type = tensors_type) {
 }
 
 # Notes which way answers are read.
-noting_reader <- function(ways) {
+noting_reader <- function(ways, labels = c("a", "b")) {
   new_tensors_reader(
     read_answer = function(answer) {
-      ways$all <- c(ways$all, "read")
+      ways$all <- c(ways$all, if ("texts" %in% names(answer)) "metadata" else "tensors")
       answer
     },
-    finish = function(tensors) {
-      ways$all <- c(ways$all, "finish")
-      list(tensors = tensors)
-    },
-    labels = c("a", "b")
+    labels = labels
   )
 }
 
@@ -37,11 +33,11 @@ test_that("an answer like the last one that says nothing more than its tensors i
   ways <- new.env()
   read <- noting_reader(ways)
   first <- read(response_of(file_with(bare_for(7))), key_of(7))
-  expect_identical(first$tensors, list(observation = 3:4))
+  expect_identical(first$tensors, list(observation = c(a = 3L, b = 4L)))
   expect_identical(first$info, empty_object)
   second <- read(response_of(file_with(bare_for(8), 5:6)), key_of(8))
   expect_identical(second$tensors, list(observation = c(a = 5L, b = 6L)))
-  expect_identical(ways$all, c("read", "finish"))
+  expect_identical(ways$all, c("metadata", "tensors"))
 })
 
 test_that("metadata are left unread only where they are what was expected", {
@@ -55,7 +51,7 @@ test_that("metadata are left unread only where they are what was expected", {
     sub('"}$', '","error":"{}"}', bare_for(8))
   )
   answers <- lapply(others, function(other) read(response_of(file_with(other)), key_of(8)))
-  expect_identical(ways$all, rep("read", 4))
+  expect_identical(ways$all, rep("metadata", 4))
   expect_identical(answers[[1]]$info, list(a = 1L))
   expect_identical(answers[[2]]$final_sub_envs, list(0L))
   expect_identical(answers[[3]]$error, empty_object)
@@ -63,7 +59,7 @@ test_that("metadata are left unread only where they are what was expected", {
 
 test_that("an answer of another layout, or cut short, is read by its own header", {
   ways <- new.env()
-  read <- noting_reader(ways)
+  read <- noting_reader(ways, labels = NULL)
   content <- file_with(bare_for(7))
   read(response_of(content), key_of(7))
   longer <- read(response_of(file_with(bare_for(8), 1:9)), key_of(8))
@@ -71,7 +67,7 @@ test_that("an answer of another layout, or cut short, is read by its own header"
   cut <- utils::head(content, -1)
   expect_error(read(response_of(cut), key_of(7)), class = "gym_error_connection")
   expect_null(read(response_of(content, 400L), key_of(7)))
-  expect_identical(ways$all, c("read", "read"))
+  expect_identical(ways$all, c("metadata", "metadata"))
 })
 
 test_that("the layout of a long header is not remembered", {
