@@ -1,8 +1,8 @@
-# The ten-armed testbed of Sutton and Barto (2018), chapter 2: is it worth while to explore?
+# The ten-armed testbed of Sutton and Barto (2018), chapter 2: does exploring pay?
 #
-# A bandit has ten arms. Each arm has a mean reward of its own, which nobody knows; who always pulls
-# the arm that has paid best so far never learns better. 500 bandits are played at once: the
-# functions are vectorised, so each line below works on all of them.
+# A bandit has ten arms. Each arm has its own mean reward, which the player does not know. A
+# player who always pulls the best arm so far may never find a better one. The functions are
+# vectorised: each line below works on 500 bandits at once.
 
 library(gym)
 
@@ -31,7 +31,7 @@ play <- function(epsilon) {
   rewards <- best <- numeric(1000)
   bandit$reset(seed = 1)
   for (step in 1:1000) {
-    # Arms that look equally good are drawn from.
+    # Draw among the arms with the same estimate.
     arm <- max.col(estimates, ties.method = "random")
     explores <- runif(n) < epsilon
     arm[explores] <- sample.int(10, sum(explores), replace = TRUE)

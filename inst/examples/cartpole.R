@@ -1,5 +1,4 @@
-# Solve CartPole: search for a network that balances the pole, look at what was
-# found, watch it play an episode.
+# Solve CartPole: search for a network that balances the pole, look at it, and play an episode.
 
 library(gym)
 
@@ -8,10 +7,10 @@ result <- search_random("CartPole-v0")
 result
 plot(result)
 
-# Is it as good as the batch of five episodes made it look?
+# Is it as good as its five episodes in the search?
 summary(result)
 
-# One episode of the policy found, step by step.
+# Play one episode of this policy, step by step.
 d <- as.data.frame(rollout("CartPole-v0", result$policy, steps = TRUE))
 head(d)
 plot(d$step, d$pole_angle, type = "l", xlab = "step", ylab = "pole angle (rad)")

@@ -1,4 +1,4 @@
-# The classic calls: a random agent plays CartPole, and the server writes a table of its episodes.
+# The classic calls: a random agent plays CartPole. The server writes a table of its episodes.
 
 library(gym)
 

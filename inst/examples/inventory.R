@@ -1,8 +1,8 @@
 # A shop that never closes: how much to order each evening?
 #
-# The store holds 20 pieces at most. A day brings a Poisson number of buyers, 4 on average; a piece
-# sells for 5 and costs 2, an order costs 4 beside the pieces, and every piece that stays overnight
-# costs 0.1. No episode ever ends, so `max_steps` says how many days are played.
+# The store holds at most 20 pieces. Each day brings a Poisson number of buyers, 4 on average. A
+# piece sells for 5 and costs 2. Each order costs another 4. Every piece that stays overnight costs
+# 0.1. Episodes never end, so `max_steps` sets the number of days.
 
 library(gym)
 
@@ -12,7 +12,7 @@ shop <- gym_env(
     self$stock
   },
   step = function(self, action) {
-    # What the store cannot hold is not ordered.
+    # Order no more than the store can hold.
     ordered <- pmin(action, 20 - self$stock)
     sold <- pmin(self$stock + ordered, rpois(self$num_envs, 4))
     self$stock <- self$stock + ordered - sold
@@ -22,14 +22,14 @@ shop <- gym_env(
       terminated = logical(self$num_envs)
     )
   },
-  # 0 to 20 pieces in store; 0 to 20 pieces to order. All shops are played at once.
+  # 0 to 20 pieces in store, 0 to 20 pieces to order. All shops play at once.
   observation_space = space_discrete(21), action_space = space_discrete(21), vectorized = TRUE,
   id = "Inventory"
 )
 
 print(check_env(shop, max_steps = 200))
 
-# Theory says that a good rule has two numbers: with `low` pieces or fewer, order up to `high`.
+# A good rule has two numbers: when `low` pieces or fewer are left, order up to `high`.
 rule <- function(low, high) {
   function(observation) ifelse(observation <= low, high - observation, 0)
 }

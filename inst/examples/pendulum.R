@@ -1,5 +1,5 @@
-# Search where actions are continuous: Pendulum takes a torque between -2 and 2.
-# It has no threshold, so the search plays all its rounds and keeps the best.
+# Search with continuous actions: Pendulum takes a torque between -2 and 2. It has no reward
+# threshold, so the search plays all rounds and keeps the best one.
 
 library(gym)
 

@@ -1,10 +1,10 @@
 # Many trainings on a cluster with a queue: a job for each seed.
 #
-# On a machine that can submit jobs to Slurm each job is asked for by `slurm.tmpl`, which lies
-# beside this file. Elsewhere the same script runs its jobs one after the other, to try it out.
+# On a machine with Slurm the script submits each job with `slurm.tmpl`, from the same folder.
+# Elsewhere it runs the jobs one after the other, so that you can try it out.
 #
-# Every job makes its own checkpoint and log in a folder that all machines see. A job that has ended
-# before its training goes on from there when the script is run again.
+# Each job writes its own checkpoint and log in a folder that all machines share. If a job ends
+# before its training does, run the script again to resume it.
 
 library(gym)
 
@@ -16,7 +16,7 @@ if (nzchar(Sys.which("sbatch"))) {
     future.batchtools::batchtools_slurm, template = file.path(here, "slurm.tmpl"),
     resources = list(cores = 4, hours = 2, memory = 2000)
   )
-  # Within a job the training plays on its four cores.
+  # Within a job, the training uses its four cores.
   future::plan(list(jobs, future::tweak(future::multisession, workers = I(4))))
 } else {
   future::plan(future.batchtools::batchtools_local)

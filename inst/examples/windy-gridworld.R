@@ -1,7 +1,7 @@
 # The windy gridworld of Sutton and Barto (2018), example 6.5, learned by Sarsa.
 #
-# The way leads from the left to a goal in the same row, through columns in which a wind blows
-# upwards, by one row or by two. Each step costs 1. The shortest way takes 15 steps.
+# The goal lies in the row of the start. In the columns between them a wind moves the player up by
+# one or two rows. Each step costs 1. The shortest path takes 15 steps.
 
 library(gym)
 
@@ -32,13 +32,13 @@ windy <- gym_env(
   render_fps = 4
 )
 
-# The cells are counted from 0, row by row.
+# Cells are numbered from 0, row by row.
 place <- function(at) 10 * (at[["row"]] - 1) + at[["column"]] - 1
 
 print(check_env(windy, max_steps = 2000))
 
-# Sarsa learns the value of each action in each cell while it follows these values, and with
-# probability 0.1 does anything.
+# Sarsa learns the value of each action in each cell. It takes the best action so far, or, with
+# probability 0.1, a random one.
 values <- matrix(0, 70, 4)
 choose <- function(place) {
   if (runif(1) < 0.1) sample.int(4, 1) else which.max(values[place + 1, ])
@@ -53,7 +53,7 @@ for (episode in seq_along(lengths)) {
     out <- windy$step(action - 1)
     lengths[episode] <- lengths[episode] + 1L
     next_action <- choose(out$observation)
-    # At the goal all values are 0, because nothing is ever learned there.
+    # Values at the goal stay 0: no step starts there.
     target <- out$reward + values[out$observation + 1, next_action]
     error <- target - values[place_now + 1, action]
     values[place_now + 1, action] <- values[place_now + 1, action] + 0.5 * error
@@ -65,12 +65,12 @@ for (episode in seq_along(lengths)) {
 cat("Steps of the first ten episodes:", mean(lengths[1:10]), "on average, of the last hundred:",
     mean(lengths[201:300]), "\n")
 
-# The policy that was learned is the best action in each cell.
+# The learned policy takes the best action in each cell.
 greedy <- function(observation) max.col(values[observation + 1, , drop = FALSE], "first") - 1
 learned <- rollout(windy, greedy, seed = 1, steps = TRUE, max_steps = 100)
 print(learned)
 cat("Its way:", rownames(moves)[learned$steps$action + 1], "\n")
 
-# The book's figure: how many episodes were finished by which step.
+# The book's figure: the number of finished episodes over the steps.
 plot(cumsum(lengths), seq_along(lengths), type = "l", xlab = "Steps", ylab = "Episodes",
      main = "Windy gridworld")
