@@ -1,4 +1,4 @@
-# What becomes of a request whose connection broke: it is made again, or it is an error.
+# When a request is made again, of one or of several under way, and what becomes of it otherwise.
 
 max_attempts <- 4L
 
@@ -16,14 +16,13 @@ repeat_request <- function(request, connection, handle, key, failure, call) {
     reason <- conditionMessage(failure)
     raise_own_stop(client, reason, call)
     reached <- reached | curl::handle_data(handle$curl)$times[["pretransfer"]] > 0
-    refused <- curl_refused(reason)
-    if (refused) {
+    if (curl_refused(reason)) {
       handle <- replace_handle(client, connection, handle)
     }
-    pause <- 0.1 * attempt
-    left <- timeout - (now() - begun) - pause
-    if (attempt < max_attempts && left > 0 && may_repeat(request, connection, reason)) {
-      if (!refused) Sys.sleep(pause)
+    pause <- pause_before_next(request, failure, attempt, connection$sent == 0L)
+    left <- timeout - (now() - begun) - (pause %||% 0)
+    if (!is.null(pause) && left > 0) {
+      Sys.sleep(pause)
       attempt <- attempt + 1L
     } else if (prompted_server_starts(client, reached, call)) {
       begun <- now()
@@ -71,14 +70,33 @@ prompted_server_starts <- function(client, reached, call) {
   prompts && the_session$prompt_for_server(client, call)
 }
 
-# What curl refuses may be repeated in any case as long as it has not asked for the body. A server
-# with the classic protocol knows no idempotency keys and would do the repeat, too.
-may_repeat <- function(request, connection, reason) {
+#' Decide whether a request is made again, and when
+#'
+#' What curl refuses may be repeated in any case as long as it has not asked for the body. A server
+#' with the classic protocol knows no idempotency keys and would do the repeat, too. One that has
+#' too much to do says when to ask again, but a single request does not wait for that.
+#' @param outcome The connection's error, or the response.
+#' @param attempt How many attempts were made.
+#' @param unsent Whether nothing was sent, as far as is known.
+#' @return After how many seconds, `NULL` where it is not made again.
+#' @noRd
+pause_before_next <- function(request, outcome, attempt, unsent = FALSE) {
+  if (!inherits(outcome, "error")) {
+    return(seconds_to_wait(outcome))
+  }
+  reason <- conditionMessage(outcome)
   repeatable <- request$repeatable && !(request$once && isTRUE(request$client$state$classic))
-  if (curl_refused(reason)) {
-    repeatable || connection$sent == 0L
-  } else {
-    repeatable && connection_broke(reason)
+  refused <- curl_refused(reason)
+  again <- if (refused) repeatable || unsent else repeatable && connection_broke(reason)
+  if (again && attempt < max_attempts) if (refused) 0 else 0.1 * attempt
+}
+
+# A server that has too much to do says when to ask again.
+seconds_to_wait <- function(response) {
+  if (response$status_code == 429L) {
+    header <- curl::parse_headers_list(response$headers)[["retry-after"]]
+    seconds <- suppressWarnings(as.numeric(header %||% NA))
+    if (is_number(seconds) && seconds >= 0) min(seconds, 60)
   }
 }
 

@@ -14,33 +14,39 @@
 #' @noRd
 perform_several <- function(request, next_content, received, at_once = 2L,
                             call = rlang::caller_env()) {
+  state <- client_state(request$client)
+  # The client's pool and its idle handles, which keep their connections from call to call.
+  line <- state$line %||% (state$line <- rlang::env(pool = curl::new_pool(), idle = list()))
   several <- rlang::env(
-    request = request, client = request$client, call = call, line = line_of(request$client),
-    under_way = list()
+    request = request, client = request$client, call = call, line = line, under_way = list()
   )
-  on.exit(suspendInterrupts(lapply(several$under_way, drop_one, several)))
+  on.exit(suspendInterrupts(for (one in several$under_way) {
+    if (!is.null(one$handle)) {
+      curl::multi_cancel(one$handle)
+      free_handle(one, several)
+    }
+  }))
   repeat {
-    take_up(several, next_content, at_once)
+    while (length(several$under_way) < at_once && !is.null(content <- next_content())) {
+      one <- rlang::env(
+        content = content, handle = NULL, outcome = NULL, attempt = 1L, not_before = 0, heard = 0,
+        sent = 0
+      )
+      several$under_way <- c(several$under_way, list(one))
+    }
     if (!length(several$under_way)) break
+    for (one in several$under_way) {
+      if (is.null(one$handle) && one$not_before <= now()) send_one(one, several)
+    }
     await_outcomes(several)
     if (hand_over(several, received)) break
-  }
-}
-
-# Takes up what there is to send, and sends it, and what is to be sent again.
-take_up <- function(several, next_content, at_once) {
-  while (length(several$under_way) < at_once && !is.null(content <- next_content())) {
-    several$under_way <- c(several$under_way, list(new_under_way(content)))
-  }
-  for (one in several$under_way) {
-    if (is.null(one$handle) && one$not_before <= now()) send_one(one, several)
   }
 }
 
 # Hands over the responses that have come. Returns whether to end.
 hand_over <- function(several, received) {
   for (one in Filter(has_outcome, several$under_way)) {
-    response <- settle(one, several)
+    response <- take_response(one, several)
     if (!is.null(response)) {
       several$under_way <- Filter(function(other) !identical(other, one), several$under_way)
       if (isTRUE(received(one$content, response, now() - one$sent))) {
@@ -51,24 +57,19 @@ hand_over <- function(several, received) {
   FALSE
 }
 
-# The client's pool and its idle handles, which keep their connections from call to call.
-line_of <- function(client) {
-  state <- client_state(client)
-  state$line %||% (state$line <- rlang::env(pool = curl::new_pool(), idle = list()))
-}
-
-new_under_way <- function(content) {
-  rlang::env(
-    content = content, handle = NULL, outcome = NULL, attempt = 1L, not_before = 0, heard = 0,
-    sent = 0
-  )
-}
-
 has_outcome <- function(one) !is.null(one$outcome)
 
 send_one <- function(one, several) {
   request <- several$request
-  handle <- take_handle(several)
+  idle <- several$line$idle[[request$kind]]
+  if (length(idle)) {
+    several$line$idle[[request$kind]] <- idle[-1L]
+    handle <- idle[[1L]]
+  } else {
+    handle <- new_handle(several$client, request$kind)
+    # Whether the server still works is asked after `timeout`, see check_silent().
+    set_curl(handle, timeout_ms = 0, tcp_keepalive = TRUE)
+  }
   one$sent <- one$heard <- now()
   suspendInterrupts({
     start_post(
@@ -86,30 +87,10 @@ start_post <- function(handle, url, body, pool, done, fail) {
   curl::multi_add(handle, done = done, fail = fail, pool = pool)
 }
 
-take_handle <- function(several) {
-  kind <- several$request$kind
-  idle <- several$line$idle[[kind]]
-  if (length(idle)) {
-    several$line$idle[[kind]] <- idle[-1L]
-    return(idle[[1L]])
-  }
-  handle <- new_handle(several$client, kind)
-  # Whether the server still works is asked after `timeout`, see check_silent().
-  set_curl(handle, timeout_ms = 0, tcp_keepalive = TRUE)
-  handle
-}
-
 free_handle <- function(one, several) {
   kind <- several$request$kind
   several$line$idle[[kind]] <- c(several$line$idle[[kind]], list(one$handle))
   one$handle <- NULL
-}
-
-drop_one <- function(one, several) {
-  if (!is.null(one$handle)) {
-    curl::multi_cancel(one$handle)
-    free_handle(one, several)
-  }
 }
 
 # Lets curl do what it can do at once, and then waits until there is more. curl would wait for whole
@@ -130,21 +111,18 @@ await_outcomes <- function(several) {
   if (state$too_large) {
     abort_too_large(base = several$client$remote_base, call = several$call)
   }
-  if (!any(vapply(several$under_way, has_outcome, NA))) {
-    wait_for_pool(pool)
-    check_silent(several)
+  if (any(vapply(several$under_way, has_outcome, NA))) {
+    return(invisible())
   }
-}
-
-# At most a tenth of a second.
-wait_for_pool <- function(pool) {
   files <- curl::multi_fdset(pool)
   if (length(files$reads) || length(files$writes)) {
+    # At most a tenth of a second.
     processx::poll(list(processx::curl_fds(files)), 100)
   } else {
     # While curl connects, or all requests wait to be sent again.
     Sys.sleep(0.002)
   }
+  check_silent(several)
 }
 
 # However long a request takes, a server that works answers another one.
@@ -157,19 +135,17 @@ check_silent <- function(several) {
   }
 }
 
-#' Decide what becomes of a request that has ended
+#' Take the response to a request that has ended
 #' @return The response, with its `answer` parsed; `NULL` where the request is to be sent again.
 #' @noRd
-settle <- function(one, several) {
+take_response <- function(one, several) {
   outcome <- whole_response(one$outcome)
   one$outcome <- NULL
   free_handle(one, several)
-  broke <- inherits(outcome, "error")
-  pause <- if (broke) 0.1 * one$attempt else seconds_to_wait(outcome)
-  if (broke) {
-    reason <- conditionMessage(outcome)
-    if (!connection_broke(reason) || one$attempt >= max_attempts) {
-      abort_connection(several$client$remote_base, reason, several$call)
+  pause <- pause_before_next(several$request, outcome, one$attempt)
+  if (inherits(outcome, "error")) {
+    if (is.null(pause)) {
+      abort_connection(several$client$remote_base, conditionMessage(outcome), several$call)
     }
     one$attempt <- one$attempt + 1L
   }
@@ -178,13 +154,4 @@ settle <- function(one, several) {
   }
   one$not_before <- now() + pause
   NULL
-}
-
-# A server that has too much to do says when to ask again.
-seconds_to_wait <- function(response) {
-  if (response$status_code == 429L) {
-    header <- curl::parse_headers_list(response$headers)[["retry-after"]]
-    seconds <- suppressWarnings(as.numeric(header %||% NA))
-    if (is_number(seconds) && seconds >= 0) min(seconds, 60)
-  }
 }
