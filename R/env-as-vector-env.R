@@ -107,7 +107,7 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
     list(env = make(NULL))
   } else {
     own <- arguments[!rlang::names2(arguments) %in% how_made()]
-    described <- known_description(client, x, own, call)
+    described <- known_description(client, without_transforms(x), own, call)
     make_sub_envs(make, described, num_envs, num_workers, max_envs, call)
   }
   env <- made$env

@@ -44,7 +44,7 @@ known_description <- function(client, env_id, arguments, call) {
 }
 
 may_be_described <- function(env_id, arguments) {
-  is_made_by_server(env_id) && !any(names(arguments) %in% how_made()) &&
+  is_made_by_server(env_id) && !any(names(arguments) %in% how_made()) && !calls_r(env_id) &&
     !length(remembering(wrapper_names(noted_wrappers(env_id))))
 }
 

@@ -8,6 +8,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
     wrappers <- c(env_id$wrappers, wrappers)
     env_id <- env_id$env_id
   }
+  check_no_transforms(wrappers, call)
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)

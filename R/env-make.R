@@ -125,13 +125,16 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   }
   check_client(client, call = call)
   kwargs <- with_random_map(env_id, kwargs, seed)
+  check_wrappers(wrappers, call = call)
+  wrappers <- split_wrappers(c(noted_wrappers(env_id), wrappers), call)
+  if (inherits(env_id, "gym_wrapped")) env_id <- env_id$env_id
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
   # No interrupt may come between creating the instance and keeping its id.
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create_and_watch(
-      client, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode,
+      client, env_id, seed, render_mode, kwargs, wrappers$server, num_envs, vectorization_mode,
       autoreset_mode, name, num_workers, call = call
     ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
@@ -139,7 +142,10 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   if (isTRUE(client_state(client)$classic)) {
     abort_classic(client, "the classic calls, such as `env_create()`, and no `gym_make()`", call)
   }
-  env <- server_env$new(client, instance_id, c(noted_wrappers(env_id), wrappers), kwargs)
+  env <- server_env$new(client, instance_id, wrappers$server, kwargs)
+  for (wrapper in wrappers$r) {
+    env <- wrap_server_env(env, wrapper[[1L]], wrapper[-1L], call)
+  }
   env
 }
 

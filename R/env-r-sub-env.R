@@ -101,6 +101,8 @@ check_was_reset <- function(sub_env, call) {
 #' The classes of the error stay, so that it can be caught by them.
 #' @noRd
 abort_raised <- function(cnd, sub_env, sub_env_number, call) {
+  # A wrapper's error says itself what went wrong.
+  if (inherits(cnd, "gym_error_wrapper")) return(invisible())
   taken <- sub_env$taken
   where <- if (is.na(taken)) "`reset()` of " else "`step()` of "
   at <- if (!is.na(taken)) paste0(" in step ", taken + 1L, " of the episode")

@@ -32,8 +32,8 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
 
 check_wrappable <- function(env, call) {
   if (!inherits(env, "gym_r_env")) {
-    must <- paste("the id of an environment, or one made by `gym_env()` or of a class that",
-                  "inherits from `GymEnv`")
+    must <- paste("the id of an environment, or one made by `gym_make()`, by `gym_env()` or of a",
+                  "class that inherits from `GymEnv`")
     abort_argument(env, must, "env_id", call)
   }
 }
@@ -53,6 +53,12 @@ wrapped_env <- R6Class(
 make_r_wrapper <- function(traits, wrapper, arguments, call) {
   check_r_wrapper(wrapper, call)
   make <- r_wrappers[[wrapper]]
+  check_wrapper_arguments(wrapper, arguments, call)
+  rlang::exec(make, traits, !!!arguments, call = call)
+}
+
+check_wrapper_arguments <- function(wrapper, arguments, call) {
+  make <- r_wrappers[[wrapper]]
   known <- setdiff(names(formals(make)), c("traits", "call"))
   strange <- setdiff(names(arguments), known)
   needed <- known[vapply(formals(make)[known], is_without_default, NA)]
@@ -68,7 +74,6 @@ make_r_wrapper <- function(traits, wrapper, arguments, call) {
       class = "gym_error_argument", argument = c(strange, lacking)[[1L]], call = call
     )
   }
-  rlang::exec(make, traits, !!!arguments, call = call)
 }
 
 is_without_default <- function(formal) rlang::is_missing(formal)
@@ -222,14 +227,16 @@ wrap_normalize_reward <- function(traits, gamma = 0.99, epsilon = 1e-8, call) {
 r_wrappers <- list(
   TimeLimit = wrap_time_limit, ClipAction = wrap_clip_action, RescaleAction = wrap_rescale_action,
   RescaleObservation = wrap_rescale_observation, ClipReward = wrap_clip_reward,
-  NormalizeObservation = wrap_normalize_observation, NormalizeReward = wrap_normalize_reward
+  NormalizeObservation = wrap_normalize_observation, NormalizeReward = wrap_normalize_reward,
+  TransformReward = wrap_transform_reward, TransformObservation = wrap_transform_observation,
+  TransformAction = wrap_transform_action
 )
 
 # What they are made of -----------------------------------------------------------------
 
 change_spaces <- function(traits, observation_space = traits$observation_space,
-                          action_space = traits$action_space) {
-  changed <- new_traits(observation_space, action_space, traits$spec$id)
+                          action_space = traits$action_space, call = NULL) {
+  changed <- new_traits(observation_space, action_space, traits$spec$id, call = call)
   parts <- c("observation_space", "action_space", "action_rules", "fits_observations",
              "fits_actions")
   traits[parts] <- changed[parts]
@@ -363,12 +370,12 @@ playing_sub_envs <- function(n) rlang::env(which = seq_len(n), all = seq_len(n))
 follow_ends <- function(inner, playing) {
   reset <- inner$reset
   step <- inner$step
-  inner$reset <- function(seed, options) {
+  inner$reset <- function(...) {
     playing$which <- playing$all
-    reset(seed, options)
+    reset(...)
   }
-  inner$step <- function(action) {
-    out <- step(action)
+  inner$step <- function(...) {
+    out <- step(...)
     n <- length(playing$all)
     if (n > 1L && is.list(out) && is_flags(out$terminated, n)) {
       ended <- out$terminated | (out$truncated %||% FALSE)

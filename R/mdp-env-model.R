@@ -72,6 +72,10 @@ model_of_env.gym_server_env <- function(env, call) {
   )
 }
 
+# What a wrapper in R does the server's table does not know.
+#' @exportS3Method
+model_of_env.gym_wrapped_server_env <- function(env, call) abort_without_model(env, call)
+
 #' @exportS3Method
 model_of_env.gym_r_env <- function(env, call) {
   model <- definition_of(env)$model

@@ -18,6 +18,9 @@ environment_recipe <- function(env, vector_env, arguments) {
   if (!is.null(vector_env$frame)) {
     return("frames are kept")
   }
+  if (calls_r(env) && refers_to_process(env)) {
+    return("the function of a wrapper has a connection or a pointer, which cannot be sent")
+  }
   own <- setdiff(names(arguments), c("num_envs", "num_workers", "frames"))
   recipe <- list(env = env, arguments = arguments[own], num_workers = arguments$num_workers)
   if (is_registered(env)) {

@@ -32,6 +32,7 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = 
       )
       made <<- complete(vector_env)
       inform_of_memory(made, env)
+      if (calls_r(env) && is_made_by_server(env)) inform_calls_r(made)
     }
     made
   }
@@ -86,6 +87,15 @@ inform_of_memory <- function(vector_env, env) {
       class = "gym_message_remembers"
     )
   }
+}
+
+inform_calls_r <- function(vector_env) {
+  names <- intersect(names(transforms), vector_env$spec$wrappers)
+  rlang::inform(
+    c(i = paste0(paste(names, collapse = " and "), " calls an R function in each step, so R plays ",
+                 "step by step, which takes longer than playing on the server.")),
+    class = "gym_message_calls_r", .frequency = "once", .frequency_id = "gym_calls_r"
+  )
 }
 
 # Interrupts and progress ---------------------------------------------------------------

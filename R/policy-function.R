@@ -54,30 +54,6 @@ batch_actions <- function(actions, n, vector_env) {
   actions
 }
 
-as_batch <- function(space, actions) {
-  if (has_parts(space)) {
-    complete <- is.list(actions) && length(actions) == length(space$spaces)
-    if (complete) map_parts(space, as_batch, in_order(space, actions)) else actions
-  } else if (is_stackable(space) && prod(space$shape) == 1 && is_column(actions)) {
-    column_as_batch(space, actions)
-  } else {
-    actions
-  }
-}
-
-# For actions of one number each, a vector and a matrix of one column mean the same.
-is_column <- function(x) {
-  is.atomic(x) && length(x) > 0L && length(x) == stack_length(x)
-}
-
-column_as_batch <- function(space, actions) {
-  if (is.logical(actions) && !identical(space$dtype, "bool")) {
-    actions <- as.integer(actions)
-  }
-  dim(actions) <- if (length(space$shape)) c(length(actions), space$shape)
-  actions
-}
-
 abort_action_count <- function(actions, count, n, vector_env) {
   returned <- if (is.na(count)) describe_argument(actions) else count_of(count, "action")
   gym_abort(

@@ -238,9 +238,26 @@ with_training_env <- function(settings, use, max_steps, client, call) {
   }
   played <- settings$sampled %||% settings$env
   kwargs <- if (is.null(settings$sampled)) settings$kwargs
+  evaluated <- NULL
+  on.exit(if (!is.null(evaluated)) evaluated$close(wait = FALSE))
+  use_both <- function(vector_env) {
+    if (calls_r(played) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
+      # The learner plays alone, its evaluations need not.
+      vector_env$make_evaluated <- function() {
+        if (is.null(evaluated)) {
+          evaluated <<- rlang::exec(
+            as_vector_env, played, !!!kwargs, max_envs = episodes, client = vector_env$client
+          )
+          evaluated$call <<- call
+        }
+        evaluated
+      }
+    }
+    use(vector_env)
+  }
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    played, episodes, use, max_steps, !!!kwargs, num_envs = settings$num_envs,
+    played, episodes, use_both, max_steps, !!!kwargs, num_envs = settings$num_envs,
     num_workers = settings$num_workers, client = client, call = call
   ))
 }

@@ -78,6 +78,7 @@ judged_policy <- function(settings, agent) {
 }
 
 play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {
+  if (!is.null(vector_env$make_evaluated)) vector_env <- vector_env$make_evaluated()
   # The final evaluation draws from copies: a training that goes on with a larger budget evaluates
   # as one that had it from the start. So does the first one, which changes no later one.
   streams <- state$evaluation_streams

@@ -1,0 +1,393 @@
+# Wrappers that call a function of the user's in each step, with the names of Gymnasium's. The
+# function gets batches, whatever is wrapped: a single environment has a batch of one. They go
+# around environments in R (env-r-wrappers.R) and around those of a server (env-wrapped-server.R).
+
+# What the function of each may ask for; the first of these is what it changes.
+transforms <- list(
+  TransformReward = c("reward", "observation", "action", "next_observation", "terminated",
+                      "truncated"),
+  TransformObservation = "observation",
+  TransformAction = c("action", "observation")
+)
+
+wrap_transform_reward <- function(traits, func, call) {
+  transform <- new_transform("TransformReward", func, traits, call)
+  changed <- traits
+  # The threshold is one of the rewards from inside.
+  changed$spec["reward_threshold"] <- list(NULL)
+  fit <- function(reward, n) {
+    wrong <- if (!(is.numeric(reward) || is.logical(reward)) || length(reward) != n) {
+      describe_argument(reward)
+    } else if (!all(is.finite(reward))) {
+      at <- which(!is.finite(reward))[[1L]]
+      paste0(reward[[at]], if (n > 1L) paste0(" in row ", at))
+    }
+    if (!is.null(wrong)) {
+      abort_transform(transform, paste0(
+        "must return a finite number for ",
+        if (n > 1L) paste("each of", n, "rewards") else "one reward", ", not ", wrong
+      ), reward)
+    }
+    as.numeric(reward)
+  }
+  around <- function(inner, n, next_step) {
+    seen <- if (transform$asks("observation")) observation_memory(traits, n)
+    # With autoreset_mode "NextStep" the step after an episode's end only resets.
+    ended <- logical(n)
+    list(
+      reset = function(..., mask = NULL) {
+        observation <- inner$reset(..., mask = mask)
+        if (next_step) ended[mask %||% TRUE] <<- FALSE
+        if (!is.null(seen)) seen$note(observation)
+        observation
+      },
+      step = function(action, which = NULL, ..., finals = TRUE) {
+        finals <- finals || transform$asks("next_observation")
+        before <- if (!is.null(seen)) seen$rows(which)
+        out <- inner$step(action, which = which, ..., finals = finals)
+        if (!is.null(seen)) seen$note(out$observation, which)
+        reward <- transform$ask(list(
+          reward = out$reward, observation = before, action = action,
+          next_observation = out$next_observation %||% out$observation,
+          terminated = out$terminated, truncated = out$truncated
+        ), length(out$reward), fit)
+        if (next_step) {
+          rows <- which %||% seq_len(n)
+          reward[ended[rows]] <- out$reward[ended[rows]]
+          ended[rows] <<- out$terminated | out$truncated
+        }
+        out$reward <- reward
+        out
+      }
+    )
+  }
+  list(traits = changed, around = around_batches(traits, changed, around))
+}
+
+wrap_transform_observation <- function(traits, func, observation_space = NULL, call) {
+  transform <- new_transform("TransformObservation", func, traits, call)
+  changed <- change_spaces(traits, observation_space = observation_space %||%
+                             traits$observation_space, call = call)
+  space <- changed$observation_space
+  fit <- function(observation, n) {
+    observation <- form_batch(space, observation, n)
+    if (!changed$fits_observations(observation, n)) {
+      refuse_misfit(transform, space, observation, n, "observation_space", observation_space)
+    }
+    tidy_value(space, observation, n)
+  }
+  change <- function(observation, n) {
+    transform$ask(list(observation = observation), n, fit)
+  }
+  around <- function(inner, n, ...) {
+    list(
+      reset = function(...) change(inner$reset(...), n),
+      step = function(action, ...) {
+        out <- inner$step(action, ...)
+        observation <- change(out$observation, length(out$reward))
+        if (!is.null(out$next_observation)) {
+          out <- change_final(out, observation, traits$observation_space, space, change)
+        }
+        out$observation <- observation
+        out
+      }
+    )
+  }
+  list(traits = changed, around = around_batches(traits, changed, around))
+}
+
+# Where another episode began in the same step, the last observation of the one before is another.
+change_final <- function(out, observation, inside, outside, change) {
+  final <- out$next_observation
+  out$next_observation <- observation
+  if (!identical(final, out$observation)) {
+    ended <- which(out$terminated | out$truncated)
+    last <- change(batch_rows(inside, final, ended), length(ended))
+    n <- length(out$reward)
+    out$next_observation <- replace_rows(outside, observation, n, ended, last)
+    if (!is.null(out$info$final_obs)) {
+      out$info$final_obs[ended] <- lapply(seq_along(ended), batch_value, space = outside,
+                                          batch = last)
+    }
+  }
+  out
+}
+
+wrap_transform_action <- function(traits, func, action_space = NULL, call) {
+  transform <- new_transform("TransformAction", func, traits, call)
+  changed <- change_spaces(traits, action_space = action_space %||% traits$action_space,
+                           call = call)
+  inside <- traits$action_space
+  fit <- function(action, n) {
+    action <- form_batch(inside, action, n)
+    if (!traits$fits_actions(action, n)) {
+      refuse_misfit(transform, traits$action_rules, action, n, "action_space", action_space)
+    }
+    tidy_actions(inside, action)
+  }
+  around <- function(inner, n, ...) {
+    seen <- if (transform$asks("observation")) observation_memory(traits, n)
+    note <- function(observation, which = NULL) {
+      if (!is.null(seen)) seen$note(observation, which)
+      observation
+    }
+    list(
+      reset = function(...) note(inner$reset(...)),
+      step = function(action, which = NULL, ...) {
+        before <- if (!is.null(seen)) seen$rows(which)
+        count <- if (is.null(which)) n else length(which)
+        action <- transform$ask(list(action = action, observation = before), count, fit)
+        out <- inner$step(action, which = which, ...)
+        note(out$observation, which)
+        out
+      }
+    )
+  }
+  list(traits = changed, around = around_batches(traits, changed, around))
+}
+
+# What was observed last in each sub-environment, on which the next action is taken.
+observation_memory <- function(traits, n) {
+  space <- traits$observation_space
+  seen <- NULL
+  list(
+    note = function(observation, which = NULL) {
+      seen <<- if (is.null(which)) observation else replace_rows(space, seen, n, which, observation)
+    },
+    rows = function(which) {
+      if (is.null(seen)) check_was_reset(list(taken = NA, traits = traits), NULL)
+      if (is.null(which)) seen else batch_rows(space, seen, which)
+    }
+  )
+}
+
+# Functions of batches -------------------------------------------------------------------
+
+#' Make the function that goes around what is wrapped
+#'
+#' @param inside,outside The traits of what is wrapped, and of what comes of it.
+#' @param around A function of `inner`, whose functions take and return batches, of how many
+#'   sub-environments there are, and of whether the step after an end only resets, that returns such
+#'   functions.
+#' @return A function as `around` of env-r-wrappers.R. The environment of a server is its third
+#'   argument: what that returns has been checked.
+#' @noRd
+around_batches <- function(inside, outside, around) {
+  function(inner, num_envs, env = NULL) {
+    if (is.null(env)) inner <- checked_functions(inner, inside, num_envs)
+    if (!is.null(num_envs)) {
+      return(around(inner, num_envs, identical(env$autoreset_mode, "NextStep")))
+    }
+    of_one <- convert_functions(
+      inner,
+      observation = function(value) batch_of(inside$observation_space, list(value)),
+      action = function(batch) batch_value(inside$action_space, batch, 1L)
+    )
+    convert_functions(
+      around(of_one, 1L, FALSE),
+      observation = function(batch) batch_value(outside$observation_space, batch, 1L),
+      action = function(value) batch_of(outside$action_space, list(value))
+    )
+  }
+}
+
+convert_functions <- function(inner, observation, action) {
+  force(inner)
+  list(
+    reset = function(...) observation(inner$reset(...)),
+    step = function(...) {
+      arguments <- list(...)
+      arguments[[1L]] <- action(arguments[[1L]])
+      out <- do.call(inner$step, arguments)
+      out$observation <- observation(out$observation)
+      out
+    }
+  )
+}
+
+# The functions of an environment in R, whose results are checked before another function of the
+# user's gets them. In a vectorised one, what comes of the sub-environments whose episode has ended
+# may be anything: that of one that plays takes its place.
+checked_functions <- function(inner, traits, num_envs) {
+  force(inner)
+  n <- num_envs %||% 1L
+  playing <- playing_sub_envs(n)
+  where <- function(name) paste0("`", name, "()` of ", traits$spec$id)
+  checked <- function(observation, name) {
+    checked_observation(traits, observation, num_envs, where(name), NULL)
+  }
+  follow_ends(list(
+    reset = function(seed, options, ...) {
+      observation <- inner$reset(seed, options)
+      marking_wrapper(checked(observation, "reset"))
+    },
+    step = function(action, ...) {
+      out <- inner$step(action)
+      which <- playing$which
+      if (length(which) && length(which) < n) {
+        out <- without_ended(out, traits$observation_space, which, n)
+      }
+      marking_wrapper({
+        out <- check_step_parts(out, n, where("step"), NULL)
+        out$observation <- checked(out$observation, "step")
+      })
+      out
+    }
+  ), playing)
+}
+
+# Marks errors that say themselves where they come from.
+marking_wrapper <- function(code) {
+  tryCatch(code, gym_error = function(cnd) {
+    class(cnd) <- c("gym_error_wrapper", class(cnd))
+    rlang::cnd_signal(cnd)
+  })
+}
+
+# The user's function --------------------------------------------------------------------
+
+#' Prepare the function of a wrapper
+#'
+#' @return A list: `wrapper`, its name; `asks(part)`, whether the function asks for this part; and
+#'   `ask(parts, n, fit)`, a function of a list of batches with `n` rows, which returns what `fit()`
+#'   makes of what the function returned, and of `n`.
+#' @noRd
+new_transform <- function(wrapper, func, traits, call) {
+  asked <- asked_parts(wrapper, func, call)
+  asking <- as.call(c(list(func), lapply(asked, as.name)))
+  transform <- list(wrapper = wrapper, func = func, asks = function(part) part %in% asked)
+  answer <- function(parts, n, fit) {
+    value <- tryCatch(eval(asking, parts, baseenv()), error = function(cnd) {
+      abort_transform(
+        transform, paste0("raised an error", if (n == 1L) " for a batch of one row"),
+        class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
+                  "gym_error_environment"),
+        parent = cnd
+      )
+    })
+    fit(narrow_values(value), n)
+  }
+  compared <- FALSE
+  transform$hint <- transform_hint(asked, traits$observation_space)
+  transform$ask <- function(parts, n, fit) {
+    before <- if (!compared) session_random_state()
+    value <- answer(parts, n, fit)
+    if (!compared && n > 1L) {
+      compared <<- TRUE
+      # What is drawn for a row alone is something else.
+      if (identical(session_random_state(), before)) {
+        compare_alone(transform, value, answer(last_row(parts[asked], n, traits), 1L, fit), n)
+      }
+    }
+    value
+  }
+  transform
+}
+
+#' Find out what a function asks for
+#' @return The names of the parts, with the names of the arguments that get them; the only argument
+#'   of a function may have any name, and gets what the wrapper changes.
+#' @noRd
+asked_parts <- function(wrapper, func, call) {
+  known <- transforms[[wrapper]]
+  if (!is.function(func)) {
+    must <- paste0("a function of `", known[[1L]], "`")
+    abort_argument(func, must, "func", call)
+  }
+  declared <- formals(args(func))
+  names <- names(declared)
+  asked <- intersect(names, known)
+  needed <- setdiff(names[vapply(declared, is_without_default, NA)], c(known, "..."))
+  if (!length(asked)) {
+    # Not `obs`, which is meant for another.
+    stands_for_other <- length(needed) == 1L && any(startsWith(known[-1L], needed))
+    if (!stands_for_other && (length(needed) == 1L || !length(needed) && length(names))) {
+      return(known[[1L]])
+    }
+  }
+  if (length(needed) || !length(asked)) {
+    gym_abort(
+      c(paste0("`func` of ", wrapper, " must be a function of `", known[[1L]], "`, and this one ",
+               if (length(needed)) paste0("needs `", needed[[1L]], "`.") else "has no argument."),
+        i = paste0("By the names of its arguments it can ask for `",
+                   paste(known, collapse = "`, `"), "`.")),
+      class = "gym_error_argument", argument = "func", value = func, call = call
+    )
+  }
+  stats::setNames(asked, asked)
+}
+
+last_row <- function(parts, n, traits) {
+  row <- function(part, name) {
+    space <- switch(
+      name, action = traits$action_space, observation = , next_observation =
+        traits$observation_space
+    )
+    if (is.null(space)) part[[n]] else batch_rows(space, part, n)
+  }
+  Map(row, parts, names(parts))
+}
+
+# A function that takes `observation[1]` for a number of its own row would otherwise give wrong
+# numbers, and nobody would know.
+compare_alone <- function(transform, value, alone, n) {
+  numbers <- function(x) unlist(x, use.names = FALSE)
+  among <- numbers(if (is.list(value)) lapply(value, rows_of, n) else rows_of(value, n))
+  if (!isTRUE(all.equal(among, numbers(alone)))) {
+    rlang::warn(
+      c(paste0("`func` of ", transform$wrapper, " gives a row another value when it is alone (",
+               describe_value(numbers(alone)), ") than among others (", describe_value(among),
+               ")."),
+        i = transform$hint),
+      class = "gym_warning_wrapper", call = NULL
+    )
+  }
+}
+
+# Gives what a function returned the form of a batch.
+form_batch <- function(space, value, n) {
+  value <- as_batch(space, value)
+  # One row of a matrix, without `drop = FALSE`.
+  if (n == 1L && is_stackable(space) && is.null(dim(value)) && length(space$shape) == 1L &&
+        length(value) == space$shape) {
+    dim(value) <- c(1L, length(value))
+  }
+  value
+}
+
+# Errors ---------------------------------------------------------------------------------
+
+refuse_misfit <- function(transform, space, value, n, arg, given) {
+  tryCatch(
+    check_batch(space, batch_space(space, n), value, n, NULL, bounds = TRUE),
+    gym_error_space = function(cnd) {
+      abort_transform(
+        transform,
+        paste0("must return ", count_of(n, sub("_space", "", arg)), " of ", format(space), ", not ",
+               describe_argument(value)),
+        value, parent = cnd, class = "gym_error_space",
+        fix = if (arg == "observation_space" && is.null(given)) {
+          "Where it returns others than it gets, `observation_space` says which."
+        }
+      )
+    }
+  )
+}
+
+abort_transform <- function(transform, problem, value = NULL, class = "gym_error_argument",
+                            fix = NULL, ...) {
+  gym_abort(
+    c(paste0("`func` of ", transform$wrapper, " ", problem, "."), i = fix, i = transform$hint),
+    class = c("gym_error_wrapper", class), wrapper = transform$wrapper, argument = "func",
+    value = value, ..., call = NULL
+  )
+}
+
+transform_hint <- function(asked, space) {
+  rows <- if ("observation" %in% asked && length(space$shape) == 1L) {
+    name <- if (is.null(space$names)) 1L else paste0("\"", space$names[[1L]], "\"")
+    paste0(": `observation[, ", name, "]` has a number for each, `observation[1]` only one")
+  }
+  paste0("It gets a batch, with a row for each sub-environment", rows,
+         "; `ifelse()` chooses for each, `if` cannot.")
+}

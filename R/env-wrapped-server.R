@@ -1,0 +1,134 @@
+# Environments of a server with wrappers that call functions of R. They are played from R.
+
+# Wraps an environment that a server has made. It is the same instance.
+wrap_server_env <- function(env, wrapper, arguments, call) {
+  if (!wrapper %in% names(transforms)) {
+    gym_abort(
+      c(paste0("Wrappers such as ", wrapper, " are applied by the server when it makes the ",
+               "environment, and this one is made."),
+        i = paste0("`gym_make(gym_wrap(\"", env$spec$id, "\", \"", wrapper, "\"))` makes one; ",
+                   "around one that is made go ", paste(names(transforms), collapse = ", "), ".")),
+      class = "gym_error_argument", argument = "wrapper", value = wrapper, call = call
+    )
+  }
+  traits <- new_traits(env$single_observation_space, env$single_action_space, env$spec$id)
+  traits$spec <- env$spec
+  made <- make_r_wrapper(traits, wrapper, arguments, call)
+  made$traits$spec$wrappers <- c(env$spec$wrappers, wrapper)
+  wrapped_server_env$new(env, made, renames = "action_space" %in% names(arguments))
+}
+
+wrapped_server_env <- R6Class(
+  c("gym_wrapped_server_env", "gym_server_env", "gym_env"),
+  inherit = server_env,
+  cloneable = FALSE,
+  public = list(
+    initialize = function(env, made, renames) {
+      traits <- made$traits
+      for (name in c("instance_id", "num_envs", "vectorization_mode", "num_workers",
+                     "autoreset_mode")) {
+        self[[name]] <- env[[name]]
+      }
+      self$spec <- traits$spec
+      self$single_observation_space <- traits$observation_space
+      self$single_action_space <- traits$action_space
+      private$env <- env
+      private$traits <- traits
+      # What an instance is to what only looks at it. Other actions have other meanings.
+      private$instance <- list(
+        client = env$client, num_envs = env$num_envs, spec = if (!renames) traits$spec,
+        single_action_space = traits$action_space,
+        single_observation_space = traits$observation_space,
+        actions = sent_space(traits$action_space, env$num_envs),
+        observations = sent_space(traits$observation_space, env$num_envs)
+      )
+      inner <- list(
+        reset = function(...) {
+          out <- env$reset(..., return_info = TRUE)
+          private$info <- out$info
+          out$observation
+        },
+        step = env$step
+      )
+      private$functions <- made$around(inner, env$num_envs, env)
+    },
+    reset = function(seed = NULL, options = NULL, return_info = FALSE, mask = NULL,
+                     infos = TRUE) {
+      check_open(self)
+      check_flag(return_info)
+      observation <- private$functions$reset(
+        seed = seed, options = options, mask = mask, infos = infos
+      )
+      if (return_info) list(observation = observation, info = private$info) else observation
+    },
+    step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
+      check_open(self)
+      action <- private$take_action(action, which, rlang::current_env())
+      private$functions$step(action, which = which, infos = infos, finals = finals)
+    },
+    close = function() {
+      private$env$close()
+      invisible(self)
+    }
+  ),
+  active = list(is_open = function() private$env$is_open),
+  private = list(
+    env = NULL, traits = NULL, functions = NULL, info = NULL,
+    # The actions as the wrapper's function gets them.
+    take_action = function(action, which, call) {
+      traits <- private$traits
+      check_which(which, private$instance, call)
+      action <- numbered_actions(private$instance, narrow_values(action), call)
+      if (is.null(self$num_envs)) {
+        check_value(traits$action_rules, action, "", call, bounds = TRUE)
+        tidy_value(traits$action_space, action, NULL)
+      } else {
+        check_actions(traits, action, which %||% seq_len(self$num_envs), call)
+        tidy_actions(traits$action_space, action)
+      }
+    },
+    # The environment inside closes itself.
+    finalize = function() NULL
+  )
+)
+
+# By name ----------------------------------------------------------------------------------
+
+#' Divide wrappers into those that the server applies and those that are applied in R after them
+#' @return A list of two lists, `server` and `r`.
+#' @noRd
+split_wrappers <- function(wrappers, call) {
+  in_r <- wrapper_names(wrappers) %in% names(transforms)
+  late <- which(!in_r & cumsum(in_r) > 0L)
+  if (length(late)) {
+    names <- c(wrappers[[late[[1L]]]][[1L]], wrappers[[which(in_r)[[1L]]]][[1L]])
+    gym_abort(
+      c(paste0(names[[1L]], " is applied on the server, inside of ", names[[2L]],
+               ", which is applied in R."),
+        i = paste0("Write it before ", names[[2L]], ".")),
+      class = "gym_error_argument", argument = "wrapper", value = names[[1L]], call = call
+    )
+  }
+  list(server = wrappers[!in_r], r = wrappers[in_r])
+}
+
+calls_r <- function(env) any(wrapper_names(noted_wrappers(env)) %in% names(transforms))
+
+# The same environment without the wrappers that are applied in R.
+without_transforms <- function(env_id) {
+  if (!calls_r(env_id)) {
+    return(env_id)
+  }
+  with_wrappers(env_id$env_id, split_wrappers(env_id$wrappers, NULL)$server)
+}
+
+check_no_transforms <- function(wrappers, call) {
+  name <- intersect(wrapper_names(wrappers), names(transforms))
+  if (length(name)) {
+    gym_abort(
+      c(paste0(name[[1L]], " calls a function of R, which no instance on a server can."),
+        i = "`gym_make()` makes an environment that plays with it."),
+      class = "gym_error_argument", argument = "wrappers", value = name, call = call
+    )
+  }
+}
