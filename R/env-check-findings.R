@@ -27,6 +27,7 @@ look_at_environment <- function(check, seed) {
     look_at_reset_without_seed(check, seed)
   }
   look_at_render(check, seed)
+  look_at_copies(check, first, seed)
 }
 
 #' Look whether an environment that has a model plays as that says
@@ -259,4 +260,54 @@ can_be_drawn <- function(env) {
   } else {
     is.function(env[["render"]])
   }
+}
+
+# Copies ----------------------------------------------------------------------------------
+
+# An environment in R is played in several copies side by side. What they share outside of their
+# `self`, such as another environment that all of them step, makes one move when another does.
+look_at_copies <- function(check, first, seed) {
+  if (is.null(check$copy) || is_noted(check, "seeds") || !length(first$results)) {
+    return(invisible())
+  }
+  one <- unchecked_functions(check$copy())
+  other <- unchecked_functions(check$copy())
+  differ <- function(i) {
+    action <- first$actions[[i]]
+    out <- one$step(action)
+    if (i <= 10L) other$step(action)
+    alike <- vapply(c("observation", "reward", "terminated"), function(name) {
+      identical(element_of(out, name), element_of(first$results[[i]], name))
+    }, NA)
+    !all(alike)
+  }
+  moved <- tryCatch(
+    suppressWarnings({
+      observation <- one$reset(seed)
+      other$reset(seed + 1)
+      !identical(observation, first$observation) ||
+        any(vapply(seq_along(first$results), differ, NA))
+    }),
+    error = function(cnd) TRUE
+  )
+  if (moved) {
+    note_finding(check, "copies", paste0(
+      "Copies of the environment that play side by side, as in `rollout()`, move each other. ",
+      shared_text(check$definition)
+    ))
+  }
+}
+
+# What copies share, as far as it can be told from the functions.
+shared_text <- function(definition) {
+  used <- unique(unlist(lapply(definition[c("reset", "step")], function(f) all.names(body(f)))))
+  place <- list2env(as.list(definition$parameters), parent = environment(definition$step) %||%
+                      globalenv())
+  shared <- Filter(function(name) is_playable(get0(name, place)), used)
+  if (!length(shared)) {
+    return("What belongs to one episode must be kept in `self`, not outside of it.")
+  }
+  paste0("They share the environment `", shared[[1L]], "`: each makes one of its own when ",
+         "`reset()` has `if (is.null(self$own)) self$own <- gym_make(\"", get0(shared[[1L]], place)$spec$id,
+         "\", seed = 1)`.")
 }

@@ -151,11 +151,21 @@ look_at_step <- function(check, out, place) {
 # Such an environment without the checks of its own, which end an episode at the first mistake.
 without_checks <- function(env) {
   sub_env <- sub_env_of(env)
+  c(
+    list(
+      observation_space = env$observation_space, action_space = env$action_space, spec = env$spec,
+      single_observation_space = env$single_observation_space,
+      single_action_space = env$single_action_space, num_envs = sub_env$num_envs,
+      render = if (!is.null(sub_env$render)) function() draw_sub_env(sub_env, NULL),
+      random_state = function() sub_env$generator$state
+    ),
+    unchecked_functions(sub_env)
+  )
+}
+
+unchecked_functions <- function(sub_env) {
   n <- sub_env$num_envs %||% 1L
   list(
-    observation_space = env$observation_space, action_space = env$action_space, spec = env$spec,
-    single_observation_space = env$single_observation_space,
-    single_action_space = env$single_action_space, num_envs = sub_env$num_envs,
     reset = function(seed = NULL) {
       if (!is.null(seed)) {
         sub_env$generator <- new_generator(seed)
@@ -173,8 +183,6 @@ without_checks <- function(env) {
         out$truncated <- if (is.logical(truncated)) truncated | at_limit else truncated
       }
       out
-    },
-    render = if (!is.null(sub_env$render)) function() draw_sub_env(sub_env, NULL),
-    random_state = function() sub_env$generator$state
+    }
   )
 }

@@ -4,7 +4,8 @@
 #' comes back, as Gymnasium's `check_env()` does: observations that are not in their space, rewards
 #' that are no finite number, flags that are not `TRUE` or `FALSE`, seeds that do not give the same
 #' episode again, numbers drawn from the session's random generator, episodes that never end,
-#' pictures that cannot be drawn. It goes on after the first problem wherever it can.
+#' pictures that cannot be drawn, copies of an environment written in R that move each other because
+#' all of them step the same other environment. It goes on after the first problem wherever it can.
 #'
 #' Two episodes are played, with the seeds `seed` and `seed + 1`, and the first of them once more
 #' with the same actions, which must give the same again, bit for bit. All sub-environments of a
@@ -28,7 +29,7 @@
 #'   each finding, none for an environment in which nothing was found, and the columns
 #'   \describe{
 #'     \item{topic}{What was looked at, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`,
-#'       `"end"`, `"render"` or `"model"`.}
+#'       `"end"`, `"render"`, `"copies"` or `"model"`.}
 #'     \item{severity}{`"wrong"` for what is a mistake, `"note"` for what may be meant.}
 #'     \item{finding}{What was found, a sentence.}
 #'   }
@@ -51,6 +52,7 @@
 check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client()) {
   check_count(max_steps)
   check_seed(seed, min = 0)
+  id <- env
   if (is.character(env) || inherits(env, "gym_wrapped")) {
     check_environment(env)
     env <- gym_make(env, ..., seed = seed, client = client)
@@ -66,6 +68,8 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   )
   if (check$in_r) {
     check$env <- without_checks(env)
+    check$definition <- definition_of(env)
+    check$copy <- copier_of(env, id, list(...))
     # It must be reset before it is played again.
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
@@ -75,6 +79,18 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     look_at_model(env, check, seed + 1)
   })
   new_check(check)
+}
+
+# A function that makes another sub-environment, as those that play side by side are made; `NULL`
+# for an object of a class, of which there is one.
+copier_of <- function(env, id, arguments) {
+  definition <- definition_of(env)
+  if (!is.null(definition)) {
+    num_envs <- sub_env_of(env)$num_envs
+    function() definition_sub_env(definition, num_envs)
+  } else if (is_registered(id)) {
+    function() sub_env_of(make_registered(id, arguments))
+  }
 }
 
 new_check <- function(check) {

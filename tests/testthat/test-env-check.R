@@ -377,3 +377,48 @@ test_that("starts, rewards and ends that a model does not have are found", {
   expect_finding(modelled(table[1:2, ]), "model", "has the observation space")
   expect_finding(modelled(function(env) stop("no table")), "model", "no table")
 })
+
+test_that("copies that share another environment, and so move each other, are found", {
+  inner <- gym_env(
+    function(self) self$place <- sample(0:2, 1),
+    function(self, action) {
+      self$place <- min(self$place + action, 9)
+      list(observation = self$place, reward = 1, terminated = self$place == 9)
+    },
+    observation_space = space_discrete(10), action_space = space_discrete(2), id = "Walk"
+  )
+  around <- function(reset, step, ...) {
+    gym_env(reset, step, observation_space = space_discrete(10), action_space = space_discrete(2),
+            ...)
+  }
+  shared <- around(function(self) inner$reset(seed = sample(1e6, 1)),
+                   function(self, action) inner$step(action))
+  text <- paste("play side by side, as in `rollout()`, move each other. They share the environment",
+                "`inner`: each makes one of its own when `reset()` has")
+  expect_finding(shared, "copies", text)
+  given <- around(function(self) self$inner$reset(seed = sample(1e6, 1)),
+                  function(self, action) self$inner$step(action), inner = inner)
+  expect_finding(given, "copies", "self$own <- gym_make(\"Walk\", seed = 1)`.")
+  gym_register("Walk-v8", inner)
+  gym_register("Walker-v8", function() shared)
+  withr::defer(lapply(c("Walk-v8", "Walker-v8"), gym_unregister))
+  expect_finding("Walker-v8", "copies", "They share the environment `inner`")
+  place <- 0
+  outside <- around(
+    function(self) place <<- sample(0:2, 1),
+    function(self, action) {
+      place <<- min(place + action, 9)
+      list(observation = place, reward = 1, terminated = place == 9)
+    }
+  )
+  expect_finding(outside, "copies", "must be kept in `self`, not outside of it.")
+  own <- around(
+    function(self) {
+      if (is.null(self$own)) self$own <- gym_make("Walk-v8", seed = 1)
+      self$own$reset(seed = sample(1e6, 1))
+    },
+    function(self, action) self$own$step(action)
+  )
+  expect_identical(nrow(check_env(own)), 0L)
+  expect_identical(nrow(check_env("Walk-v8")), 0L)
+})
