@@ -138,10 +138,7 @@ not_registered <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0
 # was installed is still there. The exit status alone does not suffice: a Python that is an empty
 # file has the exit status 0, too.
 try_environment <- function(python, extras) {
-  modules <- c(
-    box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
-  )
-  modules <- modules[names(modules) %in% extras]
+  modules <- extra_modules[names(extra_modules) %in% extras]
   script <- c(
     "import csv, importlib.metadata, importlib.util",
     "import gym_server.cli.main, gymnasium.envs.classic_control, pygame",

@@ -6,8 +6,8 @@
 #' @param pythons Paths of Pythons, a character vector.
 #' @param timeout How long all of them may take together, in seconds.
 #' @return A data frame with one row for each: `python`, `version` (a string or `NA`), `runs`
-#'   (logical, `NA` when it did not answer in time) and `reason` (why it cannot run the
-#'   server, a string or `NA`).
+#'   (logical, `NA` when it did not answer in time), `reason` (why it cannot run the
+#'   server, a string or `NA`) and `extras` (those of the server that it has, separated by ", ").
 #' @noRd
 try_pythons <- function(pythons, timeout = 6) {
   trials <- lapply(pythons, begin_trial)
@@ -17,11 +17,28 @@ try_pythons <- function(pythons, timeout = 6) {
     python = pythons,
     version = vapply(outcomes, function(outcome) outcome$version, "", USE.NAMES = FALSE),
     runs = vapply(outcomes, function(outcome) outcome$runs, NA, USE.NAMES = FALSE),
-    reason = vapply(outcomes, function(outcome) outcome$reason, "", USE.NAMES = FALSE)
+    reason = vapply(outcomes, function(outcome) outcome$reason, "", USE.NAMES = FALSE),
+    extras = vapply(outcomes, function(outcome) outcome$extras, "", USE.NAMES = FALSE)
   )
 }
 
-print_version <- "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); "
+# What each extra of the server installs.
+extra_modules <- c(
+  box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
+)
+
+# Python 2 has no `find_spec`, and its version must be printed all the same.
+print_version <- paste0(
+  "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); ",
+  "import importlib.util as util; ",
+  "print('modules ' + ' '.join(m for m in '", paste(extra_modules, collapse = " "),
+  "'.split() if util.find_spec(m))); sys.stdout.flush(); "
+)
+
+extras_in <- function(modules) {
+  has <- tapply(extra_modules %in% modules, factor(names(extra_modules), server_extras), all)
+  paste(names(which(has)), collapse = ", ")
+}
 
 # Returns the running process and its output files, NULL when it could not be started.
 begin_trial <- function(python) {
@@ -39,8 +56,9 @@ begin_trial <- function(python) {
 
 end_trial <- function(python, trial, deadline) {
   outcome <- function(version = NA_character_, runs = FALSE, reason = NA_character_) {
-    list(version = version, runs = runs, reason = reason)
+    list(version = version, runs = runs, reason = reason, extras = extras)
   }
+  extras <- ""
   if (is.null(trial)) {
     return(outcome(reason = not_started_reason(python)))
   }
@@ -48,6 +66,7 @@ end_trial <- function(python, trial, deadline) {
   await_end(trial$process, as.numeric(deadline - Sys.time(), units = "secs"))
   lines <- lapply(trial$output, log_tail)
   version <- grep("^[0-9.]+$", lines[[1L]], value = TRUE)[1L]
+  extras <- extras_in(strsplit(grep("^modules", lines[[1L]], value = TRUE)[1L], " ")[[1L]])
   if (trial$process$is_alive()) {
     trial$process$kill_tree()
     outcome(version, NA, "it did not answer in time")

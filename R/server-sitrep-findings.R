@@ -117,10 +117,12 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
   taken <- which(pythons$runs)[1L]
   own <- installed_server()$python
   rows <- Map(
-    function(i, python, version, runs, reason) {
+    function(i, python, version, runs, reason, extras) {
       what <- paste0(python, if (!is.na(version)) paste0(" (", version, ")"))
       if (isTRUE(runs)) {
-        finding("Python", what, if (i == taken) "runs the server" else "would run it, too")
+        runs <- if (i == taken) "runs the server" else "would run it, too"
+        finding("Python", what, paste0(runs, " (extras: ", if (nzchar(extras)) extras else "none",
+                                       ")"))
       } else if (named && isFALSE(runs)) {
         finding("Python", what, paste("cannot run the server:", reason), "wrong",
                 "Sys.unsetenv(\"GYM_PYTHON\")")
@@ -132,7 +134,8 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
         finding("Python", what, problem, "note")
       }
     },
-    seq_len(nrow(pythons)), pythons$python, pythons$version, pythons$runs, pythons$reason
+    seq_len(nrow(pythons)), pythons$python, pythons$version, pythons$runs, pythons$reason,
+    pythons$extras
   )
   more <- length(rows) - shown
   do.call(rbind, c(

@@ -3,7 +3,8 @@ report <- function(runs = TRUE, reason = NA_character_, frame = parent.frame()) 
   local_functions(
     python_candidates = function(python = NULL) python %||% "/some/python3",
     try_pythons = function(...) {
-      data.frame(python = "/some/python3", version = "3.12.1", runs = runs, reason = reason)
+      data.frame(python = "/some/python3", version = "3.12.1", runs = runs, reason = reason,
+                 extras = "box2d, video")
     },
     installed_server = function() NULL,
     install_folders = function() character(),
@@ -28,7 +29,8 @@ test_that("where all is well the report says so on one screen", {
   expect_false(any(seen$found$state == "wrong"))
   expect_lte(length(seen$lines), 25)
   expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
-  expect_match(seen$text, "/some/python3 (3.12.1): runs the server", fixed = TRUE)
+  expect_match(seen$text, "/some/python3 (3.12.1): runs the server (extras: box2d, video)",
+               fixed = TRUE)
   expect_match(seen$text, paste0("gym: ", packageVersion("gym")), fixed = TRUE)
   expect_identical(capture.output(print(seen$found)), seen$lines)
 })

@@ -70,13 +70,20 @@ def _major_version(package: str) -> int:
 
 def missing_extra(what: str, extra: str) -> GymServerError:
     """Something needs an extra of the server that is not installed."""
-    wanted = " ".join(f'"{requirement}"' for requirement in REQUIREMENTS[extra])
     return GymServerError(
         "missing_dependency",
         f"{what} needs the server's extra '{extra}'",
-        f'in a terminal: "{sys.executable}" -m pip install {wanted}',
+        how_to_install(extra),
         extra,
     )
+
+
+def how_to_install(extra: str) -> str:
+    """Say by which command an extra is installed for this Python; uv's environments lack pip."""
+    wanted = " ".join(f'"{requirement}"' for requirement in REQUIREMENTS[extra])
+    if _is_installed("pip"):
+        return f'in a terminal: "{sys.executable}" -m pip install {wanted}'
+    return f'in a terminal: uv pip install --python "{sys.executable}" {wanted}'
 
 
 def unmet_module(spec: EnvSpec) -> str | None:

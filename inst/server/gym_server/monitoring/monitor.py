@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import gymnasium
 
+from gym_server.envs.extras import how_to_install
 from gym_server.envs.outcomes import reward_number
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import TABLE, MonitorDirectory
@@ -169,6 +170,6 @@ def require_video(env: gymnasium.Env) -> None:
         raise GymServerError(
             "video_unavailable",
             f"Videos need moviepy, which this server does not have: {error}",
-            "install gym-server[video], or leave video_callable out",
+            f"{how_to_install('video')}, or leave video_callable out",
             "video",
         ) from error

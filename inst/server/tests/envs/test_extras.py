@@ -3,7 +3,7 @@ import sys
 import pytest
 from conftest import SERVER
 
-from gym_server.envs.extras import REQUIREMENTS
+from gym_server.envs import extras
 
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="tomllib came with Python 3.11")
@@ -12,7 +12,17 @@ def test_the_hints_name_what_the_package_declares():
 
     project = tomllib.loads((SERVER / "pyproject.toml").read_text())["project"]
     declared = project["optional-dependencies"]
-    for extra, requirements in REQUIREMENTS.items():
-        assert [name.partition(">")[0] for name in declared[extra]] == list(requirements)
+    for name, requirements in extras.REQUIREMENTS.items():
+        assert [one.partition(">")[0] for one in declared[name]] == list(requirements)
     together = declared["all"][0]
-    assert all(extra in together for extra in REQUIREMENTS)
+    assert all(name in together for name in extras.REQUIREMENTS)
+
+
+def test_an_extra_is_installed_by_pip_or_by_uv(monkeypatch):
+    command = extras.how_to_install("atari")
+    assert command.endswith('-m pip install "gymnasium[atari]" "opencv-python-headless"')
+    # As in an environment that uv made.
+    monkeypatch.setattr(extras, "_is_installed", lambda module: module != "pip")
+    command = extras.how_to_install("video")
+    assert command.startswith('in a terminal: uv pip install --python "')
+    assert command.endswith('" "moviepy"')
