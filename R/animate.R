@@ -1,18 +1,22 @@
 #' Make a moving picture of an episode
 #'
-#' Writes an episode as an animated GIF file: of a rollout one that was played with `frames = TRUE`,
+#' Writes an episode as an animated GIF file, or as an MP4 video: of a rollout one that was played
+#' with `frames = TRUE`,
 #' of a search, a training or a policy a fresh one, which is played for it. Printed in an
 #' interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
 #' names another function that opens it, or `FALSE`), and a document of knitr has it on the page,
 #' one made by LaTeX its [filmstrip][plot.gym_rollout()].
+#'
+#' A GIF takes the package magick; an MP4 the package av, or the program ffmpeg, which the server's
+#' extra `"video"` brings along (see [gym_server_install()]).
 #'
 #' The episode is shown at the environment's own pace. A GIF counts in hundredths of a second, and
 #' browsers take a delay of less than two for a slow one of ten: so there are at most 50
 #' pictures a second, of faster environments only every second frame, or fewer still.
 #'
 #' @param x A rollout, a search, a training, or a policy as for [rollout()].
-#' @param file The file to write, its name ends in `.gif`. `NULL`, the default, is one among the
-#'   session's temporary files.
+#' @param file The file to write, its name ends in `.gif` or `.mp4`. `NULL`, the default, is a GIF
+#'   among the session's temporary files.
 #' @param fps How many steps of the environment make a second, a number; `NULL`, the default,
 #'   leaves it to the environment (50 in CartPole; 30 where it does not say).
 #' @param ... For methods.
@@ -20,7 +24,7 @@
 #' @param candidate Whose episode where several policies were played, a whole number; the default
 #'   is the first.
 #' @param width The picture's width in pixels, a whole number; `NULL`, the default, is that of
-#'   the environment's frames (600 in CartPole).
+#'   the environment's frames (600 in CartPole). In an MP4 width and height are even.
 #' @param every Show every frame, 1, every second one, 2, and so on, at the same pace; the last one
 #'   is always shown. `NULL`, the default, shows as many as the format can at that pace; a number
 #'   too small for it is raised to that, with a message.
@@ -31,7 +35,7 @@
 #'   hundredths of a second, integers; the last for a second), `size` (width and height in pixels)
 #'   and `stills`, the frames of a filmstrip.
 #' @section Errors: `gym_error_argument` for an argument that is not what it should be, a rollout
-#'   without frames, an environment that cannot be drawn, or when the package magick is missing;
+#'   without frames, an environment that cannot be drawn, or when what writes the file is missing;
 #'   those of [rollout()] while it plays.
 #' @seealso [plot.gym_rollout()] for a filmstrip on paper.
 #' @export
@@ -129,16 +133,18 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
   check_count(width, max = 65535, allow_null = TRUE, call = call)
   check_count(every, allow_null = TRUE, call = call)
   if (!is.null(file)) {
-    if (!rlang::is_string(file) || !endsWith(lower_case(file), ".gif")) {
-      abort_argument(file, "the name of a file that ends in .gif, or NULL", "file", call)
+    if (!rlang::is_string(file) || !grepl("[.](gif|mp4)$", lower_case(file))) {
+      abort_argument(file, "the name of a file that ends in .gif or .mp4, or NULL", "file", call)
     }
     if (!dir.exists(dirname(file))) {
       abort_argument(file, "in a folder that exists", "file", call)
     }
   }
-  check_suggested("magick", "write an animation", call)
+  if (is_mp4(file)) check_writes_mp4(call) else check_suggested("magick", "write a GIF", call)
   if (!is.null(file)) absolute_path(file)
 }
+
+is_mp4 <- function(file) !is.null(file) && endsWith(lower_case(file), ".mp4")
 
 #' Take the frames of an episode out of a rollout
 #' @noRd
@@ -155,10 +161,17 @@ episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_e
 }
 
 new_animation <- function(frames, file, fps, width, every) {
-  plan <- animation_plan(length(frames), fps %||% frame_rate(frames), every)
+  fps <- fps %||% frame_rate(frames)
+  video <- is_mp4(file)
+  plan <- animation_plan(length(frames), fps, every, if (video) Inf else fastest_fps)
+  pngs <- unclass(frames)[plan$steps + 1L]
   # An interrupt leaves a file that was there before as it was.
-  written <- temporary_file(fileext = ".gif")
-  size <- write_gif(unclass(frames)[plan$steps + 1L], written, plan$delays, width)
+  written <- temporary_file(fileext = if (video) ".mp4" else ".gif")
+  size <- if (video) {
+    write_mp4(pngs, written, fps / (every %||% 1), width)
+  } else {
+    write_gif(pngs, written, plan$delays, width)
+  }
   if (!is.null(file)) {
     move_animation(written, file)
   }
@@ -185,23 +198,23 @@ frame_rate <- function(frames) {
 #' @return A list: `steps`, after which the frames were taken, and `delays`, in hundredths of
 #'   a second, rounded so that their errors do not add up.
 #' @noRd
-animation_plan <- function(n, fps, every = NULL) {
-  every <- shown_every(every, fps)
+animation_plan <- function(n, fps, every = NULL, fastest = fastest_fps) {
+  every <- shown_every(every, fps, fastest)
   steps <- unique(as.integer(c(seq(0, n - 1, by = every), n - 1)))
   delays <- diff(round(100 * steps / fps))
-  list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest_fps), 65535)))
+  list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest), 65535)))
 }
 
 # Browsers slow down animations with more frames a second.
 fastest_fps <- 50
 
 # Every how many frames one is shown: at least so many that the pace can be kept.
-shown_every <- function(every, fps) {
-  least <- max(1, ceiling(fps / fastest_fps))
+shown_every <- function(every, fps, fastest) {
+  least <- max(1, ceiling(fps / fastest))
   if (!is.null(every) && every < least) {
     rlang::inform(
       c(paste0("`every` is ", least, " instead of ", every, ": of ", number_text(fps),
-               " frames a second a GIF can show ", fastest_fps, " at most."),
+               " frames a second a GIF can show ", fastest, " at most."),
         i = "With a lower `fps` it shows more of them, at a slower pace."),
       class = "gym_message_every"
     )
@@ -234,7 +247,7 @@ among_temporary_files <- function(file) {
   if (startsWith(folders[[1L]], folders[[2L]])) {
     return(file)
   }
-  copy <- temporary_file(fileext = ".gif")
+  copy <- temporary_file(fileext = paste0(".", tools::file_ext(file)))
   file.copy(file, copy)
   copy
 }
@@ -251,8 +264,8 @@ format.gym_animation <- function(x, ...) {
   )
 }
 
-# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show a
-# GIF, so there it is a filmstrip.
+# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show it,
+# so there it is a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
   hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)
@@ -267,8 +280,13 @@ knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...
     grDevices::pdf(shown, width = size[[1L]], height = size[[2L]])
     tryCatch(print(filmstrip(x$stills)), finally = grDevices::dev.off())
   } else {
-    shown <- path(".gif")
+    shown <- path(paste0(".", tools::file_ext(x$file)))
     file.copy(x$file, shown, overwrite = TRUE)
+    if (is_mp4(x$file)) {
+      return(knitr::asis_output(paste0(
+        "<video controls loop muted width=\"", x$size[[1L]], "\" src=\"", shown, "\"></video>"
+      )))
+    }
   }
   knitr::knit_print(knitr::include_graphics(shown), options, ...)
 }

@@ -45,11 +45,11 @@ await_end <- function(process, seconds) {
 #' R's generator stays as it was.
 #' @param arguments A character vector.
 #' @param timeout After how many seconds it is killed.
-#' @return A list: `status`, `NA` for what could not be run or did not end in time, and `stdout`,
-#'   a string, then empty.
+#' @return A list: `status`, `NA` for what could not be run or did not end in time, and `stdout`
+#'   and `stderr`, strings, then empty.
 #' @noRd
 run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
-  silent <- list(status = NA_integer_, stdout = "")
+  silent <- list(status = NA_integer_, stdout = "", stderr = "")
   run <- with_own_tree_id(tryCatch(
     processx::run(
       command, arguments,
@@ -58,5 +58,5 @@ run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
     ),
     error = function(cnd) silent
   ))
-  if (isTRUE(run$timeout)) silent else run[c("status", "stdout")]
+  if (isTRUE(run$timeout)) silent else run[c("status", "stdout", "stderr")]
 }

@@ -149,7 +149,7 @@ test_that("what cannot be animated says why, before anything is played", {
     expect_error(animate(policy_random(), ..., env = "CartPole-v1", client = no_client()), message,
                  class = "gym_error_argument")
   }
-  bad("cartpole.png", message = "ends in .gif")
+  bad("cartpole.png", message = "ends in .gif or .mp4")
   bad(file.path(tempdir(), "not there", "a.gif"), message = "folder that exists")
   bad(fps = 0, message = "`fps`")
   bad(width = 0, message = "`width`")
@@ -257,4 +257,37 @@ test_that("gganimate's generic finds the methods, when it is loaded and later", 
   register_animate(home)
   expect_error(home$animate(rollout(fake_environment(), policy_random())),
                class = "gym_error_argument")
+})
+
+# The pictures of a video, as ffmpeg counts them.
+count_pictures <- function(file) {
+  said <- run_quietly(find_ffmpeg(), c("-i", file, "-f", "null", "-"))$stderr
+  as.integer(sub(".*frame= *([0-9]+).*", "\\1", said))
+}
+
+test_that("an MP4 has all pictures, the last for a second, with an even size", {
+  played <- short_rollout()
+  if (is.null(find_ffmpeg())) skip("no ffmpeg")
+  local_binding("is_av_there", function() FALSE)
+  file <- withr::local_tempfile(fileext = ".mp4")
+  animation <- animate(played, file)
+  expect_identical(animation$steps, 0:10)
+  expect_identical(animation$size, c(600L, 400L))
+  expect_identical(rawToChar(readBin(file, "raw", 8)[5:8]), "ftyp")
+  # 50 a second.
+  expect_identical(count_pictures(file), 11L + 49L)
+  animation <- animate(played, file, width = 101, every = 5, fps = 100)
+  expect_identical(animation$size, c(100L, 66L))
+  expect_identical(count_pictures(file), 3L + 19L)
+  expect_match(format(animation), "100 x 66 pixels")
+  expect_match(knitted(animation, "html")$text, "<video controls.*figure/pole-[0-9a-f]{8}[.]mp4")
+})
+
+test_that("without anything that writes a video one command is named", {
+  local_binding("is_av_there", function() FALSE)
+  local_binding("find_ffmpeg", function() NULL)
+  expect_error(
+    animate(policy_random(), "a.mp4", env = "CartPole-v1", client = no_client()),
+    "install.packages(\"av\")", fixed = TRUE, class = "gym_error_argument"
+  )
 })

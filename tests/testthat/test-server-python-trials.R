@@ -21,6 +21,8 @@ test_that("each Python is tried, and what it lacks is reported", {
   expect_identical(trials$version[[1]], "3.12.1")
   expect_match(trials$version[[2]], "^3[.][0-9]+[.][0-9]+$")
   expect_identical(trials$version[3:4], c(NA_character_, NA))
+  expect_match(trials$extras[[2]], "box2d")
+  expect_identical(trials$extras[c(1, 3, 4)], c("", "", ""))
 
   trial <- try_pythons(hanging, timeout = 0.5)
   expect_identical(trial$runs, NA)
