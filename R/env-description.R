@@ -16,7 +16,9 @@
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
-  if (frames || !may_be_described(env_id, arguments)) {
+  played_here <- frames || !is_made_by_server(env_id) || any(names(arguments) %in% how_made()) ||
+    calls_r(env_id) || length(remembering(wrapper_names(noted_wrappers(env_id))))
+  if (played_here) {
     return(NULL)
   }
   check_dots_named(arguments, "seed = 1", call)
@@ -41,11 +43,6 @@ known_description <- function(client, env_id, arguments, call) {
   described <- known$described[[1L]]
   if (!is.null(described)) described$known <- known
   described
-}
-
-may_be_described <- function(env_id, arguments) {
-  is_made_by_server(env_id) && !any(names(arguments) %in% how_made()) && !calls_r(env_id) &&
-    !length(remembering(wrapper_names(noted_wrappers(env_id))))
 }
 
 # The names of arguments that are none of the environment's own.

@@ -47,7 +47,8 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
 }
 
 close_instance <- function(client, instance_id, call = rlang::caller_env()) {
-  post_once(client, paste0(instance_route(instance_id), "close/"), call)
+  route <- paste0(instance_route(instance_id), "close/")
+  perform_request(prepare_request(client, route, once = TRUE), call = call)
   forget_instance(instance_place(client, instance_id))
   instances <- client_state(client)$instances
   if (!is.null(instances[[instance_id]])) {

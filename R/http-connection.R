@@ -9,7 +9,11 @@
 client_state <- function(client) {
   state <- client$state
   if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
-    connection <- new_connection(client)
+    # All clients of one server in one process share their keys: the server remembers a limited
+    # number of them for an instance, and a script may make a client for each call.
+    place <- paste(client$remote_base, Sys.getpid())
+    keys <- the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
+    connection <- new_connection(keys)
     suspendInterrupts({
       state$connection <- connection
       state$session_config <- getOption("httr_config")
@@ -34,8 +38,7 @@ client_state <- function(client) {
 
 # Makes a connection: its idempotency keys, the function that performs a request, the body under
 # way, and the handles that were made so far.
-new_connection <- function(client, keys = keys_of_process(client),
-                           fetch = curl::curl_fetch_memory) {
+new_connection <- function(keys, fetch = curl::curl_fetch_memory) {
   connection <- new.env(parent = emptyenv())
   connection$keys <- keys
   connection$fetch <- fetch
@@ -48,10 +51,10 @@ new_connection <- function(client, keys = keys_of_process(client),
 
 # The connection for a request inside of another one. R may run a finalizer at any time, also while
 # curl waits for an answer, and a user's finalizer may make a request.
-inner_connection <- function(client, connection) {
+inner_connection <- function(connection) {
   while (connection$busy) {
     if (is.null(connection$inner)) {
-      connection$inner <- new_connection(client, new_idempotency_keys(), fetch_in_own_pool())
+      connection$inner <- new_connection(new_idempotency_keys(), fetch_in_own_pool())
     }
     connection <- connection$inner
   }
@@ -103,13 +106,6 @@ next_key <- function(keys) {
   list(key = keys$key, number = keys$number)
 }
 
-# All clients of one server in one process share their keys: the server remembers a limited number
-# of them for an instance, and a script may make a client for each call.
-keys_of_process <- function(client) {
-  place <- paste(client$remote_base, Sys.getpid())
-  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
-}
-
 # Unlike anything drawn from R's generator this is never the same twice.
 random_key <- function() {
   the_session$key_count <- (the_session$key_count %||% 0) + 1
@@ -136,14 +132,6 @@ handle_kinds <- list(
   post_tensors = list(post = TRUE, sends = json_type, accepts = accepted_tensors),
   send_tensors = list(post = TRUE, sends = tensors_type, accepts = accepted_tensors)
 )
-
-handle_kind <- function(method, sends_tensors, takes_tensors) {
-  if (sends_tensors) {
-    "send_tensors"
-  } else {
-    paste0(if (method == "GET") "get" else "post", if (takes_tensors) "_tensors")
-  }
-}
 
 # Makes a connection's handle of one kind: curl's handle, and the length of body that is set on it.
 add_handle <- function(client, connection, kind) {

@@ -24,7 +24,7 @@ json_number <- function(x) {
 json_string <- function(x) {
   x <- enc2utf8(x)
   special <- grepl("[\"\\\\\\x01-\\x1f]", x, perl = TRUE)
-  x[special] <- json_escape(x[special])
+  if (any(special)) x[special] <- json_escape(x[special])
   paste0("\"", x, "\"", recycle0 = TRUE)
 }
 

@@ -21,7 +21,11 @@ prepare_request <- function(client, route, method = "POST", fields = NULL,
   list(
     client = client, url = paste0(client$remote_base, route), method = method, body = body,
     once = once, repeatable = repeatable, read = read, result = result,
-    kind = handle_kind(method, sends_tensors, takes_tensors)
+    kind = if (sends_tensors) {
+      "send_tensors"
+    } else {
+      paste0(if (method == "GET") "get" else "post", if (takes_tensors) "_tensors")
+    }
   )
 }
 
@@ -41,7 +45,7 @@ perform_request <- function(request, content = NULL, call = rlang::caller_env(),
   client <- request$client
   connection <- client_state(client)$connection
   if (connection$busy) {
-    connection <- inner_connection(client, connection)
+    connection <- inner_connection(connection)
   }
   connection$busy <- TRUE
   on.exit(connection$busy <- FALSE)
@@ -101,11 +105,6 @@ attempt_request <- function(request, connection, handle, key) {
 }
 
 # Calls ----------------------------------------------------------------------------------
-
-# Makes a POST that the server carries out exactly once, and reads its answer.
-post_once <- function(client, route, call = rlang::caller_env()) {
-  perform_request(prepare_request(client, route, once = TRUE), call = call)
-}
 
 # Makes a POST without an idempotency key, and reads its answer.
 post_answer <- function(client, route, fields = NULL, call = rlang::caller_env()) {

@@ -14,7 +14,8 @@
 read_tensors <- function(bytes, layout = read_layout(bytes)) {
   metadata <- layout$metadata
   if (layout$metadata_last) {
-    text <- rawToChar(metadata_bytes(bytes, layout))
+    # What follows the start of a header, to its end.
+    text <- rawToChar(bytes[(length(layout$start) + 1L):layout$data])
     metadata <- tryCatch(
       from_json(paste0("{\"last\":", text))$last,
       error = function(cnd) abort_tensors("the metadata are no JSON")
@@ -22,9 +23,6 @@ read_tensors <- function(bytes, layout = read_layout(bytes)) {
   }
   list(tensors = read_entries(bytes, layout), metadata = metadata)
 }
-
-# What follows the start of a header, to its end.
-metadata_bytes <- function(bytes, layout) bytes[(length(layout$start) + 1L):layout$data]
 
 # Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
 # which copies the file once, in much less time for each byte.

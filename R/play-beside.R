@@ -39,7 +39,7 @@ plays_beside <- function(vector_env, policy, max_steps, keep_steps) {
 #' @noRd
 play_beside <- function(vector_env, history, policy_of, report, target = NULL, max_steps = Inf,
                         keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE) {
-  numbers <- numbers_of_candidate(vector_env, policy_of(1L))
+  numbers <- sum(lengths(policy_data(policy_of(1L), vector_env)$tensors))
   most <- max(1L, as.integer(most_numbers %/% max(numbers, 1)))
   keep <- c("moments", "steps", "next_observation")[c(keep_moments, keep_steps, keep_next)]
   play <- new_play(
@@ -52,10 +52,6 @@ play_beside <- function(vector_env, history, policy_of, report, target = NULL, m
 
 # How many numbers of policies a request has at most.
 most_numbers <- 1e6
-
-numbers_of_candidate <- function(vector_env, policy) {
-  sum(lengths(policy_data(policy, vector_env)$tensors))
-}
 
 #' List all episodes, candidate after candidate, with their seeds
 #'
@@ -159,7 +155,11 @@ enter_in_order <- function(play) {
     place <- as.character(play$entered + 1L)
     batch <- play$pieces[[place]]
     if (is.null(batch) || play$entered >= play$needed) break
-    batch <- first_episodes(batch, play$needed - play$entered)
+    wanted <- play$needed - play$entered
+    if (length(batch$return) > wanted) {
+      # Where later candidates are left out no steps are kept.
+      batch <- lapply(batch[names(batch) != "steps"], utils::head, wanted)
+    }
     play$enter(batch)
     play$entered <- play$entered + length(batch$return)
     rm(list = place, envir = play$pieces)
@@ -170,14 +170,6 @@ enter_in_order <- function(play) {
   }
   if (play$played > play$entered) play$report(min(play$played, play$needed) - play$entered)
   play$entered >= play$needed
-}
-
-# Where later candidates are left out no steps are kept.
-first_episodes <- function(batch, n) {
-  if (length(batch$return) <= n) {
-    return(batch)
-  }
-  lapply(batch[names(batch) != "steps"], utils::head, n)
 }
 
 # Tasks for workers --------------------------------------------------------------------------

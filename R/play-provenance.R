@@ -3,6 +3,16 @@
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
+  # NumPy calculates what policies do that play on the server.
+  versions <- server_versions(vector_env$client) %||% vector_env$model$versions
+  described <- vector_env$description$versions
+  way <- if (!is.null(vector_env$model)) {
+    "from the model in R"
+  } else if (is.null(vector_env$description)) {
+    "step by step"
+  } else {
+    "beside the environment"
+  }
   structure(
     list(
       gym = as.character(utils::packageVersion("gym")),
@@ -11,9 +21,9 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
       system = paste(system[["sysname"]], system[["release"]]),
       BLAS = extSoftVersion()[["BLAS"]],
       LAPACK = La_library(),
-      server = played_versions(vector_env),
+      server = c(versions, described[setdiff(names(described), names(versions))]),
       processor = vector_env$description$processor,
-      way = way_of_playing(vector_env),
+      way = way,
       env_id = environment_label(vector_env),
       kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
       wrappers = as.character(vector_env$spec$wrappers),
@@ -25,23 +35,6 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
     ),
     class = "gym_provenance"
   )
-}
-
-way_of_playing <- function(vector_env) {
-  if (!is.null(vector_env$model)) {
-    "from the model in R"
-  } else if (is.null(vector_env$description)) {
-    "step by step"
-  } else {
-    "beside the environment"
-  }
-}
-
-# The server's versions; NumPy calculates what policies do that play there.
-played_versions <- function(vector_env) {
-  versions <- server_versions(vector_env$client) %||% vector_env$model$versions
-  described <- vector_env$description$versions
-  c(versions, described[setdiff(names(described), names(versions))])
 }
 
 #' @export

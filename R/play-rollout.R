@@ -176,7 +176,12 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_flag(progress)
   check_dots_named(list(...), "is_slippery = FALSE")
   candidates <- count_candidates(policy) %||% 1L
-  check_countable(episodes, candidates)
+  # The numbers of all episodes together are integers.
+  most <- .Machine$integer.max %/% candidates
+  if (episodes > most) {
+    must <- paste("at most", most, "for each of", count_of(candidates, "candidate"))
+    abort_argument(episodes, must, "episodes", rlang::current_env())
+  }
   seed <- seed %||% draw_seed()
   play <- function(vector_env) {
     play_rollout(
@@ -187,15 +192,6 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
     client = client, num_workers = num_workers, seed = seed
   )
-}
-
-# The numbers of all episodes together are integers.
-check_countable <- function(episodes, candidates, call = rlang::caller_env()) {
-  most <- .Machine$integer.max %/% candidates
-  if (episodes > most) {
-    must <- paste("at most", most, "for each of", count_of(candidates, "candidate"))
-    abort_argument(episodes, must, "episodes", call)
-  }
 }
 
 check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {

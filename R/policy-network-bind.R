@@ -4,21 +4,16 @@
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
   env <- one_sub_env(env)
-  policy <- with_sizes_of(with_output_of(policy, env), env)
+  if (is.na(policy$output)) {
+    policy$output <- if (inherits(env$action_space, "gym_space_box")) "gaussian" else "softmax"
+  }
+  policy <- with_sizes_of(policy, env)
   check_inputs(policy, env, call)
   check_outputs(policy, env, call)
   check_network(policy, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy["env_id"] <- list(env$spec$id)
-  policy
-}
-
-# Fills in the output that is the environment's own.
-with_output_of <- function(policy, env) {
-  if (is.na(policy$output)) {
-    policy$output <- if (inherits(env$action_space, "gym_space_box")) "gaussian" else "softmax"
-  }
   policy
 }
 
