@@ -1,7 +1,7 @@
-"""Start the server, or print in one line why this Python cannot.
+"""Start the server, or say in one line why this Python cannot run it.
 
-The line and exit status 78 (EX_CONFIG) tell a caller who looks for a fitting Python, such as
-the R package, to try the next one.  For that this file must parse on any Python, also 2.7.
+The line and exit status 78 (EX_CONFIG) tell a caller that is looking for a suitable Python, such
+as the R package, to try the next one. This file must therefore parse on any Python, even 2.7.
 """
 
 import sys
@@ -19,7 +19,7 @@ def refuse(reason):
 
 
 def main():
-    """Run the command line; never returns."""
+    """Run the command line and exit."""
     if sys.version_info < (3, 10):
         refuse("Python 3.10 or newer is needed")
     try:

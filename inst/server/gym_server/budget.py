@@ -1,4 +1,4 @@
-"""A limit of memory for many users together, and what each of them holds of it."""
+"""A memory limit shared by many users, and what each of them holds."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ class Budget:
     """Bytes that all users together may hold.
 
     Attributes:
-        limit: how many that are.
+        limit: the number of bytes.
     """
 
     def __init__(self, limit: float = math.inf) -> None:
-        """Start with all of them left."""
+        """Start with everything left."""
         self.limit = limit
         self._taken = 0.0
-        # Reentrant: a share keeps it while it takes bytes and counts what it holds.
+        # Reentrant: a share holds it while it takes bytes and updates its own count.
         self._lock = threading.RLock()
 
     @property
@@ -26,7 +26,7 @@ class Budget:
         return max(0.0, self.limit - self._taken)
 
     def take(self, size: float) -> bool:
-        """Take bytes, if so many are left; return whether they were."""
+        """Take bytes if that many are left; return whether it succeeded."""
         with self._lock:
             if not math.isfinite(size) or self._taken + size > self.limit:
                 return False
@@ -34,24 +34,24 @@ class Budget:
             return True
 
     def give_back(self, size: float) -> None:
-        """Give back bytes that were taken."""
+        """Return bytes to the budget."""
         with self._lock:
             self._taken -= size
 
     def share(self) -> Share:
-        """Return the share of one more user, which holds nothing yet."""
+        """Return an empty share for one more user."""
         return Share(self)
 
 
 class Share:
-    """What one user of a budget holds."""
+    """The bytes that one user of a budget holds."""
 
     def __init__(self, budget: Budget) -> None:
         self._budget = budget
         self._held = 0
 
     def take(self, size: int) -> bool:
-        """Take so many bytes more, if they are left; return whether they were."""
+        """Take more bytes if that many are left; return whether it succeeded."""
         with self._budget._lock:
             taken = self._budget.take(size)
             if taken:
@@ -59,12 +59,12 @@ class Share:
             return taken
 
     def give_back(self, size: int) -> None:
-        """Give back so many bytes, or all where it holds fewer."""
+        """Return bytes to the budget: at most as many as this share holds."""
         with self._budget._lock:
             size = min(size, self._held)
             self._held -= size
             self._budget.give_back(size)
 
     def give_all_back(self) -> None:
-        """Give back all that it holds."""
+        """Return everything to the budget."""
         self.give_back(self._held)

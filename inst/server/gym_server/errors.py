@@ -1,4 +1,4 @@
-"""Errors by code, and the one place where an exception becomes an answer."""
+"""Errors by code, and the one place that turns an exception into a response."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gym_server.json_values import LONGEST_MESSAGE, brief, shortened
 
 log = logging.getLogger(__name__)
 
-# Every other code answers with 400, as the classic server did.
+# All other codes have status 400, as on the classic server.
 _STATUS = {
     "unauthorized": 401,
     "foreign_host": 403,
@@ -47,22 +47,22 @@ _HEADERS = {
     "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
 }
 
-# Errors below 500 that can come after a part of the work was done. An error from 500 on always can.
+# Errors below 500 that may come after some work was done. Errors from 500 on always may.
 _AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory", "monitors_full"})
 
-# Describes the routes for people.  The classic R client shows no message of an error without it.
+# For people: describes the routes. The classic R client shows no error message without this field.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
 
 
 class GymServerError(Exception):
-    """A call that cannot be served.
+    """A call that the server cannot or will not carry out.
 
     Attributes:
-        code: stable name of what is wrong, snake_case.
+        code: a stable name of the problem, snake_case.
         message: one sentence for a person.
-        hint: what to do about it, or None.
-        extra: the extra of the server that is missing, or None.
-        is_logged: whether the process that raised it has logged it already.
+        hint: how to fix it, or None.
+        extra: the server's extra that is missing, or None.
+        is_logged: whether the process that raised it has already logged it.
     """
 
     is_logged = False
@@ -70,7 +70,7 @@ class GymServerError(Exception):
     def __init__(
         self, code: str, message: str, hint: str | None = None, extra: str | None = None
     ) -> None:
-        # An environment's message may repeat all that a client has sent.
+        # An environment's message may repeat everything that a client sent.
         self.message = shortened(message, LONGEST_MESSAGE)
         super().__init__(self.message)
         self.code = code
@@ -79,31 +79,31 @@ class GymServerError(Exception):
 
     @property
     def status(self) -> int:
-        """The HTTP status of the answer."""
+        """The HTTP status of the response."""
         return _STATUS.get(self.code, 400)
 
     @property
     def did_nothing(self) -> bool:
-        """Whether it was raised before anything was changed."""
+        """Whether it was raised before anything changed."""
         return self.status < 500 and self.code not in _AFTER_SOMETHING_WAS_DONE
 
     def again(self) -> GymServerError:
-        """Return a copy: each time an error is raised its traceback becomes longer."""
+        """Return a copy to raise: raising the same error again lengthens its traceback."""
         return GymServerError(self.code, self.message, self.hint, self.extra)
 
     @property
     def headers(self) -> tuple[tuple[str, str], ...]:
-        """Further headers of the answer."""
+        """Additional headers of the response."""
         return _HEADERS.get(self.code, ())
 
 
 def unknown_instance(instance_id: str) -> GymServerError:
-    """No environment has this instance_id, or it was closed."""
+    """Report an instance_id that no environment has, or no longer has."""
     return GymServerError("unknown_instance", f"Instance_id {instance_id} unknown")
 
 
 def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError:
-    """The server has closed an instance that was not used for some time."""
+    """Report an instance that the server closed because nobody used it."""
     return GymServerError(
         "instance_idle_closed",
         f"Instance {instance_id} of {env_id} was closed: nobody used it for {minutes:g} minutes",
@@ -112,29 +112,29 @@ def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError
 
 
 def memory_closed(instance_id: str, env_id: str, megabytes: float) -> GymServerError:
-    """The server has closed an instance that took more memory than there was."""
+    """Report an instance that the server closed because memory ran out."""
     return GymServerError(
         "instance_memory_closed",
-        f"Instance {instance_id} of {env_id} was closed: all environments together held more "
-        f"memory than they may, and this one had grown most, by {megabytes:,.0f} MiB",
+        f"Instance {instance_id} of {env_id} was closed: all environments together used more "
+        f"memory than allowed, and this one had grown most, by {megabytes:,.0f} MiB",
         "draw fewer sub-environments, or smaller pictures; the server's option --max-memory-mb "
         "sets the limit",
     )
 
 
 def rollout_memory_closed(megabytes: float) -> GymServerError:
-    """The server has killed a process that played episodes, for its memory."""
+    """Report that the server killed a process playing episodes because memory ran out."""
     return GymServerError(
         "too_much_memory",
-        f"The process of these episodes was ended: all environments together held more memory than "
-        f"they may, and it had {megabytes:,.0f} MiB",
-        "ask for fewer episodes whose steps are kept; the server's option --max-memory-mb sets the "
+        f"The process that played these episodes was ended: all environments together used more "
+        f"memory than allowed, and it used {megabytes:,.0f} MiB",
+        "ask for fewer episodes, or keep fewer steps; the server's option --max-memory-mb sets the "
         "limit",
     )
 
 
 def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError:
-    """A call took longer than the server allows.
+    """Report a call that took longer than the server allows.
 
     Args:
         what: the call, as the subject of a sentence.
@@ -149,36 +149,36 @@ def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError
 
 
 def shutdown_disabled() -> GymServerError:
-    """The operator does not let clients stop the server."""
+    """Report that the operator does not let clients stop the server."""
     return GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def shutting_down() -> GymServerError:
-    """The server is stopping and takes no more calls."""
+    """Report that the server is stopping and accepts no more calls."""
     return GymServerError("shutting_down", "The server is stopping")
 
 
 def missing_parameter(name: str) -> GymServerError:
-    """A required field is absent or empty (the classic server's words)."""
+    """Report a required field that is missing or empty, in the classic server's words."""
     return GymServerError(
         "missing_parameter", f"A required request parameter '{name}' was not provided"
     )
 
 
 def invalid_parameter(name: str, value: object, wanted: str) -> GymServerError:
-    """A field holds a value that it may not have."""
+    """Report a field with a value that is not allowed."""
     return GymServerError(
         "invalid_parameter", f"The parameter '{name}' must be {wanted}, not {brief(value)}"
     )
 
 
 def invalid_policy(problem: str, fix: str | None = None) -> GymServerError:
-    """A policy cannot be played: it is malformed, or does not fit the environment's spaces."""
+    """Report a policy that is malformed or does not fit the environment's spaces."""
     return GymServerError("invalid_policy", problem, fix)
 
 
 def wrong_length(name: str, found: int, num_envs: int, what: str) -> GymServerError:
-    """The length of a list is not the number of sub-environments."""
+    """Report a list whose length is not the number of sub-environments."""
     return GymServerError(
         "invalid_parameter",
         f"The parameter '{name}' must hold one {what} for each of the {num_envs} "
@@ -187,56 +187,56 @@ def wrong_length(name: str, found: int, num_envs: int, what: str) -> GymServerEr
 
 
 def reset_needed(call: str) -> GymServerError:
-    """A call needs a running episode, and there is none."""
+    """Report a call that needs a running episode when there is none."""
     return GymServerError(
         "reset_needed", f"{call} needs a running episode", "reset the environment first"
     )
 
 
 def environment_error(error: BaseException, who: str = "The environment") -> GymServerError:
-    """Wrap what an environment's own code raised."""
+    """Wrap an exception from an environment's own code."""
     last_line = traceback.format_exception_only(type(error), error)[-1].strip()
     return GymServerError("environment_error", f"{who} raised {last_line}")
 
 
 def environment_died(how: str, doing: str, hint: str | None = None) -> GymServerError:
-    """The process of an isolated environment ended without being asked to."""
+    """Report that the process of an isolated environment ended unexpectedly."""
     return GymServerError(
         "environment_died",
         f"The environment's process ended {doing}: {how}",
-        hint or "it is closed now, and the others go on; create another",
+        hint or "it is closed, and the others continue; create another",
     )
 
 
 def malformed_request(reason: str) -> GymServerError:
-    """What was sent cannot be read as a request."""
+    """Report bytes that are not a valid request."""
     return GymServerError("malformed_json", f"The request cannot be read: {reason}")
 
 
 def body_too_large() -> GymServerError:
-    """More was sent than the operator allows."""
+    """Report a body larger than the operator allows."""
     return GymServerError(
         "body_too_large",
-        "The request's body is larger than this server takes",
+        "The request's body is larger than this server accepts",
         "the server's option --max-body-mb sets the limit",
     )
 
 
 def busy_receiving() -> GymServerError:
-    """So many large bodies are being received that there is no memory for another."""
+    """Report that so many large bodies are arriving that there is no memory for another."""
     return GymServerError(
         "busy_receiving",
-        "This server receives as many large requests at this moment as it has room for",
-        "send it again in some seconds; the room grows with the server's option --max-body-mb",
+        "This server is receiving as many large requests as it has memory for",
+        "send it again in a few seconds; the server's option --max-body-mb sets the limit",
     )
 
 
 def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
-    """Turn any exception into a status and the body of the answer.
+    """Turn any exception into a status and a response body.
 
     Args:
-        error: a GymServerError, one of werkzeug's HTTP errors, or a fault of our own, which
-            is logged.
+        error: a GymServerError, one of werkzeug's HTTP errors, or a bug in the server, which is
+            logged.
 
     Returns:
         The HTTP status and ``{"message", "code", "documentation_url", "hint"?, "extra"?}``.
@@ -244,11 +244,11 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
     if isinstance(error, HTTPException):
         error = _from_http(error)
     elif not isinstance(error, GymServerError):
-        log.error("A fault of the server's own", exc_info=error)
+        log.error("A bug in the server", exc_info=error)
         error = GymServerError(
             "internal_error",
             f"The server failed: {type(error).__name__}: {error}",
-            "this is a fault of gym_server; the server's log has the details",
+            "this is a bug in gym_server; the server's log has the details",
         )
     elif error.code == "environment_error" and not error.is_logged:
         log.warning("%s", error.message, exc_info=error)

@@ -1,4 +1,4 @@
-"""Turn the values that an environment returns into plain JSON values."""
+"""Convert the values that an environment returns to plain JSON values."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ import numpy as np
 
 NONFINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
-# The characters of an error's message, wherever it goes.
+# The maximum length of an error message, in characters.
 LONGEST_MESSAGE = 2000
 
-# Deeper than any honest info, and shallow enough for the recursion of the JSON encoder. A structure
-# that contains itself is cut off here.
+# Deeper than any reasonable info, and shallow enough for the recursion of the JSON encoder.
+# Structures that contain themselves are cut off here.
 _DEEPEST = 128
 
 
 def plain(value: object, depth: int = 0) -> object:
-    """Turn any value into None, booleans, integers, finite floats, strings, lists and dicts.
+    """Convert any value to None, booleans, integers, finite floats, strings, lists and dicts.
+
+    NumPy scalars and arrays become Python's. Mappings get string keys. Non-finite numbers become
+    "NaN", "Infinity" or "-Infinity". Anything that JSON cannot express becomes its ``repr()``.
 
     Args:
-        value: anything; NumPy scalars and arrays become Python's, mappings get string keys,
-            non-finite numbers become "NaN", "Infinity" or "-Infinity", and what JSON has no
-            word for becomes its ``repr()``.
-        depth: how deep in the structure the value lies.
+        value: anything.
+        depth: the number of containers around the value.
     """
     if value is None or isinstance(value, (bool, int, str)):
         return value
@@ -50,14 +51,14 @@ def brief(value: object, width: int = 80) -> str:
     text = ""
     for piece in _pieces(value, width):
         text += piece
-        # The rest is not looked at: it may be as large as a request.
+        # Stop here: the rest may be as large as a request.
         if len(text) > width:
             break
     return shortened(text, width)
 
 
 def _pieces(value: object, width: int) -> Iterator[str]:
-    """Return the JSON text of a value piece by piece; of a string no more than is shown."""
+    """Yield the JSON text of a value piece by piece; at most ``width`` characters of a string."""
     if isinstance(value, str):
         yield json.dumps(value[:width])
     elif isinstance(value, Mapping):
@@ -80,7 +81,7 @@ def _pieces(value: object, width: int) -> Iterator[str]:
 
 
 def shortened(text: str, width: int) -> str:
-    """Return a text of at most ``width`` characters."""
+    """Cut a text to at most ``width`` characters."""
     return text if len(text) <= width else text[: width - 3] + "..."
 
 
@@ -95,7 +96,7 @@ def _array(value: np.ndarray, depth: int) -> object:
 
 
 def _items(value: Iterable, depth: int) -> object:
-    # Only types that are always finite: an iterator in an info may never end.
+    # Only types that are always finite: an iterator in an info may be endless.
     if isinstance(value, (list, tuple, set, frozenset, np.ndarray, range)):
         return [plain(item, depth + 1) for item in value]
     return _repr(value)
@@ -113,7 +114,7 @@ def _repr(value: object) -> str:
 
 
 def parse_nonfinite(value: object) -> Any:
-    """Return JSON values, with "NaN", "Infinity" and "-Infinity" as the numbers that they name."""
+    """Replace "NaN", "Infinity" and "-Infinity" in JSON values by the numbers they name."""
     if isinstance(value, str):
         return NONFINITE.get(value, value)
     if isinstance(value, list):

@@ -1,6 +1,6 @@
-"""How the server and its processes log: to standard error, and little of each error.
+"""Logging of the server and its processes: to standard error, with short messages.
 
-What an environment raises may repeat all that a client has sent, as often as the client likes.
+An exception from an environment may repeat everything that a client sent, any number of times.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gym_server.json_values import LONGEST_MESSAGE, shortened
 
 _LONGEST_TRACEBACK = 20_000
 
-# For how long a place's next traceback is left out.
+# After a traceback from one place, further ones from there are left out for this long.
 _QUIET_SECONDS = 60.0
 
 _Place = tuple[CodeType, int] | None
@@ -24,8 +24,8 @@ def set_up(level: str | int, about_process: str = "") -> None:
     """Log to standard error.
 
     Args:
-        level: what is logged.
-        about_process: what each line says of its process, as a format of ``logging``.
+        level: the lowest level to log.
+        about_process: what each line says about its process, as a ``logging`` format.
     """
     handler = logging.StreamHandler()
     handler.setFormatter(
@@ -36,21 +36,21 @@ def set_up(level: str | int, about_process: str = "") -> None:
 
 
 class Formatter(logging.Formatter):
-    """Cuts long messages, and leaves out tracebacks that would say the same again."""
+    """Shortens messages, and leaves out repeated tracebacks."""
 
     def __init__(self, form: str) -> None:
-        """Take the format of a line."""
+        """Set the format of a line."""
         super().__init__(form)
-        # When each place's last traceback was logged.
+        # The time of the last traceback from each place.
         self._logged: dict[_Place, float] = {}
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
-        """Return a line; see ``logging``."""
+        """Return a line; see ``logging.Formatter``."""
         record.message = shortened(record.message, LONGEST_MESSAGE)
         return super().formatMessage(record)
 
     def formatException(self, ei: tuple) -> str:  # noqa: N802
-        """Return a traceback, if none of the same place was logged a short time ago."""
+        """Return a traceback, unless one from the same place was logged recently."""
         error: BaseException = ei[1]
         place = _place((error.__cause__ or error).__traceback__)
         now = time.monotonic()
@@ -58,7 +58,7 @@ class Formatter(logging.Formatter):
         if place in self._logged:
             return "(The traceback of this place was logged less than a minute ago)"
         self._logged[place] = now
-        # Its parts are a line of code each, and the message of each error.
+        # A part is a line of code or the message of an error.
         parts = traceback.TracebackException(*ei).format()
         text = "".join(f"{shortened(part.rstrip(), LONGEST_MESSAGE)}\n" for part in parts)
         return shortened(text.rstrip(), _LONGEST_TRACEBACK)

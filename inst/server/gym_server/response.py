@@ -1,4 +1,4 @@
-"""A response, as it goes out and is stored for a repetition of its request."""
+"""A response, as it is sent, and stored in case its request is repeated."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ JSON = "application/json"
 
 
 class Response(NamedTuple):
-    """A response in HTTP's words; the length of its body is the server's to tell."""
+    """A response in HTTP's words; the server adds the Content-Length."""
 
     status: int
     body: bytes

@@ -1,1 +1,1 @@
-"""Gymnasium's environments: which there are, and how they are made and wrapped."""
+"""Gymnasium's environments: which exist, and how to make and wrap them."""

@@ -1,4 +1,4 @@
-"""The paths that clients may hand to environments and wrappers."""
+"""The paths that clients may pass to environments and wrappers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief
 
-# Separators of any system, a home directory, a drive, a leading dot (a hidden file, a parent
-# directory), and the zero that ends a string in C.
+# Separators of any system, a home directory, a drive, a leading dot (a hidden file or a parent
+# directory), and the zero that ends a C string.
 _PATH_LIKE = re.compile(r"[/\\\0]|^[~.]|^[A-Za-z]:")
 
-# Deeper than the arguments of any constructor, and far from the limit of recursion.
+# Deeper than the arguments of any constructor, and far below Python's recursion limit.
 _DEEPEST = 32
 
 
@@ -22,16 +22,16 @@ class AllowedPaths:
     """The files of this machine that clients may name."""
 
     def __init__(self, directories: Collection[Path] | None = None) -> None:
-        """Set the limits.
+        """Set the allowed directories.
 
         Args:
-            directories: paths must lie below one of them; None allows any path, for a server whose
+            directories: paths must be below one of them; None allows any path, for a server whose
                 only client is the user who started it.
         """
         self._directories = None if directories is None else [d.resolve() for d in directories]
 
     def check(self, config: EnvConfig) -> None:
-        """Refuse a path that is not allowed, in any argument of the environment and its wrappers.
+        """Refuse paths that are not allowed, in all arguments of the environment and its wrappers.
 
         Raises:
             GymServerError: ``invalid_kwargs``.
@@ -47,25 +47,25 @@ class AllowedPaths:
             if not self._lies_below(text, self._directories):
                 raise GymServerError(
                     "invalid_kwargs",
-                    f"{owner}: {brief(text)} may be a path, and clients may name none that does "
-                    "not lie in a directory that the server's operator allowed",
-                    "start the server with --allow-path DIR, and give the whole path",
+                    f"{owner}: {brief(text)} may be a path, and it is not below a directory that "
+                    "the server's operator allowed",
+                    "start the server with --allow-path DIR, and send the absolute path",
                 )
 
     def _lies_below(self, text: str, directories: list[Path]) -> bool:
         try:
             path = Path(text)
-            # What a relative path means depends on the process that opens it.
+            # The meaning of a relative path depends on the process that opens it.
             return path.is_absolute() and any(d in path.resolve().parents for d in directories)
         except (OSError, RuntimeError, ValueError):
             return False
 
 
 def _texts(value: object, owner: str, depth: int = 0) -> Iterator[str]:
-    """Return all texts in a JSON value, also the names of fields."""
+    """Return all strings in a JSON value, including field names."""
     if depth > _DEEPEST:
         raise GymServerError(
-            "invalid_kwargs", f"{owner}: there are more than {_DEEPEST} lists in one another"
+            "invalid_kwargs", f"{owner}: lists are nested more than {_DEEPEST} levels deep"
         )
     if isinstance(value, str):
         yield value

@@ -1,8 +1,8 @@
-"""How large arguments may be, and how many steps of its environment one call may take.
+"""How large arguments may be, and how many steps of an environment one call may take.
 
-Some arguments say how often something is repeated. A loop in Python runs until the limit of time
-ends it, and slows all other calls meanwhile; a loop in an environment's own C code cannot be ended
-in the server's process at all. So the numbers of repeats themselves are limited.
+Some arguments set how often something is repeated. A long loop in Python runs until the time limit
+ends it, and slows all other calls meanwhile. A loop in an environment's C code cannot be ended in
+the server's process at all. So the number of repeats is limited.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from gym_server.envs.registry import is_known, module_of
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief, parse_nonfinite
 
-# Of one environment, where the repeats of several wrappers multiply.
+# Per environment; the repeats of several wrappers multiply.
 MOST_REPEATS = 1_000
 
-# Of all sub-environments together: half a minute of the slow ones; and as many of Atari's
-# environments as a vector environment may have, each with the usual 30 idle steps after a reset.
+# Over all sub-environments: half a minute for slow ones. It allows the largest vector environment
+# of Atari games with the usual 30 no-op steps after a reset.
 MOST_STEPS = 500_000
 
 # The arguments that repeat steps, by wrapper.
@@ -34,13 +34,13 @@ _REPEATING = {
     "RepeatAction": ("num_repeats",),
 }
 
-# The arguments that repeat steps, of the environments that run in the server's process: MuJoCo's
-# and Atari's.
+# The arguments that repeat steps, of environments that run in the server's process: MuJoCo's and
+# Atari's.
 _REPEATING_ARGUMENTS: tuple[str, ...] = ("frame_skip", "frameskip", "noop_max")
 
-# The least and the most of arguments that take memory or time in proportion to their value: the
-# size of MuJoCo's pictures and what they show, Atari's own vector environment, which never comes
-# back from a picture or a stack without a size.
+# The bounds of arguments that take memory or time in proportion to their value: the size and
+# contents of MuJoCo's pictures, and Atari's own vector environment, which hangs if a picture or
+# stack has no size.
 _ENVIRONMENT_LIMITS = {
     "width": (1, 4_096),
     "height": (1, 4_096),
@@ -51,7 +51,7 @@ _ENVIRONMENT_LIMITS = {
     "num_threads": (0, 64),
 }
 
-# The most of such arguments of wrappers, which check for themselves what is too small.
+# The largest such arguments of wrappers. Wrappers themselves check for too small ones.
 _WRAPPER_LIMITS = {
     "AtariPreprocessing": ("screen_size", 4_096),
     "DelayObservation": ("delay", 1_000),
@@ -61,10 +61,10 @@ _WRAPPER_LIMITS = {
     "ResizeObservation": ("shape", 4_096),
 }
 
-# A map of FrozenLake of 250 x 250, which takes a second to be made.
+# Fits a FrozenLake map of 250 x 250, which takes a second to make.
 _LONGEST_ARGUMENTS = 65_536
 
-# It brings an angle into its range one turn at a time, however many turns that takes.
+# Acrobot brings an angle into range one turn at a time, however many turns that takes.
 _TURNING = "gymnasium.envs.classic_control.acrobot"
 _LARGEST_ANGLE = 100_000
 
@@ -72,22 +72,22 @@ _LARGEST_ANGLE = 100_000
 def check_environment(
     spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_envs: int = 1
 ) -> None:
-    """Refuse arguments that are too large, and repeats that make one call too many steps.
+    """Refuse arguments that are too large, and repeats that make one call take too many steps.
 
     Args:
-        spec: of the environment.
+        spec: the environment's spec.
         kwargs: its arguments.
-        wrappers: what will be put around it.
+        wrappers: the wrappers to put around it.
         num_envs: how many sub-environments a call steps.
 
     Raises:
         GymServerError: ``invalid_kwargs``.
     """
-    # What the arguments of other environments mean is not known. By default those run in a process
-    # of their own.
+    # The meaning of other environments' arguments is unknown. By default these run in their own
+    # process.
     if is_known(module_of(spec)):
         _check_length(kwargs)
-        # A step of Atari's own vector environment waits for so many sub-environments.
+        # A step of Atari's own vector environment waits for this many sub-environments.
         _check_sizes(kwargs, {**_ENVIRONMENT_LIMITS, "batch_size": (num_envs, num_envs)})
     _check_steps(spec, kwargs, wrappers, num_envs)
 
@@ -104,7 +104,7 @@ def check_wrapper(wrapper: Wrapper) -> None:
 
 
 def check_reset_options(env: gymnasium.Env | VectorEnv, options: dict | None) -> None:
-    """Refuse options of a reset that make a long loop.
+    """Refuse reset options that cause a long loop.
 
     Raises:
         GymServerError: ``invalid_parameter``.
@@ -126,15 +126,15 @@ def _check_length(kwargs: dict) -> None:
     if length > _LONGEST_ARGUMENTS:
         raise GymServerError(
             "invalid_kwargs",
-            f"kwargs must be of at most {_LONGEST_ARGUMENTS:,} characters of JSON, not {length:,}",
+            f"kwargs may have at most {_LONGEST_ARGUMENTS:,} characters of JSON, not {length:,}",
         )
 
 
 def _check_sizes(kwargs: dict, limits: Mapping[str, tuple[float, int]], prefix: str = "") -> None:
-    """Refuse arguments beyond their limits; the prefix begins the message."""
+    """Refuse arguments that are out of bounds; the message starts with the prefix."""
     for name, (least, most) in limits.items():
         for number in _numbers(kwargs.get(name)):
-            # NaN is refused as well.
+            # Refuses NaN, too.
             if not least <= number <= most:
                 must = f"at least {least}" if number < least else f"at most {most}"
                 raise GymServerError(
@@ -155,21 +155,21 @@ def _check_steps(spec: EnvSpec, kwargs: dict, wrappers: Sequence[Wrapper], num_e
             f"One call would take {_formatted(repeats * num_envs)} steps, by "
             + ", ".join(f"{name} {brief(value)}" for name, value in given)
             + (f" and {num_envs} sub-environments" if num_envs > 1 else ""),
-            f"it may take {MOST_REPEATS:,} of one environment, {MOST_STEPS:,} of all its "
+            f"at most {MOST_REPEATS:,} are allowed for one environment, {MOST_STEPS:,} for all "
             "sub-environments; repeat less and step more often",
         )
 
 
 def _numbers(value: object) -> Iterator[float]:
-    """Return the numbers in an argument, which may be a list of them."""
+    """Return the numbers in an argument, which may be a list."""
     value = parse_nonfinite(value)
     items = value if isinstance(value, list) else [value]
     return (item for item in items if isinstance(item, (int, float)))
 
 
 def _largest(value: object) -> float:
-    """Return the largest number in an argument; 0 when there is none."""
-    # 10**18 stands for all larger ones, because not every integer can be multiplied by every float.
+    """Return the largest number in an argument; 0 if there is none."""
+    # 10**18 stands for all larger numbers, because a large integer times a float may overflow.
     return max((min(number, 10**18) for number in _numbers(value)), default=0)
 
 

@@ -1,10 +1,10 @@
-"""The ids that the Atari games had in OpenAI's Gym, and the ids that they have today."""
+"""The Atari games' ids in OpenAI's Gym, and their ids today."""
 
 from __future__ import annotations
 
 import re
 
-# The games of Gym 0.21, whose ids stand in classic scripts. Gymnasium itself does not know them.
+# The games of Gym 0.21, whose ids appear in classic scripts. Gymnasium does not know these ids.
 _GAMES = """
     Adventure AirRaid Alien Amidar Assault Asterix Asteroids Atlantis BankHeist BattleZone
     BeamRider Berzerk Bowling Boxing Breakout Carnival Centipede ChopperCommand CrazyClimber
@@ -20,7 +20,7 @@ _CLASSIC = re.compile(r"(\w+?)(-ram)?(?:Deterministic|NoFrameskip)?(?:-v\d+)?", 
 
 
 def classic_game(name: str) -> tuple[str, bool] | None:
-    """Return today's id for a classic id of an Atari game, and whether it observes memory.
+    """Return today's id for a classic Atari id, and whether it observes the game's memory.
 
     Args:
         name: such as ``Breakout-v0`` or ``Pong-ramNoFrameskip-v4``.

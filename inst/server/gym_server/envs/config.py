@@ -21,18 +21,18 @@ class EnvConfig:
 
     Attributes:
         env_id: ``Name-v0``, or ``module:Name-v0`` for a module that registers it.
-        seed: for the first reset, unless that has one; for a vector environment also a tuple with
-            one for each sub-environment.
+        seed: the seed of the first reset, unless that has its own; for a vector environment also a
+            tuple with one per sub-environment.
         render_mode: "rgb_array", "human" (made as "rgb_array": the server opens no window), or None
-            for "rgb_array" where the environment can.
-        kwargs: handed to the environment.
-        wrappers: the first one is innermost.
-        num_envs: how many sub-environments; None for a single environment.
-        vectorization_mode: what runs the sub-environments; None for the fastest that fits.
-        num_workers: how many processes run the sub-environments; None to choose.
-        max_workers: the most that may be chosen.
-        autoreset_mode: when a sub-environment whose episode ended is reset; None for NEXT_STEP.
-        name: the client's own name for the environment.
+            for "rgb_array" if the environment supports it.
+        kwargs: arguments of the environment.
+        wrappers: the wrappers; the first one is innermost.
+        num_envs: the number of sub-environments; None for a single environment.
+        vectorization_mode: what runs the sub-environments; None for the fastest that works.
+        num_workers: the number of worker processes; None to choose.
+        max_workers: the largest number that may be chosen.
+        autoreset_mode: when to reset a sub-environment whose episode ended; None for NEXT_STEP.
+        name: the client's name for the environment.
     """
 
     env_id: object
@@ -49,5 +49,5 @@ class EnvConfig:
 
     @property
     def wants_workers(self) -> bool:
-        """Whether the client asked for processes of sub-environments."""
+        """Whether the client asked for worker processes."""
         return bool(self.num_workers) or self.vectorization_mode == "async"

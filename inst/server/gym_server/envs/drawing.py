@@ -1,4 +1,4 @@
-"""How an environment of this process is drawn, and closed in the end."""
+"""How to draw, and finally close, an environment of this process."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Drawing:
     """
 
     def __init__(self, renderer: RenderThread, drawn: bool = False) -> None:
-        """Begin with one that draws when it is stepped (``drawn``), or one that was not drawn."""
+        """Start with an environment that draws in each step (``drawn``), or was not drawn yet."""
         self._renderer = renderer
         self.drawn = drawn
         self.grown = 0
 
     def draw(self, render: Callable, *args: object) -> object:
-        """Return what a function draws."""
+        """Call a function that draws, and return the frame."""
         self.drawn = True
         frame, grown = self._renderer.run(measured, partial(render, *args))
         self.grown += grown

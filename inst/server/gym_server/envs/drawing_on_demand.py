@@ -1,7 +1,7 @@
-"""Let environments draw only when they are asked to, where the possibility alone takes time.
+"""Prepare environments for drawing only on demand, where being able to draw takes time.
 
-LunarLander adds sparks to its world in each step for as long as it has a render mode, which takes
-three times as long as the step without them and changes nothing else.
+While LunarLander has a render mode, it adds sparks to its world in each step. That triples the time
+of a step and changes nothing else.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ _DECORATING = ("gymnasium.envs.box2d.lunar_lander",)
 
 
 def save_drawing(env: gymnasium.Env) -> str | None:
-    """Take its render mode from an environment that works for it in each step.
+    """Remove the render mode of an environment that works for it in each step.
 
     Returns:
-        The render mode, for ``allow_drawing()``; None for an environment that is left as it is.
+        The render mode, for ``allow_drawing()``; None if the environment was not changed.
     """
     base = env.unwrapped
     if type(base).__module__ not in _DECORATING or draws_when_stepped(env):
@@ -27,6 +27,6 @@ def save_drawing(env: gymnasium.Env) -> str | None:
 
 
 def allow_drawing(env: gymnasium.Env, render_mode: str | None) -> None:
-    """Give it back the render mode that ``save_drawing()`` has taken."""
+    """Restore the render mode that ``save_drawing()`` removed."""
     if render_mode is not None:
         env.unwrapped.render_mode = render_mode

@@ -1,4 +1,4 @@
-"""The extras of the server's package: what environments need beyond its own dependencies."""
+"""The package's extras: what environments need beyond the server's own dependencies."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ REQUIREMENTS = {
     "video": ("moviepy",),
 }
 
-# By the package that an environment comes from: its extra, and the module that must be installed.
-# Toy text needs nothing beyond the server's own dependencies.
+# By the package of an environment: its extra, and the module that must be installed. Toy text needs
+# only the server's own dependencies.
 _PACKAGES = {
     "gymnasium.envs.box2d": ("box2d", "Box2D"),
     "gymnasium.envs.mujoco": ("mujoco", "mujoco"),
@@ -39,16 +39,15 @@ def extra_of(spec: EnvSpec) -> str | None:
 
 
 def is_available(spec: EnvSpec) -> bool:
-    """Tell whether what an environment needs is installed, without importing it."""
+    """Return whether an environment's requirements are installed, without importing them."""
     return why_unavailable(spec) is None
 
 
 def why_unavailable(spec: EnvSpec) -> str | None:
-    """Return why an environment cannot be made here, or None; nothing is imported."""
+    """Return why an environment cannot be made here, or None, without importing anything."""
     if not isinstance(spec.entry_point, str):
-        # For an environment that has moved to another package Gymnasium registers a function that
-        # raises an error.
-        # The type ignored: Gymnasium's protocol of a creator has no __name__.
+        # For environments that moved to another package, Gymnasium registers a function that
+        # raises. The type is ignored because Gymnasium's creator protocol has no __name__.
         moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")  # type: ignore[attr-defined]
         return "it is no longer part of Gymnasium" if moved else None
     extra, module = _needs(spec)
@@ -69,7 +68,7 @@ def _major_version(package: str) -> int:
 
 
 def missing_extra(what: str, extra: str) -> GymServerError:
-    """Something needs an extra of the server that is not installed."""
+    """Report an extra of the server that is not installed."""
     return GymServerError(
         "missing_dependency",
         f"{what} needs the server's extra '{extra}'",
@@ -79,7 +78,7 @@ def missing_extra(what: str, extra: str) -> GymServerError:
 
 
 def how_to_install(extra: str) -> str:
-    """Say by which command an extra is installed for this Python; uv's environments lack pip."""
+    """Return the command that installs an extra for this Python; uv's environments lack pip."""
     wanted = " ".join(f'"{requirement}"' for requirement in REQUIREMENTS[extra])
     if _is_installed("pip"):
         return f'in a terminal: "{sys.executable}" -m pip install {wanted}'
@@ -87,7 +86,7 @@ def how_to_install(extra: str) -> str:
 
 
 def unmet_module(spec: EnvSpec) -> str | None:
-    """Return a module that an environment needs, if it is not installed and no extra has it."""
+    """Return a module that an environment needs and that no extra installs, if it is missing."""
     extra, module = _needs(spec)
     return module if extra is None and module and not _is_installed(module) else None
 
@@ -101,7 +100,7 @@ def _needs(spec: EnvSpec) -> tuple[str | None, str | None]:
 
 
 def _is_installed(module: str) -> bool:
-    # Only the package itself is looked for: to look for its submodules would import it.
+    # Look only for the top-level package: looking for submodules would import it.
     package = module.partition(".")[0]
     if package in sys.modules:
         return sys.modules[package] is not None

@@ -1,4 +1,4 @@
-"""Make an environment from its id, and explain what is wrong with an id that names none."""
+"""Make an environment from its id, and explain what is wrong with an unknown id."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def make_env(
 
     Args:
         config: what the client chose.
-        allowed_modules: names of the modules that an id may import.
-        memory: what reserves its memory.
+        allowed_modules: the modules that an id may import.
+        memory: reserves the environment's memory.
 
     Raises:
         GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
@@ -51,18 +51,18 @@ def make_env(
 
 
 def check_kwargs(kwargs: dict) -> None:
-    """Raise ``invalid_kwargs`` for an argument that is a parameter of its own."""
+    """Raise ``invalid_kwargs`` for an argument that is a request parameter."""
     if "render_mode" in kwargs:
         raise GymServerError(
             "invalid_kwargs",
-            "kwargs must not carry 'render_mode'",
-            "render_mode is a parameter of its own",
+            "kwargs must not contain 'render_mode'",
+            "send render_mode as its own parameter",
         )
 
 
 @contextlib.contextmanager
 def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
-    """Name the extra of the server in a ``missing_dependency`` that the extra would prevent."""
+    """Name the server's extra in a ``missing_dependency`` error if that extra would help."""
     try:
         yield
     except GymServerError as refusal:
@@ -80,7 +80,7 @@ def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
 
 
 def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
-    """Return the spec of an id, after importing its module when it names one.
+    """Return the spec of an id; first import its module if it names one.
 
     Raises:
         GymServerError: as for ``make_env()``.
@@ -167,7 +167,7 @@ def _load_creator(spec: registration.EnvSpec) -> Callable:
         importlib.import_module("gymnasium.wrappers")
         if callable(spec.entry_point):
             return spec.entry_point
-        # Gymnasium has it as text where it is not callable.
+        # If it is not callable, it is a string.
         entry_point = cast(str, spec.entry_point)
         if extra_of(spec) != "mujoco":
             return registration.load_env_creator(entry_point)
@@ -181,18 +181,18 @@ def _load_creator(spec: registration.EnvSpec) -> Callable:
 def choose_render_mode(
     creator: Callable, spec: registration.EnvSpec, wanted: str | None
 ) -> str | None:
-    """Return the render_mode to make an environment with.
+    """Return the render_mode for making an environment.
 
     Args:
-        creator: what makes it; its metadata lists its render modes.
-        spec: its spec, for its name.
+        creator: its class or function; its metadata lists the render modes.
+        spec: the environment's spec.
         wanted: the client's render_mode; see ``EnvConfig``.
 
     Raises:
         GymServerError: ``invalid_parameter``.
     """
     metadata = getattr(creator, "metadata", None)
-    # A function has no metadata. Then Gymnasium decides what becomes of the client's render_mode.
+    # A function has no metadata. Then Gymnasium handles the client's render_mode.
     modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
     if wanted is None:
         return "rgb_array" if modes and "rgb_array" in modes else None
@@ -211,7 +211,7 @@ def make_from_spec(
     Raises:
         GymServerError: ``missing_dependency``, ``invalid_kwargs``, ``environment_error``.
     """
-    # The checker takes time in each step, and would fill the server's log.
+    # The checker slows each step, and would fill the server's log.
     ours: dict[str, Any] = {"disable_env_checker": True}
     if render_mode is not None:
         ours["render_mode"] = render_mode
@@ -256,11 +256,11 @@ _ABOUT_ARGUMENTS = ("unexpected keyword argument", "multiple values for", "requi
 
 
 def call_env(function: Callable[..., ResultT], *args: object) -> ResultT:
-    """Call a function of Gymnasium or of an environment; translate what it raises.
+    """Call a function of Gymnasium or of an environment; translate its exceptions.
 
     Raises:
-        GymServerError: ``missing_dependency`` or ``environment_error``, or one that the function
-            raises itself.
+        GymServerError: ``missing_dependency``, ``environment_error``, or the function's own
+            GymServerError.
     """
     try:
         return function(*args)
@@ -269,6 +269,6 @@ def call_env(function: Callable[..., ResultT], *args: object) -> ResultT:
     except (error.DependencyNotInstalled, ImportError) as failure:
         raise GymServerError("missing_dependency", str(failure)) from failure
     except BaseException as failure:
-        # KeyboardInterrupt and SystemExit are translated, too: a signal handler takes Ctrl-C here,
-        # so only an environment can raise them, and its client needs an answer.
+        # Includes KeyboardInterrupt and SystemExit: a signal handler takes Ctrl-C, so only an
+        # environment can raise them, and its client needs a response.
         raise environment_error(failure) from failure

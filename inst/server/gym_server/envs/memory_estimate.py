@@ -1,8 +1,8 @@
-"""Estimates of the memory that an environment will take, made before it takes it.
+"""Estimates of the memory that an environment will need, before it is made.
 
-An estimate is the most that the environment and one answer in JSON need at the same time. The
-figures for the environments themselves were measured as the growth of a process with each further
-environment (Gymnasium 1.4, ale_py 0.12), and rounded up.
+An estimate covers the environment and one JSON response at the same time. The figures for the
+environments were measured as the growth of a process per environment (Gymnasium 1.4, ale_py 0.12),
+and rounded up.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ _KB, _MB = 2**10, 2**20
 _TOY_TEXT = "gymnasium.envs.toy_text"
 _MUJOCO = "gymnasium.envs.mujoco"
 
-# By the beginning of the module's name, the more particular one before the more general one;
-# environments of all others are small.
+# By a prefix of the module's name, specific ones first. All other environments are small.
 _ENVIRONMENT_BYTES = {
     f"{_TOY_TEXT}.taxi": 1 * _MB,
     _TOY_TEXT: 128 * _KB,
@@ -35,37 +34,35 @@ _ENVIRONMENT_BYTES = {
 }
 _OTHER_ENVIRONMENT_BYTES = 16 * _KB
 
-# What MuJoCo takes for each pixel when it draws a picture larger than usual: the figures above are
-# of environments that nobody draws, and what drawing takes is measured afterwards (``Account``).
+# MuJoCo's memory per pixel for pictures larger than usual. The figures above are of environments
+# that are not drawn; the memory of drawing is measured afterwards (``Account``).
 _PIXEL_BYTES = 72
 _USUAL_PIXELS = 480 * 480
 
-# A map of FrozenLake becomes a table of transitions, and each of its letters takes this much there.
-# The figures above include arguments that are no longer than _FREE_ARGUMENT_LETTERS.
+# A FrozenLake map becomes a table of transitions, which takes this much per letter. The figures
+# above include arguments of up to _FREE_ARGUMENT_LETTERS.
 _ARGUMENT_LETTER_BYTES = 2 * _KB
 _FREE_ARGUMENT_LETTERS = 64
 
-# What a transition takes in the answer that holds all of them: in the columns, and while they are
-# written as JSON. Of 20,000 and more of them each takes less.
+# The memory of a transition in the response that holds all of them: in columns, and while they are
+# written as JSON. Measured for 20,000 and more, of which each takes less.
 _TRANSITION_BYTES = 544
 
-# A wrapper's arguments may be arrays of bounds: the bytes per digit that they are written in.
+# A wrapper's arguments may be arrays of bounds: the bytes per written digit.
 _WRAPPER_LETTER_BYTES = 16
 _WRAPPER_BYTES = 1 * _KB
 
-# Each part of a space is an object, and there are three arrays of its size: its two bounds, and an
-# observation.
+# Each part of a space is an object with three arrays of its size: two bounds and an observation.
 _PART_BYTES = 512
 _COPIES = 3
 
-# What a number takes that is sent as JSON: an object in a list (Python keeps small integers in any
-# case), its digits in a text, and again as bytes; and its two bounds as such objects in the space's
-# description.
+# The memory of a number sent as JSON: an object in a list (Python caches small integers), its
+# digits as text and as bytes; and two such objects for its bounds in the space's description.
 _SHORT_NUMBER_BYTES, _NUMBER_BYTES = 44 + 16, 80 + 64
 
 
 def environment_bytes(spec: EnvSpec, kwargs: dict) -> float:
-    """Estimate an environment without its observations."""
+    """Estimate the memory of an environment without its observations."""
     module = module_of(spec)
     letters = len(json.dumps(kwargs, default=str))
     for beginning, size in _ENVIRONMENT_BYTES.items():
@@ -81,7 +78,7 @@ def _picture_bytes(kwargs: dict) -> float:
 
 
 def model_bytes(env: gymnasium.Env) -> float:
-    """Estimate the answer that holds the transition model of an environment of Gymnasium's."""
+    """Estimate the response with the transition model of one of Gymnasium's environments."""
     base: Any = env.unwrapped
     if not type(base).__module__.startswith(_TOY_TEXT) or not hasattr(base, "P"):
         return 0
@@ -90,17 +87,17 @@ def model_bytes(env: gymnasium.Env) -> float:
 
 
 def vector_bytes(spec: EnvSpec, kwargs: dict) -> float:
-    """Estimate a sub-environment of an environment's own vector implementation."""
+    """Estimate one sub-environment of an environment's own vector implementation."""
     if module_of(spec).partition(".")[0] != "ale_py":
         return environment_bytes(spec, kwargs)
-    # Atari's implementation stacks pictures, whose size and number are arguments.
+    # Atari's implementation stacks pictures; their size and number are arguments.
     sides = [_number(kwargs.get(f"img_{side}", 84)) for side in ("height", "width")]
     frames = _number(kwargs.get("stack_num", 4)) * (1 if kwargs.get("grayscale", True) else 3)
     return environment_bytes(spec, kwargs) + _COPIES * frames * math.prod(sides)
 
 
 def answer_bytes(space: gymnasium.Space) -> float:
-    """Estimate an observation of one sub-environment on its way to the client."""
+    """Estimate an observation of one sub-environment, including its response."""
     return sum(
         _PART_BYTES
         + _COPIES * elements * size
@@ -110,24 +107,24 @@ def answer_bytes(space: gymnasium.Space) -> float:
 
 
 def observation_bytes(space: gymnasium.Space) -> float:
-    """Return how many bytes an observation has."""
+    """Return the size of an observation in bytes."""
     return sum(elements * size for elements, size in _parts(space))
 
 
 class WrapperBytes(NamedTuple):
-    """What a wrapper takes, in bytes: for as long as it exists, and for an answer."""
+    """The memory of a wrapper in bytes: while it exists, and for a response."""
 
     kept: float
     answer: float
 
 
 def wrapper_bytes(name: str, kwargs: dict, env: gymnasium.Env) -> WrapperBytes:
-    """Estimate a wrapper around an environment, before it is made.
+    """Estimate a wrapper before it is made.
 
     Args:
-        name: the wrapper's.
-        kwargs: what it gets.
-        env: what it is put around.
+        name: the wrapper's name.
+        kwargs: its arguments.
+        env: the environment to wrap.
     """
     space = env.observation_space
     elements = sum(elements for elements, _ in _parts(space))
@@ -137,7 +134,7 @@ def wrapper_bytes(name: str, kwargs: dict, env: gymnasium.Env) -> WrapperBytes:
         case "FrameStackObservation":
             size = _number(kwargs.get("stack_size"))
             elements, observation = elements * size, observation * size
-            # It keeps the last ones, and an array for all of them.
+            # It keeps the last observations, and an array for all of them.
             queue = 2 * observation
         case "DelayObservation":
             queue = observation * _number(kwargs.get("delay"))
@@ -164,7 +161,7 @@ def wrapper_bytes(name: str, kwargs: dict, env: gymnasium.Env) -> WrapperBytes:
 
 
 def _parts(space: gymnasium.Space) -> Iterator[tuple[float, int]]:
-    """Return how many elements each part of a space has, and how many bytes one of them has."""
+    """Yield the number of elements of each part of a space, and the bytes of one element."""
     waiting = [space]
     while waiting:
         match waiting.pop():
@@ -201,7 +198,7 @@ def _channels(space: gymnasium.Space) -> int:
 
 
 def _product(shape: object) -> float:
-    """Return how many pixels there are in a picture of a shape, or of the length of its sides."""
+    """Return the number of pixels, given a picture's shape or the length of its sides."""
     sides = shape if isinstance(shape, list) else [shape, shape]
     return math.prod(map(_number, sides))
 

@@ -1,4 +1,4 @@
-"""The memory that one creation reserves before it takes it."""
+"""The memory that creating an environment reserves in advance."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ _MB = 2**20
 
 
 class TooLargeHereError(GymServerError):
-    """What is being created is too large for this process, and is to be made in another one."""
+    """The environment is too large for this process and must be made in another one."""
 
 
 class MemoryReservation:
-    """What one creation takes of the budget of all environments.
+    """The share of the memory budget that one creation takes.
 
     Attributes:
-        taken: how many bytes that are.
+        taken: the bytes taken so far.
     """
 
     def __init__(
@@ -27,9 +27,9 @@ class MemoryReservation:
         """Start with nothing taken.
 
         Args:
-            budget: what it takes from; None for one without a limit.
+            budget: the budget; None for no limit.
             num_envs: how many sub-environments ``reserve()`` reserves for.
-            most_here: how many bytes one of them may take, to be made in this process.
+            most_here: the most bytes that one of them may take in this process.
         """
         self._budget = budget or Budget()
         self._num_envs = num_envs
@@ -40,13 +40,13 @@ class MemoryReservation:
         """Take memory for a part of each sub-environment, before that part is made.
 
         Args:
-            size: bytes of one of them.
-            what: names the part in a refusal.
-            later: bytes that will be reserved later, for which there must be room already.
+            size: the bytes for one sub-environment.
+            what: the part's name in an error.
+            later: bytes to be reserved later, which must already be available.
 
         Raises:
             GymServerError: ``too_much_memory``.
-            TooLargeHereError: there is room for it, but not in this process.
+            TooLargeHereError: there is enough memory, but not in this process.
         """
         self.take((size + later) * self._num_envs, what)
         if self.taken > self._most_here * self._num_envs:
@@ -55,13 +55,13 @@ class MemoryReservation:
         self._budget.give_back(later * self._num_envs)
 
     def take(self, size: float, what: str) -> None:
-        """Take memory for all sub-environments together; see ``reserve()``."""
+        """Take memory for all sub-environments at once; see ``reserve()``."""
         if not self._budget.take(size):
             raise self._refusal(size, what)
         self.taken += size
 
     def give_back(self) -> None:
-        """Give everything back."""
+        """Return everything to the budget."""
         taken, self.taken = self.taken, 0.0
         self._budget.give_back(taken)
 

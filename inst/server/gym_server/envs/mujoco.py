@@ -1,4 +1,4 @@
-"""Prepare MuJoCo for a server: OpenGL without a display, for several environments; its warnings."""
+"""Prepare MuJoCo for a server: OpenGL without a display, several environments, its warnings."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _EGL_PLATFORM_DEVICE_EXT = 0x313F
 
 
 def choose_gl() -> None:
-    """Set MUJOCO_GL to the kind of OpenGL that works here, unless it is set already.
+    """Set MUJOCO_GL to a kind of OpenGL that works here, unless it is already set.
 
-    MuJoCo reads the variable when it is first imported.  Without it MuJoCo opens a window, which
-    fails on a Linux machine without a display, and ends the process on macOS, where only the main
-    thread may open windows.
+    MuJoCo reads the variable when it is first imported. Without it MuJoCo opens a window. That
+    fails on Linux without a display, and ends the process on macOS, where only the main thread may
+    open windows.
     """
     if "MUJOCO_GL" in os.environ:
         return
@@ -41,11 +41,11 @@ def log_warnings() -> None:
 
 
 def draw_in_own_context() -> None:
-    """Let every environment draw, and free what it drew with, in its own OpenGL context.
+    """Make every environment draw, and free its resources, in its own OpenGL context.
 
-    Gymnasium leaves the context current that was used last, so that an environment draws in that
-    of another one. And what a closed environment drew with is freed when Python collects it, in
-    whatever context is current then: the environment that has it draws black pictures from then on.
+    Gymnasium leaves the last used context current, so one environment draws in another's. The
+    resources of a closed environment are freed when Python collects it, in whatever context is
+    current then. The environment that owns that context draws black pictures from then on.
     """
     from gymnasium.envs.mujoco import mujoco_rendering
 
@@ -54,7 +54,7 @@ def draw_in_own_context() -> None:
     if getattr(original, "draws_in_own_context", False):
         return
 
-    # The class is known only where MuJoCo is installed.
+    # The base class is known only if MuJoCo is installed.
     class OwnContextViewer(original):  # type: ignore[misc]
         con: Any
         draws_in_own_context = True
@@ -78,7 +78,7 @@ def _has_display() -> bool:
 
 
 def _choose_cgl() -> None:
-    # Gymnasium's list of renderers lacks macOS's renderer that needs no window.
+    # Gymnasium's list of renderers lacks the one that needs no window on macOS.
     os.environ["MUJOCO_GL"] = "cgl"
     from gymnasium.envs.mujoco import mujoco_rendering
     from mujoco.cgl import GLContext
@@ -87,7 +87,7 @@ def _choose_cgl() -> None:
 
 
 def _has_egl() -> bool:
-    """Tell whether EGL has a device that MuJoCo will be able to open."""
+    """Return whether EGL has a device that MuJoCo can open."""
     try:
         egl = ctypes.CDLL("libEGL.so.1")
     except OSError:

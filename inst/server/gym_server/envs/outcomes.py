@@ -1,4 +1,4 @@
-"""What an environment returns from a reset or a step beside the observation."""
+"""Check the rewards and infos that environments return."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gym_server.json_values import brief
 
 
 def reward_number(reward: Any) -> float:
-    """Return a reward as a number, also where it is an array of one.
+    """Return a reward as a number; it may be an array with one element.
 
     Raises:
         GymServerError: ``environment_error``.
@@ -22,12 +22,12 @@ def reward_number(reward: Any) -> float:
     except (TypeError, ValueError):
         raise GymServerError(
             "environment_error",
-            f"A reward must be a number, and the environment's is {brief(reward)}",
+            f"A reward must be a number, and the environment returned {brief(reward)}",
         ) from None
 
 
 def checked_info(info: Any) -> Any:
-    """Return an info, which is a dict.
+    """Return an info after checking that it is a dict.
 
     Raises:
         GymServerError: ``environment_error``.
@@ -36,6 +36,6 @@ def checked_info(info: Any) -> Any:
         return info
     raise GymServerError(
         "environment_error",
-        f"An info must be a dict, and the environment's is {brief(info)}",
-        "return {} where there is nothing to tell",
+        f"An info must be a dict, and the environment returned {brief(info)}",
+        "return {} for an empty info",
     )

@@ -1,7 +1,7 @@
-"""Let environments choose from short lists as fast as they draw a number.
+"""Make choices from short lists as fast as drawing a number.
 
-For each card Blackjack calls ``np_random.choice()`` of a list, which NumPy first makes an array of.
-That takes five times as long as to draw the card, and half of an episode.
+For each card, Blackjack calls ``np_random.choice()`` with a list, which NumPy first converts to an
+array. That takes five times as long as drawing the card, and half of the time of an episode.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ _CHOOSING = ("gymnasium.envs.toy_text.blackjack",)
 
 
 class QuickChoice(Generator):
-    """A generator whose ``choice()`` of a list draws what NumPy's does, and leaves it a list."""
+    """A generator whose ``choice()`` draws the same as NumPy's without converting a list."""
 
     def choice(self, a: Any, *args: Any, **kwargs: Any) -> Any:
-        """Return one of ``a``, or what NumPy returns for more arguments."""
+        """Return an element of ``a``; with more arguments, call NumPy's ``choice()``."""
         if type(a) is list and not args and not kwargs:
             return a[self.integers(0, len(a))]
         return super().choice(a, *args, **kwargs)

@@ -23,27 +23,27 @@ log = logging.getLogger(__name__)
 # The packages whose environments and arguments the server knows.
 _KNOWN_PACKAGES = ("gymnasium", "ale_py")
 
-# Held during imports. Python releases its own import locks where modules import each other in a
-# circle, as Gymnasium's do, and a second thread could use a module that is not complete.
+# Held during imports. For circular imports, such as Gymnasium's, Python releases its import locks,
+# and a second thread could use an incomplete module.
 importing = threading.RLock()
 
-# Longer ids are not looked up: to find ids that resemble them would take seconds.
+# Longer ids are not looked up, because finding similar ids would take seconds.
 LONGEST_ID = 200
 
-# Packages that register a namespace. Since Gymnasium 1.0 it does not import them by itself.
+# Packages that register a namespace. Since 1.0, Gymnasium does not import them.
 _PACKAGES = {"ALE": "ale_py"}
 
-# They make environments of older Gyms, when shimmy is installed. Their argument env_id can name any
-# module to import, also one that the operator has not allowed.
+# With shimmy installed, these make environments of older Gyms. Their argument env_id can import any
+# module, even one that the operator has not allowed.
 _UNGUARDED = ("GymV21Environment", "GymV26Environment")
 _WHY_UNGUARDED = "may import any module that its env_id names, so this server makes none"
 
 
 def look_up(name: str) -> EnvSpec:
-    """Return the spec of an id; the newest version when the id names none.
+    """Return the spec of an id; the newest version if the id names none.
 
     Raises:
-        gymnasium.error.Error: when nothing is registered under it.
+        gymnasium.error.Error: the id is not registered.
         GymServerError: ``missing_dependency``, ``module_not_allowed``.
     """
     namespace, bare_name, _ = registration.parse_env_id(name)
@@ -62,7 +62,7 @@ def look_up(name: str) -> EnvSpec:
 
 
 def _require_atari(name: str, namespace: str | None) -> None:
-    """Raise ``missing_dependency`` for an Atari game when its extra is missing."""
+    """Raise ``missing_dependency`` for an Atari game if the extra is missing."""
     if _PACKAGES["ALE"] in _registered:
         return
     if namespace == "ALE":
@@ -75,7 +75,7 @@ _registered: set[str] = set()
 
 
 def _register_packages() -> None:
-    """Import the installed packages among those that register environments."""
+    """Import the packages that register environments, if they are installed."""
     for package in _PACKAGES.values():
         if package not in _registered:
             with contextlib.suppress(ImportError):
@@ -84,7 +84,7 @@ def _register_packages() -> None:
 
 
 def _with_version(name: str) -> str:
-    """Return the newest version of an id that names none, as Gymnasium does."""
+    """Add the newest version to an id without one, as Gymnasium does."""
     namespace, bare_name, version = registration.parse_env_id(name)
     if version is None and name not in gymnasium.registry:
         version = registration.find_highest_version(namespace, bare_name)
@@ -92,9 +92,9 @@ def _with_version(name: str) -> str:
 
 
 def near(name: str, limit: int = 3) -> list[str]:
-    """Return the ids that are most like a name, the nearest first.
+    """Return the ids that are most similar to a name, most similar first.
 
-    Those that no extra of the server could make are left out.
+    Leaves out ids that no extra of the server can make.
     """
     ids = [i for i, spec in gymnasium.registry.items() if extra_of(spec) or is_available(spec)]
     found = difflib.get_close_matches(name, ids, n=limit, cutoff=0.6)
@@ -106,13 +106,12 @@ def near(name: str, limit: int = 3) -> list[str]:
 
 
 def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
-    """Return what is registered, one object for each environment.
+    """Return the registered environments, one object each.
 
     Args:
-        text: a part of the id, in lower or upper case; when no id contains it, the nearest ids
-            are returned. None for all. A text longer than any id is refused: to find ids near it
-            would take seconds.
-        allowed_modules: modules that the operator allowed; their environments are listed, too.
+        text: a part of the id, ignoring case; None for all. If no id contains it, the most similar
+            ids are returned. Must not be longer than the longest id.
+        allowed_modules: modules that the operator allowed; their environments are included.
 
     Raises:
         GymServerError: ``invalid_parameter``.
@@ -160,5 +159,5 @@ def module_of(spec: EnvSpec) -> str:
 
 
 def is_known(module: str) -> bool:
-    """Tell whether a module belongs to a package whose environments the server knows."""
+    """Return whether a module belongs to a package whose environments the server knows."""
     return module.partition(".")[0] in _KNOWN_PACKAGES

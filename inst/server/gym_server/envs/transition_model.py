@@ -1,8 +1,8 @@
-"""The transition model of an environment that has a table of it, as Gymnasium's toy-text ones do.
+"""The transition model of an environment with a table of it, such as Gymnasium's toy-text ones.
 
-The table is the environment's ``P``, where ``P[state][action]`` lists ``(probability, next_state,
-reward, terminated)``. Beside it ``initial_state_distrib`` holds the probability of each state to be
-the first of an episode.
+The table is the attribute ``P``: ``P[state][action]`` lists ``(probability, next_state, reward,
+terminated)``. The attribute ``initial_state_distrib`` holds the probability that an episode starts
+in each state.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from gym_server.json_values import brief
 
 _COLUMNS = ("state", "action", "next_state", "probability", "reward", "terminated")
 
-# The largest map of FrozenLake that can be made has 750,000 of them.
+# The largest FrozenLake map that can be made has 750,000.
 _MOST_TRANSITIONS = 1_000_000
 
-# How far from 1 the sum of probabilities may be that were rounded.
+# How far the sum of rounded probabilities may be from 1.
 _ROUNDING = 1e-6
 
 
 def transition_model(env: gymnasium.Env, env_id: str) -> dict:
-    """Return the transition model of an environment; a limit of time is no part of it.
+    """Return the transition model of an environment, without its time limit.
 
     Args:
         env: the environment, with its wrappers.
-        env_id: its name, for the errors.
+        env_id: its name, for errors.
 
     Returns:
         ``{"num_states", "num_actions", "start", "state", "action", "next_state", "probability",
-        "reward", "terminated"}``, all of them Python's own numbers: how many states and actions
-        there are; the probability of each state to be the first; and columns with one element for
-        each transition of a probability above 0, by state, action, and the order in the table.
+        "reward", "terminated"}``, all Python numbers: the number of states and actions; the
+        probability of starting in each state; and columns with one element per transition with a
+        probability above 0, sorted by state, action, and position in the table.
 
     Raises:
         GymServerError: ``not_supported``.
@@ -51,8 +51,8 @@ def transition_model(env: gymnasium.Env, env_id: str) -> dict:
         raise GymServerError(
             "not_supported",
             f"{env_id} has no table of its transitions",
-            "FrozenLake, CliffWalking and Taxi have one, and so has every environment with the "
-            "attributes P and initial_state_distrib and Discrete spaces that begin at 0",
+            "FrozenLake, CliffWalking and Taxi have one, and so does every environment with the "
+            "attributes P and initial_state_distrib and Discrete spaces that start at 0",
         )
     _check_table_holds(env, env_id)
     try:
@@ -61,39 +61,39 @@ def transition_model(env: gymnasium.Env, env_id: str) -> dict:
     except _UnsoundError as fault:
         raise GymServerError(
             "not_supported",
-            f"The table of the transitions of {env_id} is unsound: {fault}",
+            f"The transition table of {env_id} is invalid: {fault}",
             "P[state][action] must list (probability, next_state, reward, terminated), and "
-            "probabilities must add up to 1; its arguments may be the reason",
+            "probabilities must add up to 1; the environment's arguments may be the cause",
         ) from None
     return {"num_states": num_states, "num_actions": num_actions, "start": first, **columns}
 
 
 def _size(space: gymnasium.Space) -> int:
-    """Return how many members a Discrete space has that begins at 0; 0 for any other space."""
+    """Return the number of members of a Discrete space that starts at 0; 0 for other spaces."""
     return int(space.n) if isinstance(space, Discrete) and space.start == 0 else 0
 
 
 def _check_table_holds(env: gymnasium.Env, env_id: str) -> None:
-    """Refuse an environment that moves in other ways than its table says."""
+    """Refuse an environment whose transitions differ from its table."""
     wrapper = changing_wrapper(env)
     if wrapper is not None:
         raise GymServerError(
             "not_supported",
-            f"The table of the transitions of {env_id} does not hold with its wrapper {wrapper}",
-            "create it without this wrapper; TimeLimit and RecordEpisodeStatistics may stay",
+            f"The transition table of {env_id} is wrong with its wrapper {wrapper}",
+            "create it without this wrapper; TimeLimit and RecordEpisodeStatistics are allowed",
         )
-    # Taxi's passenger changes the destination after the move that the table has, and whether that
-    # will happen is not a part of the state.
+    # Taxi's passenger may change the destination after a move, and whether this will happen is not
+    # part of the state.
     if getattr(env.unwrapped, "fickle_passenger", False):
         raise GymServerError(
             "not_supported",
-            f"The table of the transitions of {env_id} does not hold with a fickle_passenger",
+            f"The transition table of {env_id} is wrong with fickle_passenger",
             "create it without fickle_passenger",
         )
 
 
 class _UnsoundError(Exception):
-    """A table is none of a transition model."""
+    """A table is not a valid transition model."""
 
 
 def _start(distribution: object, num_states: int) -> list[float]:
@@ -105,7 +105,7 @@ def _start(distribution: object, num_states: int) -> list[float]:
         )
     start = [_number(probability) for probability in distribution]
     if not all(probability >= 0 for probability in start):
-        raise _UnsoundError("initial_state_distrib holds something that is no probability")
+        raise _UnsoundError("initial_state_distrib holds a value that is not a probability")
     _check_sum("initial_state_distrib", sum(start))
     return start
 
@@ -117,8 +117,8 @@ def _columns(transitions: Iterable[tuple], env_id: str) -> dict[str, list]:
         if count == _MOST_TRANSITIONS:
             raise GymServerError(
                 "not_supported",
-                f"{env_id} has more than {_MOST_TRANSITIONS:,} transitions, the most that an "
-                "answer may hold",
+                f"{env_id} has more than {_MOST_TRANSITIONS:,} transitions, the most that a "
+                "response may hold",
                 "create one with fewer states",
             )
         for append, value in zip(appends, transition, strict=True):
@@ -133,7 +133,7 @@ def _transitions(table: dict, num_states: int, num_actions: int) -> Iterator[tup
             name = f"P[{state}][{action}]"
             outcomes = actions.get(action) if isinstance(actions, dict) else None
             if not isinstance(outcomes, (list, tuple)):
-                raise _UnsoundError(f"{name} is no list")
+                raise _UnsoundError(f"{name} is not a list")
             total = 0.0
             for outcome in outcomes:
                 probability, next_state, reward, terminated = _read(outcome, num_states, name)
@@ -159,7 +159,7 @@ def _read(outcome: object, num_states: int, name: str) -> tuple[float, int, floa
 
 
 def _number(value: object) -> float:
-    """Return a number as a float; NaN for what is none."""
+    """Return a number as a float; NaN for anything else."""
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         try:
             return float(value)

@@ -1,6 +1,6 @@
-"""Arguments that an environment's constructor wants as tuples: JSON has lists only.
+"""Convert lists, the only sequences in JSON, to tuples where a constructor requires tuples.
 
-Most constructors take any sequence, but some ask whether it is a tuple, such as Atari's for its
+Most constructors accept any sequence, but some check for a tuple, such as Atari's for its
 ``frameskip``.
 """
 
@@ -13,10 +13,10 @@ from collections.abc import Callable
 
 
 def with_tuples(creator: Callable, kwargs: dict) -> dict:
-    """Return the arguments with tuples in place of lists where the constructor asks for tuples.
+    """Convert lists in the arguments to tuples where the constructor requires tuples.
 
-    It does where the default is a tuple, or where the annotation names tuples and no other type
-    that a list belongs to.
+    It does if the default is a tuple, or if the annotation has tuples and no type that accepts a
+    list.
 
     Args:
         creator: the class or function that makes the environment.
@@ -32,8 +32,8 @@ def with_tuples(creator: Callable, kwargs: dict) -> dict:
 
 
 def _parameters(creator: Callable) -> typing.Mapping[str, inspect.Parameter]:
-    # An annotation may be a text that names what is imported for type checkers only, or anything
-    # else.
+    # Evaluating an annotation fails if it is a string with names that are imported only for type
+    # checkers, or for any other reason.
     for eval_str in (True, False):
         try:
             return inspect.signature(creator, eval_str=eval_str).parameters

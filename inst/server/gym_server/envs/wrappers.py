@@ -19,9 +19,9 @@ from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.json_values import parse_nonfinite
 
-# Wrappers whose arguments are numbers, texts and lists, and which keep one environment one
-# environment and write no files.  Not among them: Autoreset, whose resets no client would see;
-# wrappers that take functions or devices; wrappers that open windows.
+# Wrappers whose arguments are numbers, strings and lists, that keep a single environment, and that
+# write no files. Excluded are Autoreset, whose resets clients would not see, wrappers that take
+# functions or devices, and wrappers that open windows.
 _ALLOWED = (
     "AddRenderObservation",
     "AddWhiteNoise",
@@ -51,7 +51,7 @@ _ALLOWED = (
     "TimeLimit",
 )
 
-# Arguments whose lists become arrays of a space's dtype. Gymnasium wants other lists as tuples.
+# Arguments whose lists become arrays of a space's dtype. Gymnasium expects other lists as tuples.
 _ARRAYS = {
     "min_action": "action_space",
     "max_action": "action_space",
@@ -59,7 +59,7 @@ _ARRAYS = {
     "max_obs": "observation_space",
 }
 
-# Each takes time in each step.
+# Each wrapper slows each step.
 _MOST_WRAPPERS = 32
 
 # Wrappers that draw when they are made and in each step.
@@ -68,8 +68,7 @@ _DRAWING = ("AddRenderObservation",)
 # Wrappers that keep observations of earlier steps.
 _KEEPING = ("DelayObservation", "FrameStackObservation")
 
-# Wrappers that leave observations, actions and rewards as they are. The first two are Gymnasium's
-# own additions.
+# Wrappers that do not change observations, actions or rewards. Gymnasium itself adds the first two.
 _UNCHANGING = (
     gymnasium.wrappers.OrderEnforcing,
     gymnasium.wrappers.PassiveEnvChecker,
@@ -77,24 +76,24 @@ _UNCHANGING = (
     gymnasium.wrappers.TimeLimit,
 )
 
-# Environments that draw their own observation, a picture, in each step.
+# Environments that draw their observation, a picture, in each step.
 _DRAWING_ENVIRONMENTS = ("gymnasium.envs.box2d.car_racing",)
 
 
 class _CopiedObservations(gymnasium.ObservationWrapper):
-    """Keeps an environment from changing in place what it has observed before."""
+    """Copies observations, in case the environment changes them in place later."""
 
     def observation(self, observation: Any) -> Any:
         return copy.deepcopy(observation)
 
 
 def allowed() -> list[str]:
-    """Return the names of the wrappers that this Gymnasium has and a client may choose."""
+    """Return the wrappers that a client may choose and that this Gymnasium has."""
     return [name for name in _ALLOWED if hasattr(gymnasium.wrappers, name)]
 
 
 def check(wrappers: Sequence[Wrapper]) -> None:
-    """Refuse a wrapper that is not on the list, and too many of them.
+    """Refuse wrappers that are not allowed, and too many wrappers.
 
     Raises:
         GymServerError: ``wrapper_not_allowed``, ``invalid_parameter``.
@@ -109,8 +108,8 @@ def check(wrappers: Sequence[Wrapper]) -> None:
         if wrapper.name not in allowed():
             raise GymServerError(
                 "wrapper_not_allowed",
-                f"The wrapper '{wrapper.name}' is none that this server takes",
-                f"it takes {', '.join(allowed())}",
+                f"This server does not allow the wrapper '{wrapper.name}'",
+                f"it allows {', '.join(allowed())}",
             )
 
 
@@ -124,9 +123,9 @@ def wrap(
 
     Args:
         env: the environment.
-        wrappers: what is put around it.
-        renderer: where wrappers that draw are made; a ``RenderThread``, or what stands for it.
-        memory: what reserves the memory of the wrappers; None where it has been reserved.
+        wrappers: the wrappers.
+        renderer: the ``RenderThread`` for wrappers that draw, or a substitute.
+        memory: reserves the wrappers' memory; None if that is already reserved.
 
     Raises:
         GymServerError: ``invalid_kwargs``, ``missing_dependency``, ``too_much_memory``.
@@ -142,10 +141,9 @@ def wrap(
 
 
 def time_limit(env: gymnasium.Env) -> int | None:
-    """Return the smallest time limit of an environment and the wrappers around it, or None.
+    """Return the smallest time limit of an environment and its wrappers, or None.
 
-    The spec of each layer knows the outermost limit below it, so the specs of all layers together
-    know every limit.
+    Each layer's spec has the outermost limit below it, so all specs together have every limit.
     """
     limits = [env.spec.max_episode_steps if env.spec else None]
     while isinstance(env, gymnasium.Wrapper):
@@ -155,13 +153,13 @@ def time_limit(env: gymnasium.Env) -> int | None:
 
 
 def changing_wrapper(env: gymnasium.Env) -> str | None:
-    """Return the name of a wrapper that may change observations, actions or rewards, or None.
+    """Return the outermost wrapper that may change observations, actions or rewards, or None.
 
-    That is the outermost one that is not known to leave them as they are.
+    Unknown wrappers are assumed to do so.
     """
     base = env.unwrapped
     while env is not base:
-        # Others may call theirs by the same names, or derive from them.
+        # Compare types exactly: other wrappers may have the same name, or be subclasses.
         if not isinstance(env, gymnasium.Wrapper) or type(env) not in _UNCHANGING:
             return type(env).__name__
         env = env.env
@@ -169,7 +167,7 @@ def changing_wrapper(env: gymnasium.Env) -> str | None:
 
 
 def draws_when_stepped(env: gymnasium.Env) -> bool:
-    """Tell whether an environment draws in each reset and step, not only in ``render()``."""
+    """Return whether an environment draws in each reset and step, not only in ``render()``."""
     if type(env.unwrapped).__module__ in _DRAWING_ENVIRONMENTS:
         return True
     while isinstance(env, gymnasium.Wrapper):
@@ -182,7 +180,7 @@ def draws_when_stepped(env: gymnasium.Env) -> bool:
 def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None) -> gymnasium.Env:
     kind = getattr(gymnasium.wrappers, wrapper.name)
     try:
-        # Of two mistakes, an unknown argument and a missing one, the unknown one is reported.
+        # bind_partial() first: report an unknown argument before a missing one.
         inspect.signature(kind).bind_partial(env, **wrapper.kwargs)
         inspect.signature(kind).bind(env, **wrapper.kwargs)
     except TypeError as failure:
@@ -198,10 +196,10 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None
         wrapped: gymnasium.Env = kind(env, **arguments)
         return wrapped
     except error.DependencyNotInstalled as failure:
-        # Wrappers that lack a dependency lack OpenCV, which this extra of ours installs.
+        # The only dependency that these wrappers may lack is OpenCV, which this extra installs.
         raise missing_extra(wrapper.name, "atari") from failure
     except Exception as failure:
-        words = str(failure) or "it says no more"
+        words = str(failure) or "no reason given"
         raise GymServerError(
             "invalid_kwargs",
             f"{wrapper.name} cannot wrap this environment: {type(failure).__name__}: {words}",
@@ -213,12 +211,12 @@ def _argument(env: gymnasium.Env, name: str, value: object) -> object:
     if isinstance(value, list):
         items = [_argument(env, name, item) for item in value]
         return _array(getattr(env, _ARRAYS[name]), items) if name in _ARRAYS else tuple(items)
-    # Many wrappers insist on integers, and a client may write 4 as 4.0.
+    # Many wrappers insist on integers, and a client may send 4 as 4.0.
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _array(space: gymnasium.Space, items: list) -> np.ndarray:
     array = np.array(items)
-    # Gymnasium would warn that precision is lost, where none is.
+    # Otherwise Gymnasium warns about lost precision, even if none is lost.
     is_float = space.dtype is not None and space.dtype.kind == "f"
     return array.astype(space.dtype) if is_float else array

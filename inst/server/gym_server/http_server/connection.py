@@ -1,4 +1,4 @@
-"""One client's connection: its requests come in, their answers go out, in a thread of its own."""
+"""One client's connection: reads its requests and sends the responses, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -20,58 +20,58 @@ from gym_server.http_server.interface import Application
 from gym_server.http_server.request_parser import Request, RequestParser
 from gym_server.response import Response
 
-# Seconds that a connection may be idle.
+# The longest that a connection may be idle, in seconds.
 _IDLE_SECONDS = 3600.0
 
-# Seconds that nothing may come of a begun request, and that nothing may be read of an answer;
-# and how many bytes a second there must be beyond that, on the whole.
+# A client may pause this long, in seconds, while it sends a request or reads a response. Overall it
+# must move at least this many bytes a second.
 _REST_SECONDS = 60.0
 _SLOWEST_BYTES = 1000
 
-# Seconds for all that comes and goes while the client is not recognized, however it comes. Longer
-# than the proxy of inst/examples/nginx.conf keeps a connection that is idle.
+# How long a client that is not recognized may use the connection, in seconds, whatever it does.
+# Longer than the proxy of inst/examples/nginx.conf keeps an idle connection.
 _UNRECOGNIZED_SECONDS = 20.0
 
-# When an answer was not read for so long, the client is slow, and not the network.
+# When a response has been unread for this long, the client is slow and not the network.
 _UNREAD_SECONDS = 1.0
 
-# Seconds that it may take to send the answer of a thread that is stuck.
+# The longest time to send the response of a stuck thread, in seconds.
 _STUCK_ANSWER_SECONDS = 1.0
 
-# The header of answers that are worth nothing later.
+# The header of responses that need not be delivered after the server has stopped.
 _NO_STORE = ("Cache-Control", "no-store")
 
 _RECEIVE_BYTES = 2**16
 
-# An answer's body that is copied behind its head, so that both go in one piece.
+# Bodies up to this size are copied behind their head, to send both in one piece.
 _COPIED_BYTES = 2**16
 
-# How much of an answer the system takes beyond what is on its way. It takes more when half of that
-# is gone, so a client that reads as slowly as it may is seen to read within half a minute.
+# How much of a response the system buffers beyond what is in flight. It takes more when half of
+# that is gone, so even the slowest reader allowed is seen to read within half a minute.
 _UNSENT_BYTES = 2**16
 
-# With this option closing discards what was not read; the system would keep it for minutes.
+# With this option, closing a socket discards unread data instead of keeping it for minutes.
 _DISCARD_UNREAD = struct.pack("hh" if os.name == "nt" else "ii", 1, 0)
 
 
 class _Pace:
-    """How long to wait for the rest of what comes or goes in parts.
+    """How long to wait for the next part of a request or response.
 
-    A client that sends or reads drop by drop is treated as one that does nothing.
+    A client that sends or reads byte by byte is treated like one that does nothing.
     """
 
     def __init__(self) -> None:
-        """Begin now."""
+        """Start the clock."""
         self._due = time.monotonic() + _REST_SECONDS
 
     def left(self, moved: int) -> float:
         """Return how many seconds the next part may take.
 
         Args:
-            moved: how many bytes have come or gone since the last call.
+            moved: the bytes sent or received since the last call.
 
         Raises:
-            TimeoutError: it is too slow.
+            TimeoutError: the client is too slow.
         """
         self._due += moved / _SLOWEST_BYTES
         left = min(_REST_SECONDS, self._due - time.monotonic())
@@ -81,7 +81,7 @@ class _Pace:
 
 
 class Connection:
-    """Serves the requests of one socket, one after the other."""
+    """Serves the requests of one socket, one after another."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class Connection:
         Args:
             client: the socket.
             app: the application.
-            base_environ: what is the same in the environment of each request.
+            base_environ: the entries that the environ of every request shares.
             max_body_bytes: the size of the largest body.
             bodies: the memory that large bodies hold until they are answered.
         """
@@ -105,33 +105,33 @@ class Connection:
         self._base_environ = base_environ
         self._parser = RequestParser(max_body_bytes, self._send, self._refusal, bodies, app.refuse)
         self._is_recognized = False
-        # When its time is over if it is not recognized until then, in the clock's seconds.
+        # The deadline for being recognized, in the clock's seconds.
         self._due = time.monotonic() + _UNRECOGNIZED_SECONDS
         self._last: Request | None = None
         self._last_environ: dict = {}
         self._stopping = False
-        # Whether it works on a request, and does not wait for its client.
+        # Whether it is working on a request rather than waiting for its client.
         self._busy = False
-        # The size of the answer that is being sent, as a list's only item. list.pop() succeeds in
-        # one thread only: in the serving thread when all is sent, and the connection goes on; or in
-        # the thread that evicts this connection because the answer is not read.
+        # The size of the response that is being sent, as the only item of a list. Two threads may
+        # call list.pop(): the serving thread when everything is sent, and the thread that evicts
+        # this connection because the response is not read. It succeeds in only one of them.
         self._sending: list[int] = []
-        # Whether what is sent is worth nothing later.
+        # Whether the response being sent need not be delivered after a stop.
         self._sends_no_store = False
-        # The request that waits for its answer, as a list's only item; see answer_for().
+        # The request that waits for its response, as the only item of a list; see answer_for().
         self._unanswered: list[Request] = []
-        # The identity of the thread that serves it.
+        # The identity of the serving thread.
         self.thread = 0
-        # Since when it has waited for its client, in the clock's seconds.
+        # Since when it has been waiting for its client, in the clock's seconds.
         self.waiting_since = time.monotonic()
 
     @property
     def unsent_bytes(self) -> int:
-        """The size of the answer that its client has not read to the end."""
+        """The size of the response that its client has not yet read."""
         return sum(self._sending)
 
     def _wait_at_most(self, seconds: float) -> None:
-        """Set how long the socket may take for the next part that comes or goes."""
+        """Set how long the socket may take to send or receive the next part."""
         if not self._is_recognized:
             seconds = min(seconds, self._due - time.monotonic())
             if seconds <= 0:
@@ -139,9 +139,9 @@ class Connection:
         self._socket.settimeout(seconds)
 
     def serve(self) -> None:
-        """Answer until the client leaves, is silent for too long, or the server stops."""
+        """Answer requests until the client leaves, is silent for too long, or the server stops."""
         self.thread = threading.get_ident()
-        # A client that has left needs no answer, so errors of its socket are ignored.
+        # A client that has left needs no response, so socket errors are ignored.
         with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if hasattr(socket, "TCP_NOTSENT_LOWAT"):
@@ -157,7 +157,7 @@ class Connection:
                     self.waiting_since = time.monotonic()
                 self._busy = False
                 if not self._parser.began:
-                    # For a client that plays the socket is set already.
+                    # For a recognized client the timeout is already set.
                     if rest is not None or not self._is_recognized:
                         self._wait_at_most(_REST_SECONDS)
                     rest = None
@@ -176,7 +176,7 @@ class Connection:
                     raise
 
     def _refusal(self, request: Request) -> Response | None:
-        """Return the response that refuses a request, before its large body has come."""
+        """Return a response that refuses a request before its large body arrives, or None."""
         try:
             environ = {**self._base_environ, **request.environ()}
         except HttpParserError as error:
@@ -200,12 +200,12 @@ class Connection:
         try:
             self._unanswered.pop()
         except IndexError:
-            # It took so long that answer_for() has answered.
+            # answer_for() has answered, because it took too long.
             return False
         keep = request.keep_alive and self._is_recognized and not self._stopping
         self._sends_no_store = _NO_STORE in response.headers
         head, body = _head(response, keep), b"" if request.method == "HEAD" else response.body
-        # In one piece, where that is not much to copy: what follows the head would come later.
+        # One send() where the copy is cheap: a second one would arrive later.
         if len(body) <= _COPIED_BYTES:
             self._send(head + body)
         else:
@@ -214,7 +214,7 @@ class Connection:
         return keep
 
     def _send(self, data: bytes, more: bytes = b"") -> None:
-        """Send all of it to a client that reads it, however slowly within reason."""
+        """Send everything to a client that keeps reading."""
         self.waiting_since = time.monotonic()
         self._sending.append(len(data) + len(more))
         try:
@@ -237,17 +237,17 @@ class Connection:
         self._wait_at_most(_REST_SECONDS)
 
     def answer_for(self, response: Response) -> None:
-        """Answer on behalf of the serving thread, which is stuck in the application; then close.
+        """Answer for the serving thread, which is stuck in the application; then close.
 
-        Both threads may come to answer the same request:
+        Both threads may try to answer the same request:
 
         1. The serving thread puts the request into ``_unanswered`` and calls the application.
         2. Another thread decides that this takes too long, and calls ``answer_for()``.
-        3. The application may come back at this very moment, so both threads try to take the
-           request out of the list. Only one of them can.
-        4. The thread that took it out sends its answer. If that is the serving thread,
-           ``answer_for()`` does nothing. If it is the other, that closes the socket, and the
-           serving thread, if the application ever comes back, finds the list empty and ends.
+        3. The application may return at this moment. Both threads then try to take the request
+           out of the list, and only one of them succeeds.
+        4. The thread that took it sends its response. If that is the serving thread,
+           ``answer_for()`` does nothing. Otherwise ``answer_for()`` closes the socket, and the
+           serving thread ends when it returns from the application and finds the list empty.
         """
         try:
             request = self._unanswered.pop()
@@ -271,7 +271,7 @@ class Connection:
         return self._app.respond(environ)
 
     def _environ(self, request: Request) -> dict:
-        # A client that plays sends the same head with each step.
+        # A client that plays sends the same head with every step.
         if not (self._last is not None and request.same_head(self._last)):
             self._last, self._last_environ = request, {**self._base_environ, **request.environ()}
         body = bytes(request.body)
@@ -284,7 +284,7 @@ class Connection:
         }
 
     def _is_connected(self) -> bool:
-        """Tell whether the client has not closed its end; the serving thread may ask."""
+        """Return whether the client's end is still open; called by the serving thread."""
         seconds = self._socket.gettimeout()
         try:
             self._socket.settimeout(0)
@@ -298,10 +298,10 @@ class Connection:
                 self._socket.settimeout(seconds)
 
     def eviction_rank(self, now: float) -> tuple[int, float] | None:
-        """Return what is the smaller, the sooner it is to be evicted; None if it is not to be now.
+        """Return a key to sort connections for eviction, smallest first; None if not evictable.
 
-        First come connections whose client is not recognized, then those whose client does not
-        read its answer, then idle ones; of each kind the one that has waited longest is first.
+        Connections of unrecognized clients come first, then those whose client does not read its
+        response, then idle ones. Among equals, the one that has waited longest is first.
 
         Args:
             now: the clock's seconds.
@@ -309,12 +309,12 @@ class Connection:
         is_slow = now > self.waiting_since + _UNREAD_SECONDS
         if self._busy and not (self._sending and is_slow):
             return None
-        # The client of a new connection may be recognized in a moment.
+        # The client of a new connection may soon be recognized.
         is_foreign = is_slow and not self._is_recognized
         return (0 if is_foreign else 1 if self._busy else 2), self.waiting_since
 
     def evict(self) -> bool:
-        """End it if it only waits for its client; return whether that is so."""
+        """End the connection if it is only waiting for its client; return whether it did."""
         how = socket.SHUT_RD
         if self._busy:
             try:
@@ -323,16 +323,16 @@ class Connection:
                 return False
             how = socket.SHUT_RDWR
         with contextlib.suppress(OSError):
-            # What an idle client has just sent is still answered.
+            # A request that an idle client has just sent is still answered.
             self._socket.shutdown(how)
         return True
 
     def stop(self, half_sent: bool) -> None:
-        """Make ``serve()`` end when the requests that have arrived are answered.
+        """Make ``serve()`` end once it has answered the requests that have arrived.
 
         Args:
-            half_sent: whether to drop a request of which only a part has arrived, and an answer
-                that is worth nothing later and is not read.
+            half_sent: whether to drop requests that have only partly arrived, and unread
+                responses that need not be delivered.
         """
         self._stopping = True
         if self._busy and self._sends_no_store and half_sent:
@@ -343,13 +343,13 @@ class Connection:
                 self._socket.shutdown(socket.SHUT_RD)
 
 
-# In capitals, as Flask writes it and classic clients show it.
+# In capitals, as in Flask's responses, and as classic clients show them.
 _STATUS_LINES = {one.value: f"HTTP/1.1 {one.value} {one.phrase.upper()}" for one in HTTPStatus}
 _NO_CONTENT = HTTPStatus.NO_CONTENT.value
 
 
 def _head(response: Response, keep: bool) -> bytes:
-    """Return what comes before the body."""
+    """Return the status line and headers."""
     head = f"{_STATUS_LINES[response.status]}\r\nContent-Type: {response.content_type}\r\n"
     if response.status != _NO_CONTENT:
         head += f"Content-Length: {len(response.body)}\r\n"

@@ -1,4 +1,4 @@
-"""The connections of a server, and which of them are evicted when more clients come."""
+"""The connections of a server, and which of them to evict when more clients come."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from collections import Counter
 
 from gym_server.http_server.connection import Connection
 
-# Threads that only wait for their client cost some memory.
+# Each thread that waits for its client costs some memory.
 MOST_CONNECTIONS = 4000
 
-# One address leaves as many to all others. It may be a proxy's, and then all clients come from it;
-# they hardly send two thousand requests in the same moment.
+# Leaves as many for all other addresses. The address may be a proxy's, which all clients come from;
+# they are unlikely to send two thousand requests at once.
 MOST_OF_ONE_ADDRESS = MOST_CONNECTIONS // 2
 
-# How many are evicted at once.
+# The number of connections evicted at once.
 EVICTED_AT_ONCE = 100
 
-# The size of all answers that their clients have not read to the end.
+# The total size of responses that clients have not yet read.
 MOST_UNSENT_BYTES = 2**28
 
-# How long make_room() waits for the evicted to end, or for one that can be evicted next time.
+# How long make_room() waits for evicted connections to end, or for an evictable one to appear.
 _MOMENT_SECONDS = 0.1
 
 
 class Connections:
-    """The connections of a server; each is there until its thread has ended."""
+    """The connections of a server, each until its thread has ended."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Start with none."""
         self._all: set[Connection] = set()
-        # Those that were not evicted, with the address that each comes from.
+        # Those that were not evicted, each with its owner, see _owner().
         self._remaining: dict[Connection, str] = {}
         self._of_address: Counter[str] = Counter()
         self._changed = threading.Condition()
@@ -41,13 +41,13 @@ class Connections:
         return len(self._all)
 
     def add(self, connection: Connection, address: str) -> bool:
-        """Take one in; return whether its address may have one more.
+        """Add a connection; return False if its address already has too many.
 
-        To make room for it, only connections of the same address are evicted.
+        Makes room by evicting connections of the same address only.
 
         Args:
             connection: the connection.
-            address: its client's.
+            address: its client's address.
         """
         owner = _owner(address)
         with self._changed:
@@ -59,30 +59,30 @@ class Connections:
             return True
 
     def remove(self, connection: Connection) -> None:
-        """Forget one, which has ended."""
+        """Remove a connection that has ended."""
         with self._changed:
             self._all.discard(connection)
             self._uncount(connection)
             self._changed.notify()
 
     def served_by(self, thread: int) -> list[Connection]:
-        """Return those that this thread serves."""
+        """Return the connections that this thread serves."""
         with self._changed:
             return [one for one in self._all if one.thread == thread]
 
     def make_room(self) -> None:
-        """Evict some, and wait a moment for them to end."""
+        """Evict some connections, and wait briefly for them to end."""
         with self._changed:
             self._evict_some()
             self._changed.wait(_MOMENT_SECONDS)
 
     def _evict_some(self, owner: str | None = None) -> int:
-        """Evict in the order of ``Connection.eviction_rank()``; return how many.
+        """Evict in the order of ``Connection.eviction_rank()``; return the number evicted.
 
         Their clients may connect again.
 
         Args:
-            owner: whose connections; None for anybody's.
+            owner: evict connections of this owner only; None for any owner.
         """
         now = time.monotonic()
         ranks = {
@@ -111,7 +111,7 @@ class Connections:
                 del self._of_address[owner]
 
     def evict_unread(self) -> None:
-        """Evict those that wait longest for their answer to be read, while unread ones are many."""
+        """Evict the slowest readers while unread responses exceed their limit."""
         now = time.monotonic()
         with self._changed:
             unread = [one for one in self._remaining if one.unsent_bytes]
@@ -124,11 +124,11 @@ class Connections:
                     excess -= size
 
     def drain(self, grace: float, half_sent_seconds: float) -> bool:
-        """End all that have nothing under way; return whether all have ended in time.
+        """End all connections without a request in progress; return whether all ended in time.
 
         Args:
-            grace: seconds that requests under way may take.
-            half_sent_seconds: after how many those are dropped of which only a part has come.
+            grace: seconds for requests in progress to finish.
+            half_sent_seconds: seconds after which partly received requests are dropped.
         """
         stopped = time.monotonic()
         with self._changed:
@@ -141,7 +141,7 @@ class Connections:
 
 
 def _owner(address: str) -> str:
-    """Return what the addresses of one owner have in common: in IPv6 a network has 2^64 of them."""
+    """Return what an owner's addresses share: in IPv6 an owner has a network of 2^64 addresses."""
     ip = ipaddress.ip_address(address.partition("%")[0])
     if isinstance(ip, ipaddress.IPv6Address) and ip.ipv4_mapped is None:
         return str(ipaddress.ip_network((ip, 64), strict=False))

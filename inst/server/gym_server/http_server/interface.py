@@ -1,4 +1,4 @@
-"""What the server asks of its application."""
+"""What the server needs from its application."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from gym_server.response import Response
 
 
 class Application(Protocol):
-    """Makes the responses; an environment is a request as WSGI has it."""
+    """Makes the responses. A request is given as a WSGI environ."""
 
     def respond(self, environ: dict) -> Response:
-        """Answer a request, whatever goes wrong with it."""
+        """Answer a request; never raise."""
 
     def admit(self, environ: dict) -> Response | None:
-        """Return what refuses a request whose large body is still to come; None to read it."""
+        """Return a response that refuses a request before its large body is read, or None."""
 
     def recognizes(self, environ: dict) -> bool:
-        """Tell whether a client may stay connected; others get one answer and have less time."""
+        """Return whether a client may stay connected; others get one response and less time."""
 
     def refuse(self, status: int, reason: str) -> Response:
-        """Answer what does not become a request: 400 for a reason, 413 or 503."""
+        """Answer bytes that are not a request: 400 with a reason, 413 or 503."""
 
     def begin_stop(self) -> None:
-        """Let those requests end soon that would otherwise wait for longer than the stop takes."""
+        """End requests soon that would otherwise wait for longer than the stop takes."""

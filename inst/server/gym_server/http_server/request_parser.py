@@ -1,4 +1,4 @@
-"""Bytes become requests, by httptools (which is llhttp, the parser of Node.js)."""
+"""Parse bytes into requests with httptools (llhttp, the parser of Node.js)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gym_server.response import Response
 
 _LARGEST_HEAD_BYTES = 2**16
 
-# Browsers send some twenty, and a proxy adds a few. Each line takes far more memory than its bytes.
+# Browsers send about twenty, and proxies add a few. A line takes far more memory than its bytes.
 _MOST_HEAD_LINES = 100
 
-# A body of this size is read without asking whether the request is admitted, and whether there is
-# memory left for it; of a larger one memory is taken in pieces of this size.
+# Bodies up to this size are read without asking whether the request is admitted and whether memory
+# is left. Larger bodies take memory in pieces of this size.
 _SMALL_BODY_BYTES = 2**16
 
-# So much of a refused body is read and thrown away, so that its sender gets to see the answer.
+# How much of a refused body is read and discarded, so that its sender sees the response.
 _DISCARD_BYTES = 2**30
 
 # The headers that ask for another protocol.
@@ -30,17 +30,17 @@ class Request:
     """A request as it was read.
 
     Attributes:
-        url: as it was sent.
+        url: the URL as it was sent.
         headers: names in lower case, and values.
-        head_bytes: the size of the URL, and of these names and values.
-        body: what has come of it.
-        body_bytes: the size of all that has come of it, also of what was thrown away.
-        held_bytes: the memory that was taken for it.
+        head_bytes: the size of the URL and all header names and values.
+        body: the part of the body that has arrived.
+        body_bytes: the size of the body so far, including discarded bytes.
+        held_bytes: the memory taken for the body.
         method: such as "GET"; empty until the head is complete.
-        version: of HTTP, such as "1.1".
-        keep_alive: whether the client wants the connection to stay.
-        was_checked: whether it was asked whether the request is admitted.
-        refusal: the response, if the request is not handed to the application.
+        version: the HTTP version, such as "1.1".
+        keep_alive: whether the client wants to keep the connection.
+        was_checked: whether the application was asked to admit the request.
+        refusal: a response that is sent instead of calling the application.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class Request:
         self.refusal: Response | None = None
 
     def same_head(self, other: Request) -> bool:
-        """Tell whether another request has the same head."""
+        """Return whether another request has the same head."""
         return (
             self.url == other.url
             and self.headers == other.headers
@@ -66,7 +66,7 @@ class Request:
         )
 
     def add(self, data: bytes) -> None:
-        """Take a piece of the body; most come in one, which is not copied."""
+        """Add a piece of the body. Most bodies come in one piece, which is not copied."""
         if not self.body:
             self.body = data
             return
@@ -75,7 +75,7 @@ class Request:
         self.body += data
 
     def plain_head(self) -> bytes:
-        """Return its head without the headers that ask for another protocol."""
+        """Return the head without the headers that ask for another protocol."""
         lines = [b"%s %s HTTP/%s" % (self.method.encode(), self.url, self.version.encode())]
         others = [header for header in self.headers if header[0] not in _UPGRADE_HEADERS]
         lines += [b": ".join(header) for header in others]
@@ -91,7 +91,7 @@ class Request:
         ]
 
     def environ(self) -> dict:
-        """Return what WSGI's environment holds of its head."""
+        """Return the WSGI environ entries for the head."""
         path, query = self._target()
         environ = {
             "REQUEST_METHOD": self.method,
@@ -100,13 +100,13 @@ class Request:
             "SERVER_PROTOCOL": f"HTTP/{self.version}",
         }
         for name, value in self.headers:
-            # A name with an underscore could not be told from another with a hyphen.
+            # In CGI names, an underscore cannot be told from a hyphen.
             if b"_" not in name:
                 key = "HTTP_" + name.decode("latin-1").upper().replace("-", "_")
                 text = value.decode("latin-1")
                 environ[key] = f"{environ[key]},{text}" if key in environ else text
         environ["CONTENT_TYPE"] = environ.pop("HTTP_CONTENT_TYPE", "")
-        # The body is handed on as a whole, so these two do not hold for it any more.
+        # The body is passed on complete and decoded, so these two no longer apply.
         environ.pop("HTTP_CONTENT_LENGTH", None)
         environ.pop("HTTP_TRANSFER_ENCODING", None)
         return environ
@@ -115,13 +115,13 @@ class Request:
         if self.url.startswith(b"/"):
             path, _, query = self.url.partition(b"?")
             return path, query
-        # An absolute URL, as clients send it to proxies.
+        # An absolute URL, as clients send it to a proxy.
         url = parse_url(self.url)
         return url.path or b"/", url.query or b""
 
 
 class RequestParser:
-    """Makes requests of bytes; httptools calls the methods that begin with ``on_``."""
+    """Turns bytes into requests; httptools calls the ``on_`` methods."""
 
     def __init__(
         self,
@@ -131,13 +131,13 @@ class RequestParser:
         bodies: Share,
         refuse: Callable[[int, str], Response],
     ) -> None:
-        """Begin to read.
+        """Start with no data.
 
         Args:
             max_body_bytes: the size of the largest body.
-            send: sends what has to be sent before a request is complete.
-            refusal: returns the response that refuses a request whose large body is still to come,
-                or None to let it pass.
+            send: sends bytes to the client before a request is complete.
+            refusal: returns a response that refuses a request before its large body is read, or
+                None to read it.
             bodies: the memory that large bodies hold.
             refuse: see ``Application.refuse()``.
         """
@@ -149,24 +149,23 @@ class RequestParser:
         self._parser = HttpRequestParser(self)
         self._request = Request()
         self._complete: list[Request] = []
-        # Bytes since the parser last reported something.
+        # Bytes since the parser last called an ``on_`` method.
         self._unreported_bytes = 0
-        # What is wrong with a request that httptools would take.
+        # The reason for rejecting a request that httptools would accept.
         self._fault = ""
-        # Whether a request has come in part.
+        # Whether part of a request has arrived.
         self.began = False
 
     def release(self, request: Request) -> None:
-        """Give back the memory that was taken for a request's body."""
+        """Release the memory taken for a request's body."""
         self._bodies.give_back(request.held_bytes)
         request.held_bytes = 0
 
     def close(self) -> None:
-        """Give back all memory, also that of a request that has come in part.
+        """Release all memory, including that of a partly received request.
 
-        httptools' parser and the connection refer to this object, and it refers to them. Without
-        this cut all of them, and the bodies that they hold, would stay until Python collects
-        garbage.
+        The parser, the connection and this object refer to each other. Without breaking this
+        cycle, they and the bodies they hold would stay until Python's garbage collection.
         """
         self._bodies.give_all_back()
         self._parser = HttpRequestParser(None)
@@ -176,7 +175,7 @@ class RequestParser:
         self._complete = []
 
     def feed(self, data: bytes) -> list[Request]:
-        """Take what has arrived; return the requests that are complete with it."""
+        """Parse received bytes; return the requests they complete."""
         self._complete = []
         self._unreported_bytes += len(data)
         try:
@@ -189,13 +188,13 @@ class RequestParser:
         return self._complete
 
     def _parse(self, data: bytes) -> bytes:
-        """Parse; return what is left."""
+        """Parse bytes; return those that must be parsed again."""
         try:
             self._parser.feed_data(data)
         except HttpParserUpgrade as upgrade:
-            # The client asks for a protocol that this server does not speak. httptools takes all
-            # that follows for that protocol, the request's body too. So a new parser gets the head
-            # once more without the headers that ask for it.
+            # The client asks for a protocol that this server does not speak. httptools then treats
+            # everything that follows as that protocol, including the request's body. So parse the
+            # head again without the headers that ask for it.
             request = self._complete.pop()
             if request.method == "CONNECT":
                 self._request = request
@@ -206,7 +205,7 @@ class RequestParser:
         return b""
 
     def _end_with(self, refusal: Response) -> None:
-        """Answer what has come so far, after which the connection closes."""
+        """Refuse the current request; the connection closes after the response."""
         self._request.refusal = refusal
         self._request.keep_alive = False
         self._finish()
@@ -217,11 +216,11 @@ class RequestParser:
         self.began = False
 
     def on_message_begin(self) -> None:
-        """Note that a request has begun."""
+        """Note that a request has started."""
         self.began = True
 
     def on_url(self, url: bytes) -> None:
-        """Take a piece of the URL."""
+        """Add a piece of the URL."""
         request = self._request
         request.url += url
         request.head_bytes += len(url)
@@ -229,8 +228,7 @@ class RequestParser:
             self._refuse_head()
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Take a header."""
-        # Those that come after a body in chunks are ignored.
+        """Add a header; ignore trailers, which follow a chunked body."""
         request = self._request
         if not request.method:
             request.headers.append((name.lower(), value))
@@ -247,17 +245,17 @@ class RequestParser:
         raise HttpParserError
 
     def on_headers_complete(self) -> None:
-        """Decide whether the body is wanted."""
+        """Decide whether to read the body."""
         self._unreported_bytes = 0
         request = self._request
         request.method = self._parser.get_method().decode("ascii")
         request.version = self._parser.get_http_version()
         if self._parser.should_upgrade():
-            # The head comes once more, see _parse().
+            # _parse() feeds the head again.
             return
         headers = dict(request.headers)
         if b"transfer-encoding" in headers and not _is_plainly_chunked(request):
-            # A proxy before this server might see its end elsewhere.
+            # A proxy in front of this server might disagree about where the body ends.
             self._fault = "it does not say in one way where it ends"
             raise HttpParserError
         self._check_size(int(headers.get(b"content-length", 0)))
@@ -268,7 +266,7 @@ class RequestParser:
                 self._send(b"HTTP/1.1 100 Continue\r\n\r\n")
 
     def on_body(self, data: bytes) -> None:
-        """Take a piece of the body."""
+        """Add a piece of the body."""
         self._unreported_bytes = 0
         request = self._request
         request.body_bytes += len(data)
@@ -297,15 +295,15 @@ class RequestParser:
             self._discard_body(self._refuse(503, ""))
 
     def _discard_body(self, refusal: Response) -> None:
-        """Throw away what comes of the body; its sender gets the answer at its end."""
+        """Discard the body as it arrives; its sender gets the response when it is done."""
         self._request.refusal = refusal
         self._request.body = b""
         self.release(self._request)
 
     def on_message_complete(self) -> None:
-        """Put the request with those that are complete."""
+        """Add the request to those that are complete."""
         self._unreported_bytes = 0
-        # A client of HTTP/1.0 would expect a header that says so.
+        # HTTP/1.0 clients expect a header for keep-alive, which this server does not send.
         self._request.keep_alive = (
             self._parser.should_keep_alive() and self._request.version == "1.1"
         )

@@ -1,4 +1,4 @@
-"""The server: a port, a thread for each connection, and a stop that loses no answer."""
+"""The server: a port, a thread per connection, and a stop that loses no response."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from gym_server.response import Response
 
 log = logging.getLogger(__name__)
 
-# Between two searches for clients that do not read their answers, and between two warnings.
+# The interval between two searches for slow readers, and between two warnings, in seconds.
 _SEARCH_SECONDS = 1.0
 _WARN_SECONDS = 10.0
 
-# After the stop a client that has sent half a request has this long to send the rest.
+# After the stop, a client that has sent part of a request gets this long to send the rest.
 _HALF_SENT_SECONDS = 2.0
 
 
@@ -33,11 +33,11 @@ def bind(host: str, port: int) -> socket.socket:
     """Bind a port for this process alone.
 
     Args:
-        host: an address, or a name that has one.
-        port: a number; 0 takes a free one.
+        host: an address, or a name that resolves to one.
+        port: a port number; 0 picks a free port.
 
     Returns:
-        A listening socket: from now on clients can connect.
+        A listening socket: clients can connect from now on.
 
     Raises:
         OSError: the port is taken, or the host is not an address of this machine.
@@ -48,11 +48,11 @@ def bind(host: str, port: int) -> socket.socket:
     listener = socket.socket(family, kind, protocol)
     try:
         if sys.platform == "win32":
-            # On Windows SO_REUSEADDR would let another process take the port over.
+            # With SO_REUSEADDR, Windows would let another process take over the port.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         else:
-            # A new server can start while connections of the old one linger. A port on which
-            # another process listens stays refused.
+            # Lets a new server start while connections of the old one linger. A port that another
+            # process listens on is still refused.
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(1024)
@@ -72,13 +72,13 @@ class Server:
         max_body_bytes: int,
         bodies: Budget,
     ) -> None:
-        """Prepare; ``run()`` serves.
+        """Prepare to serve; ``run()`` starts.
 
         Args:
             app: the application.
-            listener: a listening socket, as ``bind()`` returns it.
+            listener: a listening socket from ``bind()``.
             max_body_bytes: the size of the largest request body.
-            bodies: the memory for the bodies of all requests; small ones take none of it.
+            bodies: the memory for large request bodies; small ones are not counted.
         """
         self._app = app
         self._listener = listener
@@ -97,17 +97,17 @@ class Server:
         self._wake, self._waker = socket.socketpair()
 
     def stop(self) -> None:
-        """Ask ``run()`` to end; callable from any thread and signal handler."""
+        """Ask ``run()`` to end; may be called from any thread or signal handler."""
         self._stop_asked.set()
-        # After run() this socket is closed.
+        # run() closes this socket when it ends.
         with contextlib.suppress(OSError):
             self._waker.send(b"x")
 
     def run(self, grace: float) -> bool:
-        """Serve until ``stop()``, then answer the requests under way.
+        """Serve until ``stop()`` is called, then answer the requests in progress.
 
         Args:
-            grace: seconds that these may take.
+            grace: seconds for these requests to finish.
 
         Returns:
             Whether all of them were answered.
@@ -115,7 +115,7 @@ class Server:
         self._listener.setblocking(False)
         searched = time.monotonic()
         while not self._stop_asked.is_set():
-            # Windows handles a signal only when the wait is over.
+            # On Windows, signals are handled only after the wait.
             if self._listener in select.select([self._listener, self._wake], [], [], 1.0)[0]:
                 self._accept()
             if time.monotonic() > searched + _SEARCH_SECONDS:
@@ -128,14 +128,14 @@ class Server:
         return self._connections.drain(grace, _HALF_SENT_SECONDS)
 
     def answer_for(self, thread: int, response: Response) -> None:
-        """Answer on behalf of a thread that is stuck in the application."""
+        """Answer for a thread that is stuck in the application."""
         for connection in self._connections.served_by(thread):
             connection.answer_for(response)
             self._connections.remove(connection)
 
     def _accept(self) -> None:
         if len(self._connections) >= connections.MOST_CONNECTIONS:
-            # The others wait in the queue of the listening socket.
+            # Further clients wait in the socket's backlog.
             self._connections.make_room()
             return
         try:
@@ -144,7 +144,7 @@ class Server:
             if error.errno in (errno.EMFILE, errno.ENFILE):
                 self._warn("No more connections: this process may open no more files")
                 self._connections.make_room()
-            return  # Otherwise the client has left again.
+            return  # Otherwise the client has already left.
         client.setblocking(True)
         connection = Connection(
             client,
@@ -157,7 +157,7 @@ class Server:
             self._warn(f"No more connections from {address[0]}: all that it has are at work")
             client.close()
             return
-        # A daemon: a call of the application that never returns must not keep the process alive.
+        # A daemon thread, so that a call that never returns does not keep the process alive.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
             thread.start()
@@ -168,7 +168,7 @@ class Server:
             self._connections.make_room()
 
     def _warn(self, message: str) -> None:
-        # A client can cause this a thousand times a second.
+        # A client can trigger this a thousand times a second.
         if time.monotonic() > self._warned + _WARN_SECONDS:
             self._warned = time.monotonic()
             log.warning("%s", message)
@@ -177,6 +177,6 @@ class Server:
         try:
             connection.serve()
         except Exception:
-            log.exception("A connection ended by a fault of the server's own")
+            log.exception("A connection ended because of a bug in the server")
         finally:
             self._connections.remove(connection)

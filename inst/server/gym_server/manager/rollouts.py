@@ -220,7 +220,7 @@ class Rollouts:
             while self._take_turn(player):
                 self._play(player)
         except Exception:
-            log.exception("A fault of the server's own")
+            log.exception("A bug in the server")
         try:
             self._let_process_go(player)
         finally:

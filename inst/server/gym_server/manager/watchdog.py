@@ -69,7 +69,7 @@ class Watchdog:
             try:
                 self._check()
             except Exception:
-                log.exception("A fault of the server's own")
+                log.exception("A bug in the server")
 
     def _check(self) -> None:
         self._rollouts.kill_overdue(self._limits.max_call_seconds)

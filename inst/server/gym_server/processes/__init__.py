@@ -1,1 +1,1 @@
-"""Processes that the server starts, and the messages between it and them."""
+"""Processes that the server starts, and its messages to and from them."""

@@ -1,4 +1,4 @@
-"""How many cores this process may use, and which of them the processes use that it has started."""
+"""How many cores this process may use, and which of them its child processes use."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 
 def usable_cores(cgroup: Path = _CGROUP) -> int:
-    """Return how many cores this process may use: those of its affinity, within its cgroup's limit.
+    """Return how many cores this process may use: its affinity, capped by its cgroup's limit.
 
     Args:
-        cgroup: where the system shows control groups, of version 2 or 1.
+        cgroup: the mount point of control groups, version 1 or 2.
     """
     if hasattr(os, "sched_getaffinity"):
         cores = len(os.sched_getaffinity(0))
@@ -25,7 +25,7 @@ def usable_cores(cgroup: Path = _CGROUP) -> int:
 
 
 def _cgroup_limit(cgroup: Path) -> float:
-    """Return the limit in cores, infinity for none."""
+    """Return the limit in cores; infinity if there is none."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         quota, period = (cgroup / "cpu.max").read_text().split()
         return float(quota) / float(period) if quota != "max" else math.inf
@@ -37,11 +37,11 @@ def _cgroup_limit(cgroup: Path) -> float:
 
 
 def spread(pids: Sequence[int]) -> None:
-    """Give each of some processes cores of its own, of those that this process may use.
+    """Give each process its own share of the cores that this process may use.
 
-    They are woken at the same time, and Linux often wakes two of them on the same core and leaves
-    them there: a step of a LunarLander, one of 256 in two processes on two cores, took 36 us (three
-    runs of 78 steps of all), and takes 19 to 25 us since (two runs).
+    The processes are woken at the same time, and Linux often wakes two of them on the same core and
+    leaves them there. With 256 LunarLanders in two processes on two cores, a step of one took 36 us
+    (three runs of 78 steps of all), and takes 19 to 25 us with this (two runs).
     """
     if not hasattr(os, "sched_setaffinity"):
         return
@@ -50,6 +50,6 @@ def spread(pids: Sequence[int]) -> None:
         cores[place :: len(pids)] or [cores[place % len(cores)]] for place in range(len(pids))
     ]
     for pid, share in zip(pids, shares, strict=True):
-        # It may have ended, or be kept from it by the system's administrator.
+        # The process may have ended, or the administrator may forbid this.
         with contextlib.suppress(OSError):
             os.sched_setaffinity(pid, share)

@@ -1,4 +1,4 @@
-"""How much memory this process and those below it have to themselves, and giving it back."""
+"""How much memory this process and its descendants hold, and how to return it to the system."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import TypeVar
 
 ResultT = TypeVar("ResultT")
 
-# glibc's numbers of two settings of mallopt(), and our values. A block from _LARGE_BYTES on, such
-# as a request's body, is a mapping of its own, which goes back to the system when it is freed. A
-# pool keeps at most _FREE_BYTES free at its end.
+# glibc's numbers for two settings of mallopt(), and our values. A block of _LARGE_BYTES or more,
+# such as a request's body, gets its own mapping, which is returned to the system when it is freed.
+# A heap keeps at most _FREE_BYTES free at its end.
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES = 2**20
 _FREE_BYTES = 2**22
 
 
 def _glibc(name: str) -> Callable[..., int] | None:
-    # macOS, Windows and musl return memory without being asked, and have no such functions.
+    # macOS, Windows and musl have no such functions; they return memory by themselves.
     return getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
 
 
@@ -32,11 +32,11 @@ _mallopt = _glibc("mallopt")
 def prepare() -> None:
     """Prepare for ``give_back()``; call it once, when all modules are loaded.
 
-    The objects that exist now, most of them code, are taken out of later garbage collections: one
-    that finds nothing takes some microseconds instead of 25 ms, in which nothing is answered.
+    Exempts the objects that exist now, mostly code, from later garbage collections. A collection
+    that finds nothing then takes microseconds instead of 25 ms, in which no call is answered.
 
-    glibc's two thresholds are fixed, because it raises them to the size of blocks that were freed,
-    up to 32 MiB, and keeps that much at the end of each pool.
+    Fixes glibc's two thresholds. Otherwise glibc raises them to the size of freed blocks, up to 32
+    MiB, and keeps that much at the end of each heap.
     """
     gc.collect()
     gc.freeze()
@@ -46,16 +46,14 @@ def prepare() -> None:
 
 
 def give_back(garbage: bool = True) -> None:
-    """Collect the garbage and return free memory to the system.
+    """Collect garbage and return free memory to the system.
 
-    Environments refer to themselves in circles, so closed ones stay until Python's garbage
-    collection, which starts by the number of new objects and not by their size. And glibc has a
-    pool of memory for every few threads, and keeps what is free there for as long as any block
-    behind it is in use.
+    Environments contain reference cycles, so closed ones stay until Python collects garbage, which
+    depends on the number of new objects and not on their size. glibc has a heap for every few
+    threads, and keeps its free memory as long as any later block is in use.
 
     Args:
-        garbage: whether to collect the garbage first; the more objects there are, the longer it
-            takes.
+        garbage: whether to collect garbage first; takes longer the more objects there are.
     """
     if garbage:
         gc.collect()
@@ -70,19 +68,19 @@ _PAGE = os.sysconf("SC_PAGE_SIZE") if _MEASURES else 0
 
 
 def own_bytes() -> int:
-    """Return what this process has in memory and shares with no other; 0 where that is unknown."""
+    """Return the unshared memory of this process; 0 if unknown."""
     return _resident(os.getpid()) if _MEASURES else 0
 
 
 def measured(call: Callable[[], ResultT]) -> tuple[ResultT, int]:
-    """Call a function; return its result, and how many bytes this process has grown meanwhile."""
+    """Call a function; return its result, and by how many bytes this process grew meanwhile."""
     before = own_bytes()
     result = call()
     return result, own_bytes() - before
 
 
 def descendants(pid: int) -> dict[int, int]:
-    """Return the processes below one, each after and with the one that started it."""
+    """Return the descendants of a process, each with its parent, and after it."""
     children: dict[int, list[int]] = defaultdict(list)
     for child, parent in _parents() if _MEASURES else ():
         children[parent].append(child)
@@ -97,12 +95,12 @@ def descendants(pid: int) -> dict[int, int]:
 
 
 def bytes_of(pid: int, exactly: bool) -> int:
-    """Return what a process has in memory and shares with no other; 0 for one that is gone.
+    """Return the unshared memory of a process; 0 if it has ended.
 
     Args:
         pid: its number.
-        exactly: whether to leave out the pages that a fork shares with its parent until one of them
-            writes there, which takes a millisecond or more.
+        exactly: whether to exclude pages that a fork still shares with its parent, which takes a
+            millisecond or more.
     """
     if not exactly:
         return _resident(pid)
@@ -123,7 +121,7 @@ def _parents() -> Iterator[tuple[int, int]]:
 
 
 def _read(pid: int | str, name: str) -> str:
-    """Return what the system says of a process, nothing of one that is gone."""
+    """Return a file that describes a process, or "" if the process has ended."""
     try:
         with open(f"/proc/{pid}/{name}", encoding="utf-8", errors="replace") as file:
             return file.read()

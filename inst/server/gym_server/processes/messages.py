@@ -1,9 +1,9 @@
-"""Method calls from the server to a process that it has started, and their results.
+"""Calls from the server to a process that it started, and their results.
 
-The server sends calls as pickles: the process can trust the server.  The server cannot trust the
-process of an isolated environment, which the environment may have taken over.  So its results are
-numbers, JSON and bytes, each checked before it is used, and nothing in them names code.  Only a
-process that runs what would otherwise run in the server's own process may return Python's objects.
+The server sends calls as pickles, because the process can trust the server. The server cannot trust
+the process of an isolated environment, which the environment may have taken over. So results are
+numbers, JSON and bytes, checked before use, and none of them names code. Only a process that runs
+what would otherwise run in the server's own process may return Python objects.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from gym_server.protocol.answers import Ready, dumps
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 from gym_server.response import JSON
 
-# The number of the call, the kind of the result, and the length of its text; of an answer, which
-# has none, how many steps were taken for it.
+# The number of the call, the kind of the result, and the length of its text. A finished body has no
+# text, but the number of steps that it took.
 _HEAD = struct.Struct("<QBI")
 
 _REFUSAL, _VALUE, _JSON, _TENSORS, _OBJECT, _COLUMN_TENSORS = range(6)
@@ -38,7 +38,7 @@ _LONGEST_TEXT = 100_000
 
 
 class Result(NamedTuple):
-    """What a method returned: a JSON value, and a frame or None."""
+    """The result of a function: a JSON value, and a frame or None."""
 
     value: Any
     frame: np.ndarray | None = None
@@ -48,30 +48,30 @@ class Result(NamedTuple):
 
 
 def read_call(raw: bytes) -> tuple[int, str, tuple]:
-    """Return a call's number, the name of the method, and its arguments."""
+    """Return a call's number, the function's name, and its arguments."""
     number, method, args = pickle.loads(raw)
     return number, method, args
 
 
 def answer_message(number: int, answer: Ready) -> bytes:
-    """Return the message that carries an answer that is ready."""
+    """Return the message for a finished body."""
     return _HEAD.pack(number, _KINDS[answer.content_type], answer.steps) + answer.body
 
 
 def value_message(number: int, value: object, frame: np.ndarray | None = None) -> bytes:
-    """Return the message that carries a JSON value and a frame."""
+    """Return the message for a JSON value and a frame."""
     text = dumps([value, None if frame is None else frame.shape])
     pixels = b"" if frame is None else frame.tobytes()
     return _HEAD.pack(number, _VALUE, len(text)) + text + pixels
 
 
 def object_message(number: int, value: object) -> bytes:
-    """Return the message that carries any object of Python's from a process that is trusted."""
+    """Return the message for any Python object, from a trusted process."""
     return _HEAD.pack(number, _OBJECT, 0) + pickle.dumps(value, 5)
 
 
 def refusal_message(number: int, refusal: dict[str, str]) -> bytes:
-    """Return the message that carries an error; see ``errors.answer_to()``."""
+    """Return the message for an error; see ``errors.answer_to()``."""
     text = dumps(refusal)
     return _HEAD.pack(number, _REFUSAL, len(text)) + text
 
@@ -80,19 +80,18 @@ def refusal_message(number: int, refusal: dict[str, str]) -> bytes:
 
 
 class CallPipe:
-    """Calls methods in the process, one at a time.
+    """Calls functions in the process, one at a time.
 
     Attributes:
-        busy_since: since when a call has waited for its result, in the clock's seconds; None
-            while there is none.
+        busy_since: when the current call started, in the clock's seconds; None if there is none.
     """
 
     def __init__(self, connection: Connection, trusted: bool = False) -> None:
         """Take over the server's end of a pipe.
 
         Args:
-            connection: the end.
-            trusted: whether the process may return any object of Python's.
+            connection: the server's end.
+            trusted: whether the process may return any Python object.
         """
         self._pipe = Pipe(connection)
         self._trusted = trusted
@@ -101,21 +100,21 @@ class CallPipe:
         self.busy_since: float | None = None
 
     def call(self, method: str, *args: object, timeout: float | None = None) -> Any:
-        """Call a method in the process.
+        """Call a function in the process.
 
         Args:
             method: its name.
             *args: its arguments; they are pickled.
-            timeout: how many seconds to wait; None for as long as it takes.
+            timeout: seconds to wait; None to wait without limit.
 
         Returns:
-            ``Ready``, ``Result``, or from a process that is trusted any other object.
+            ``Ready``, ``Result``, or from a trusted process any other object.
 
         Raises:
-            GymServerError: what the process refused with; ``malformed_json``.
-            EOFError, OSError: the process is gone.
+            GymServerError: the function's error, or ``malformed_json``.
+            EOFError, OSError: the process has ended.
             TimeoutError: it took too long; its result will be ignored.
-            MalformedMessageError: what it sent is no result.
+            MalformedMessageError: the process did not send a valid result.
         """
         self.begin(method, *args, timeout=timeout)
         return self.finish(timeout)
@@ -124,9 +123,9 @@ class CallPipe:
         """Send a call; ``finish()`` must follow unless this raises an error.
 
         Args:
-            method: its name.
+            method: the name of the function.
             *args: its arguments; they are pickled.
-            timeout: how many seconds to wait for an earlier call.
+            timeout: seconds to wait for an earlier call.
 
         Raises:
             GymServerError, EOFError, OSError, TimeoutError: as for ``call()``.
@@ -142,7 +141,7 @@ class CallPipe:
             raise
 
     def finish(self, timeout: float | None = None) -> Any:
-        """Wait for the result of the call that has begun; see ``call()``."""
+        """Wait for the result of the call; see ``call()``."""
         try:
             return self._receive(timeout)
         finally:
@@ -160,16 +159,16 @@ class CallPipe:
             number = _HEAD.unpack_from(raw)[0] if len(raw) >= _HEAD.size else -1
             if number == self._number:
                 return _read_result(raw, self._trusted)
-            # A smaller number is that of a call that was not waited for any more.
+            # A smaller number belongs to a call that timed out.
             if not 0 < number < self._number:
-                raise MalformedMessageError("an answer that nobody asked for")
+                raise MalformedMessageError("an answer to no call")
 
     def wake(self) -> None:
-        """Make a call in another thread fail, because the process is gone."""
+        """Make a call in another thread fail, because the process has ended."""
         self._pipe.wake()
 
     def close(self) -> None:
-        """Close the pipe as soon as no call waits any more; ``wake()`` ends one that does."""
+        """Close the pipe when no call is waiting any more; ``wake()`` ends one that is."""
         with self._lock:
             self._pipe.close()
 
@@ -178,10 +177,10 @@ def _pickled(number: int, method: str, args: tuple) -> bytes:
     try:
         return pickle.dumps((number, method, args), 5)
     except RecursionError:
-        # The JSON reader allows deeper nesting than the pickler does.
+        # The JSON reader allows deeper nesting than pickle.
         raise GymServerError(
             "malformed_json",
-            "The request's body has too many lists in one another to be handed on",
+            "The lists in the request's body are nested too deeply",
         ) from None
 
 
@@ -193,24 +192,24 @@ def _read_result(raw: bytes, trusted: bool) -> Any:
         return Ready(raw[_HEAD.size :], _CONTENT_TYPES[kind], length)
     end = _HEAD.size + length
     if end > len(raw):
-        raise MalformedMessageError("a text that is cut off")
+        raise MalformedMessageError("a truncated text")
     try:
         value = json.loads(raw[_HEAD.size : end])
     except (ValueError, RecursionError):
-        raise MalformedMessageError("a text that is no JSON") from None
+        raise MalformedMessageError("a text that is not JSON") from None
     if kind == _REFUSAL:
         raise _refusal(value)
     if kind != _VALUE or not isinstance(value, list) or len(value) != 2:
-        raise MalformedMessageError("an answer of no kind")
+        raise MalformedMessageError("an answer of an unknown kind")
     return Result(value[0], _frame(value[1], raw, end))
 
 
 def _refusal(value: object) -> Exception:
     if not isinstance(value, dict):
-        return MalformedMessageError("an error that is none")
+        return MalformedMessageError("an invalid error")
     parts: list[Any] = [value.get(name) for name in ("code", "message", "hint", "extra")]
     if not all(part is None or isinstance(part, str) for part in parts):
-        return MalformedMessageError("an error that is none")
+        return MalformedMessageError("an invalid error")
     code, message, *_ = parts
     if not code or not code.isidentifier() or message is None:
         return MalformedMessageError("an error without a name")
@@ -230,5 +229,5 @@ def _frame(shape: object, raw: bytes, begin: int) -> np.ndarray | None:
     ):
         raise MalformedMessageError("a picture without a shape")
     if math.prod(shape) != len(raw) - begin:
-        raise MalformedMessageError("a picture of another size than its shape")
+        raise MalformedMessageError("a picture whose size does not match its shape")
     return np.frombuffer(raw, np.uint8, offset=begin).reshape(shape)

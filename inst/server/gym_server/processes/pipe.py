@@ -1,9 +1,8 @@
-"""Messages between two processes, sent and received with as few system calls as possible.
+"""Messages between two processes, with as few system calls as possible.
 
-``multiprocessing``'s connections read the length of a message first and then the message.  Where
-they are sockets underneath, one read gets both: a call and its result take 25 us instead of 43
-(medians of 1,500 with pauses of 300 us between them, in which the caches cool down, as a client
-makes them).
+``multiprocessing``'s connections first read the length of a message, and then the message. Over a
+socket one read gets both: a call and its result take 25 us instead of 43 (medians of 1,500 with
+pauses of 300 us, in which caches cool down, as between a client's calls).
 """
 
 from __future__ import annotations
@@ -18,19 +17,19 @@ from multiprocessing.connection import Connection
 _LENGTH_BYTES = 8
 _READ_BYTES = 2**16
 
-# No honest message is longer. Nothing is allocated because of a length that was sent.
+# Longer than any valid message. The length that was sent is not used to allocate memory.
 _LONGEST = 2**31 - 1
 
 
 class MalformedMessageError(Exception):
-    """What came from the other process is no message."""
+    """The other process did not send a valid message."""
 
 
 class ConnectionPipe:
-    """One end of a pipe, for one thread at a time."""
+    """One end of a pipe; only one thread may use it at a time."""
 
     def __init__(self, connection: Connection) -> None:
-        """Take over an end."""
+        """Take over one end."""
         self._connection = connection
 
     def send(self, message: bytes) -> None:
@@ -41,19 +40,19 @@ class ConnectionPipe:
         """Wait for a message.
 
         Raises:
-            EOFError, OSError: no process has the other end any more.
-            MalformedMessageError: what came is no message.
+            EOFError, OSError: no process has the other end open any more.
+            MalformedMessageError: the message is invalid.
         """
         return self._connection.recv_bytes(_LONGEST)
 
     def poll(self, seconds: float) -> bool:
-        """Wait for the beginning of a message or the end of the pipe; return whether it came."""
+        """Wait for a message or the end of the pipe; return whether one came."""
         return self._connection.poll(seconds)
 
     def wake(self) -> None:
-        """Make a ``receive()`` in another thread fail, even while processes have the other end.
+        """Make a ``receive()`` in another thread fail, even if processes have the other end open.
 
-        Only sockets can do that; here it does nothing.
+        Only sockets can do this; here it does nothing.
         """
 
     def close(self) -> None:
@@ -62,10 +61,10 @@ class ConnectionPipe:
 
 
 class SocketPipe(ConnectionPipe):
-    """The same where the connection is a socket."""
+    """A pipe whose connection is a socket."""
 
     def __init__(self, connection: Connection) -> None:
-        """Take over an end."""
+        """Take over one end."""
         self._socket = socket.socket(fileno=os.dup(connection.fileno()))
         self._rest = b""
         connection.close()
@@ -81,7 +80,7 @@ class SocketPipe(ConnectionPipe):
             read += self._read()
         end = _LENGTH_BYTES + int.from_bytes(read[:_LENGTH_BYTES], "little")
         if end > _LONGEST:
-            raise MalformedMessageError("a message of no length")
+            raise MalformedMessageError("a message with an invalid length")
         if len(read) < end:
             read = self._read_until(end, read)
         self._rest = read[end:]
@@ -101,10 +100,10 @@ class SocketPipe(ConnectionPipe):
         return b"".join(pieces)
 
     def poll(self, seconds: float) -> bool:
-        """Wait for the beginning of a message or the end of the pipe; return whether it came."""
+        """Wait for a message or the end of the pipe; return whether one came."""
         if self._rest:
             return True
-        # Not select(), which takes only the first 1,024 file descriptors.
+        # select() accepts only the first 1,024 file descriptors.
         waiting = select.poll()
         waiting.register(self._socket, select.POLLIN)
         return bool(waiting.poll(1000 * seconds))

@@ -1,8 +1,8 @@
-"""The pool of all processes that run environments, sub-environments and whole episodes.
+"""The pool of processes that run environments, sub-environments and whole episodes.
 
-To start a process takes 20 ms, and a second on Windows, so they wait here for the next ones. One
-that has run environments of foreign packages is not kept: who knows what they have left in it. Nor
-is one that has become large.
+Starting a process takes 20 ms, and a second on Windows, so idle processes are kept here. A process
+that has run environments of other packages is not kept, because they may have left anything in it.
+Neither is one that has grown large.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from gym_server.processes.cores import usable_cores
 from gym_server.processes.memory import bytes_of
 from gym_server.processes.worker_process import WorkerProcess
 
-# What has drawn with MuJoCo keeps 110 MiB.
+# A process that has drawn with MuJoCo keeps 110 MiB.
 _MOST_BYTES = 128 * 2**20
 
-# After so many seconds without work a process ends.
+# An idle process ends after this long.
 _IDLE_SECONDS = 600.0
 
 
@@ -25,21 +25,21 @@ class Pool:
     """Keeps at most as many processes as there are cores.
 
     Attributes:
-        most_mb: how much memory the system lets a process have, in MiB; 0 for no limit.
+        most_mb: the memory limit of each process in MiB; 0 for no limit.
     """
 
     def __init__(self, most: int | None = None, idle_seconds: float = _IDLE_SECONDS) -> None:
-        """Start with none.
+        """Start with no processes.
 
         Args:
-            most: how many to keep; None for one a core.
-            idle_seconds: how long to keep one.
+            most: how many to keep; None for one per core.
+            idle_seconds: how long to keep an idle process.
         """
         self.most_mb = 0
         self._most = usable_cores() if most is None else most
         self._idle_seconds = idle_seconds
         self._lock = threading.Lock()
-        # With the time at which each was put here, the last one last.
+        # With the time each was added; the most recent one is last.
         self._idle: list[tuple[float, WorkerProcess]] = []
         self._timer: threading.Timer | None = None
 
@@ -51,16 +51,16 @@ class Pool:
         most_mb: int = 0,
         hint: str | None = None,
     ) -> WorkerProcess:
-        """Return a process that nobody uses, started if need be.
+        """Return an unused process, and start one if necessary.
 
         Args:
-            module: the name of the module whose functions it is to run.
-            polite: whether it gives way to other processes from now on, also those that use it
-                later; ordinary ones are given to those who did not ask for that.
-            trusted: see ``WorkerProcess``; one that is not is always a new one, and must not be put
-                here.
-            most_mb: how much memory the system lets a new one have, in MiB; 0 for the pool's limit.
-            hint: what to do about an end by itself of a new one.
+            module: the module whose functions it is to run.
+            polite: whether it runs at a lower priority from now on, also for later users. Such
+                processes are not given to callers that did not ask for this.
+            trusted: see ``WorkerProcess``; an untrusted process is always new, and must not be put
+                back.
+            most_mb: the memory limit of a new process in MiB; 0 for the pool's limit.
+            hint: what to do if a new process ends unexpectedly.
         """
         idle = self._take_idle(polite) if trusted else None
         process = idle or WorkerProcess(most_mb or self.most_mb, trusted, hint)
@@ -79,7 +79,7 @@ class Pool:
         return None
 
     def put(self, process: WorkerProcess) -> None:
-        """Keep a process whose work is done, or end it if there are enough."""
+        """Keep a process that has done its work, or end it if there are enough."""
         process.release()
         is_small = bytes_of(process.pid, exactly=True) <= _MOST_BYTES
         with self._lock:
@@ -111,12 +111,12 @@ class Pool:
             process.kill()
 
     def end(self) -> None:
-        """End all processes that wait here."""
+        """End all idle processes."""
         with self._lock:
             idle, self._idle = self._idle, []
         for _, process in idle:
             process.kill()
 
 
-# That of this process.
+# The pool of this process.
 pool = Pool()

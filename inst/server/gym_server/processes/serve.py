@@ -1,4 +1,4 @@
-"""What a process of the server's runs: functions of the server's own, one call after the other."""
+"""What a worker process runs: functions of the server, one call after another."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from gym_server.processes.pipe import Pipe
 from gym_server.processes.set_up import set_up_process
 from gym_server.protocol.answers import Ready
 
-# What the process's function is doing, for the server to see meanwhile; see ``WorkerProcess``.
+# The progress of the running function, visible to the server; see ``WorkerProcess``.
 progress: Any = [0, 0]
 
 
 def serve(
     calls: Connection, queries: Connection, log_level: int, most_mb: int, shared_progress: Any
 ) -> None:
-    """Call one function after the other, until the server closes the pipe or is gone.
+    """Call functions, one after another, until the server closes the pipe or ends.
 
     Args:
-        calls: carries one call after the other.
-        queries: carries calls that can be answered while another one runs.
-        log_level: what goes to standard error.
-        most_mb: how much memory the process may have, in MiB; 0 for no limit.
+        calls: receives one call after another.
+        queries: receives calls that are answered while another one runs.
+        log_level: the lowest level to log to standard error.
+        most_mb: the memory limit of this process in MiB; 0 for no limit.
         shared_progress: two integers that the server can read.
     """
     global progress

@@ -1,4 +1,4 @@
-"""What a process that the server has started does first."""
+"""The first steps of a process that the server started."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import signal
 from gym_server import logs
 from gym_server.processes import start
 
-# What a process may have beside its environments: modules, and pictures by OpenGL.
+# What a process may use besides its environments: modules, and pictures by OpenGL.
 OWN_MB = 512
 
 
 def set_up_process(log_level: int, max_mb: int = 0) -> None:
-    """Become a process that ends with the server, logs as it does, and has a memory limit.
+    """Make this process end with the server and log as the server does; limit its memory.
 
     Args:
-        log_level: what goes to standard error.
-        max_mb: how much memory the process may have, in MiB; 0 for no limit.
+        log_level: the lowest level to log to standard error.
+        max_mb: the memory limit of this process in MiB; 0 for no limit.
     """
     if hasattr(os, "setsid"):
-        # The processes that the environment starts can be killed with it, and Ctrl-C reaches the
-        # server only.
+        # So that processes which the environment starts can be killed with it, and Ctrl-C reaches
+        # only the server.
         os.setsid()
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
@@ -31,14 +31,14 @@ def set_up_process(log_level: int, max_mb: int = 0) -> None:
     start.exit_with_parent(group=True)
     logs.set_up(log_level, " (process %(process)d)")
     with contextlib.suppress(OSError, ValueError, AttributeError):
-        # A crash in C prints where it happened.
+        # Print where C code crashed.
         faulthandler.enable()
     if max_mb:
         _limit_memory(max_mb * 2**20)
 
 
 def _limit_memory(size: int) -> None:
-    # Not RLIMIT_AS: threads and libraries reserve addresses that they never use.
+    # Not RLIMIT_AS: threads and libraries reserve address space that they never use.
     import resource
 
     resource.setrlimit(resource.RLIMIT_DATA, (size, size))

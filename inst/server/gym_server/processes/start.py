@@ -1,4 +1,4 @@
-"""How the server starts processes, and makes sure that none outlives it."""
+"""Start processes so that none outlives the server."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from multiprocessing import util
 from typing import Any
 
 # A fork server forks a process that has imported the preloaded modules and does nothing else;
-# Windows has none.  The server itself is never forked: a copy would have locks that other threads
-# hold, and our signal handlers.
+# Windows has none. The server itself is never forked: a copy would hold locks of other threads, and
+# would have its signal handlers.
 START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 _preloaded: list[str] = []
 
 
 def preload(module: str) -> None:
-    """Let processes start with a module imported, where the system can copy one that has it.
+    """Start processes with a module already imported, if the system can fork.
 
     Call it before the first process starts.
     """
     _preloaded.append(module)
 
 
-# A process for each core is what there is for more than one core: threads of NumPy's beside them
-# would wait for each other. Read when NumPy is imported, so this process keeps its own.
+# There is one process per core, so further NumPy threads would only wait for each other. NumPy
+# reads these when it is imported, so this process is not affected.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def context() -> Any:
-    """Return the ``multiprocessing`` context that starts processes."""
+    """Return the ``multiprocessing`` context for starting processes."""
     context = multiprocessing.get_context(START_METHOD)
     for name in _ONE_THREAD:
         os.environ.setdefault(name, "1")
@@ -50,26 +50,26 @@ _folder_lock = threading.Lock()
 
 @cache
 def _temporary_folder() -> str:
-    """Return the folder of the sockets over which processes are started.
+    """Return the folder of the sockets that are used to start processes.
 
-    A process that starts others makes such a folder unless it inherits one. The server makes its
-    folder before it starts any process, so that all share this one: a process that is killed
-    would leave a folder of its own behind.
+    A process that starts others creates such a folder unless it inherits one. The server creates
+    its folder before it starts any process, so all share it. A process that is killed would leave
+    its own folder behind.
     """
     return util.get_temp_dir()
 
 
 def remove_temporary_folder() -> None:
-    """Remove the folder, which an ordinary exit does by itself, before ``os._exit()``."""
+    """Remove the folder before ``os._exit()``; an ordinary exit removes it by itself."""
     if _temporary_folder.cache_info().currsize:
         shutil.rmtree(_temporary_folder(), ignore_errors=True)
 
 
 def exit_with_parent(group: bool = False) -> None:
-    """Let this process exit when the process that started it ends, in whatever way.
+    """Make this process exit when its parent ends, however it ends.
 
     Args:
-        group: whether all other processes of its group are killed, too.
+        group: whether to kill all other processes of its group, too.
     """
     parent = multiprocessing.parent_process()
     if parent is None:
@@ -90,7 +90,7 @@ def exit_with_parent(group: bool = False) -> None:
 def _kill_group_at_end_of(sentinel: int) -> None:
     """Let the system kill this process group when the other end of a pipe closes.
 
-    That needs no thread of Python's, which code in C that keeps the interpreter's lock would stop.
+    This works even while C code holds the GIL, which would stop a thread.
     """
     import fcntl
 

@@ -1,8 +1,7 @@
-"""A process that the server has started: calls to it, and how it ended.
+"""A process that the server started: calls to it, and how it ended.
 
-What it runs would otherwise run in the server's own process, so the server trusts it as it trusts
-itself, and both send Python's objects; unless it was started for an environment that is not
-trusted.
+Most of these run what would otherwise run in the server's own process. The server trusts them, and
+both send Python objects. A process for an untrusted environment sends none.
 """
 
 from __future__ import annotations
@@ -25,39 +24,39 @@ from gym_server.processes.serve import serve
 
 log = logging.getLogger(__name__)
 
-# After its end of the pipe is closed the process has nothing left to do.
+# How long a process may take to exit after its pipe is closed.
 _EXIT_SECONDS = 2.0
 
-# The exit status comes a little after the pipe is closed, and on a busy machine later.
+# The exit status arrives shortly after the pipe is closed, and later on a busy machine.
 _EXIT_STATUS_SECONDS = 10.0
 
-# As ``nice`` has it; no process may take that back.
+# A ``nice`` value. A process cannot undo it.
 _LOWER_PRIORITY = 5
 
-# What a call raises when the process is gone, or was taken over.
+# The errors of a call when the process has ended, or was taken over.
 _FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
 
 
 class WorkerProcess:
-    """A process that runs the functions of a module; when it is taken again, of another one.
+    """A process that runs the functions of one module; of another when it is taken again.
 
-    It has one pipe for calls in turn, and one for queries that it answers meanwhile.
+    It has a pipe for calls in turn, and one for queries that it answers meanwhile.
 
     Attributes:
         module: the name of the module.
-        pid: its number.
-        why: the reason that every caller gets once it has ended, else None.
-        progress: two integers that its function may set while it runs.
-        gives_way: whether it gives way to other processes.
+        pid: the process number.
+        why: the error for every caller once it has ended, else None.
+        progress: two integers that the running function may set.
+        gives_way: whether it runs at a lower priority.
     """
 
     def __init__(self, most_mb: int = 0, trusted: bool = True, hint: str | None = None) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
-            most_mb: how much memory the system lets it have, in MiB; 0 for no limit.
-            trusted: whether it may return any objects of Python's; see ``messages``.
-            hint: what to do about an end by itself.
+            most_mb: its memory limit in MiB; 0 for no limit.
+            trusted: whether it may return any Python object; see ``messages``.
+            hint: what to do if it ends unexpectedly.
         """
         self.module = ""
         self.gives_way = False
@@ -65,19 +64,19 @@ class WorkerProcess:
         self._hint = hint
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._lock = threading.Lock()
-        # Why we ended it, if we did.
+        # Why the server ended it, if it did.
         self._our_reason: GymServerError | None = None
-        # What was wrong with what it sent.
+        # What was wrong with a message from it.
         self._fault = ""
         self._phase = "while it was created"
-        # Until report_end(): the creation that waits for it gets the error itself.
+        # Until report_end(), the creation that waits for the process gets the error itself.
         self._end_expected = True
         self._ended = threading.Event()
         context = start.context()
         self.progress = context.RawArray("q", 2)
         pipes = [context.Pipe() for _ in range(2)]
         self._calls, self._queries = (CallPipe(ours, trusted) for ours, _ in pipes)
-        # Not a daemon: a daemon may start no processes, and sub-environments can be processes.
+        # Not a daemon: daemons may not start processes, and sub-environments can be processes.
         self._process = context.Process(
             target=serve,
             args=(
@@ -100,34 +99,34 @@ class WorkerProcess:
         finally:
             for _, theirs in pipes:
                 theirs.close()
-        # multiprocessing asks every process on this list whether it has ended when it starts
-        # another one, and waits for all of them at exit. Only our own thread may wait for this one.
-        # The type ignored: the list is private.
+        # When multiprocessing starts a process it polls all on this list, and at exit it waits for
+        # all of them. Only our own thread may wait for this one.
+        # The type is ignored because the list is private.
         multiprocessing_process._children.discard(self._process)  # type: ignore[attr-defined]
 
     @property
     def is_alive(self) -> bool:
-        """Whether it has not ended."""
+        """Whether it is running."""
         return self.why is None
 
     # Calls ----------------------------------------------------------------------------------
 
     def call(self, function: str, *args: object) -> Any:
-        """Call one of its module's functions; the caller sees to it that only one call runs.
+        """Call a function of its module; the caller ensures that only one call runs.
 
         Returns:
-            What the function returned: ``Ready``, ``Result``, or from a process that is trusted any
-            other object.
+            The function's result: ``Ready``, ``Result``, or from a trusted process any other
+            object.
 
         Raises:
-            GymServerError: what the function refused with; ``environment_died``, or why the process
-                was killed.
+            GymServerError: the function's error, ``environment_died``, or why the process was
+                killed.
         """
         self.begin(function, *args)
         return self.finish()
 
     def begin(self, function: str, *args: object) -> None:
-        """Begin a ``call()``; unless this raises an error, ``finish()`` must follow."""
+        """Start a ``call()``; unless this raises an error, ``finish()`` must follow."""
         if self.why is not None:
             raise self.why.again()
         try:
@@ -136,18 +135,18 @@ class WorkerProcess:
             raise self._end_after(fault) from None
 
     def finish(self) -> Any:
-        """Return the result of the call that has begun; see ``call()``."""
+        """Return the result of the call; see ``call()``."""
         try:
             return self._calls.finish()
         except _FAULTS as fault:
             raise self._end_after(fault) from None
 
     def query(self, function: str, *args: object, timeout: float | None = None) -> Any:
-        """Call a function that it answers even while a ``call()`` runs.
+        """Call a function; the process answers even while a ``call()`` runs.
 
         Raises:
             GymServerError: as for ``call()``.
-            TimeoutError: it took more than these seconds.
+            TimeoutError: it took longer than ``timeout`` seconds.
         """
         if self.why is not None:
             raise self.why.again()
@@ -160,11 +159,11 @@ class WorkerProcess:
 
     @property
     def query_since(self) -> float | None:
-        """Since when a ``query()`` has waited for its result, in the clock's seconds, or None."""
+        """When the current ``query()`` started, in the clock's seconds; None if there is none."""
         return self._queries.busy_since
 
     def _end_after(self, fault: Exception) -> GymServerError:
-        """Return why the process has ended, after making sure that it has."""
+        """Make sure that the process has ended; return the reason."""
         if isinstance(fault, MalformedMessageError):
             self._fault = f"it sent {fault}"
             self._send_kill()
@@ -172,11 +171,11 @@ class WorkerProcess:
             self._fault = "it closed its connection to the server"
             self._send_kill()
         self._ended.wait(_EXIT_SECONDS)
-        # There is no exit status of a process that even the system cannot end.
+        # A process that even the system cannot end has no exit status.
         return self.why.again() if self.why else self._died(None)
 
     def give_way(self) -> None:
-        """Give way to other processes from now on, the server's own among them, for good."""
+        """Run at a lower priority than other processes, including the server, from now on."""
         if not self.gives_way and hasattr(os, "setpriority"):
             with contextlib.suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, self.pid, _LOWER_PRIORITY)
@@ -185,14 +184,14 @@ class WorkerProcess:
     # The end --------------------------------------------------------------------------------
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """From now on report when it ends without being asked to, or at once if it has already.
+        """Report an unexpected end from now on, or at once if it has ended.
 
-        The reason is reported in a thread of its own. It may end while this is called. The lock
-        leaves two orders, and ``on_end`` is called once:
+        The reason is reported in a separate thread. If the process ends during this call, the lock
+        leaves two possible orders, and ``on_end`` is called once in both:
 
-        1. ``_await_end()`` sets ``why`` first and sees an expected end, of which it tells no one;
-           then this finds ``why`` and calls ``on_end``.
-        2. This clears ``_end_expected`` first and finds no ``why``; then ``_await_end()`` calls
+        1. ``_await_end()`` sets ``why`` first, and reports nothing because it expects the end.
+           Then this finds ``why`` and calls ``on_end``.
+        2. This clears ``_end_expected`` first and finds no ``why``. Then ``_await_end()`` calls
            ``on_end``.
         """
         with self._lock:
@@ -204,17 +203,17 @@ class WorkerProcess:
             on_end(why)
 
     def release(self) -> None:
-        """Take its end from now on for one that nobody needs to know of."""
+        """Stop reporting an unexpected end."""
         self._end_expected = True
 
     def kill(self, why: GymServerError | None = None) -> None:
-        """End it at once; every call that waits for it raises the reason."""
+        """End it at once; every waiting call raises the reason."""
         with self._lock:
             self._our_reason = self._our_reason or why or shutting_down()
         self._send_kill()
 
     def end(self, why: GymServerError) -> None:
-        """Let it exit, and kill it when it does not; no call may be running."""
+        """Let it exit, and kill it if it does not; no call may be running."""
         with self._lock:
             self._our_reason = self._our_reason or why
         self._calls.close()
@@ -244,7 +243,7 @@ class WorkerProcess:
             self._on_end(self.why)
 
     def _kill_group(self) -> None:
-        """Kill what the process has started."""
+        """Kill the processes that it started."""
         if hasattr(os, "killpg"):
             with contextlib.suppress(OSError):
                 os.killpg(self.pid, signal.SIGKILL)

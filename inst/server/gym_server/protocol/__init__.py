@@ -1,1 +1,1 @@
-"""What travels: JSON and safetensors in bodies, the fields of requests, answers."""
+"""What travels over HTTP: JSON and safetensors bodies, request fields, responses."""

@@ -1,4 +1,4 @@
-"""What a route returns becomes a response: a body of strict JSON, or of safetensors."""
+"""Turn a route's result into a response with a body of strict JSON or safetensors."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ HTML = "text/html"
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
 
 
-# json holds the interpreter while it writes, so that no other call is answered: some milliseconds
-# for so many numbers.
+# json holds the GIL while it writes, and no other call is answered meanwhile. This many numbers
+# take a few milliseconds.
 _AT_ONCE = 20_000
 
 
 def dumps(value: object) -> bytes:
-    """Return a value as strict JSON; non-finite numbers become strings."""
+    """Encode a value as strict JSON; non-finite numbers become strings."""
     try:
         text = _text(value)
     except (TypeError, ValueError, RecursionError):
-        # Only now walk through all of it: an ordinary step has nothing to convert.
+        # Convert only now: the result of an ordinary step needs no conversion.
         text = _text(plain(value))
     return text.encode("ascii")
 
 
 def _text(value: Any) -> str:
-    """Return JSON, written in pieces where it is long."""
+    """Return JSON text, written in pieces if it is long."""
     size = _size(value)
     if size <= _AT_ONCE:
         return _encode(value)
@@ -58,20 +58,21 @@ def _text(value: Any) -> str:
 
 
 def _size(value: Any) -> int:
-    """Return how many numbers a value has, if the rows of a list are alike."""
+    """Return how many numbers a value holds, assuming that the rows of a list are alike."""
     if type(value) is dict:
         return sum([_size(item) for item in value.values()])
     return len(value) * _size(value[0]) if type(value) is list and value else 1
 
 
 class AnswerForm(NamedTuple):
-    """What the answer to a reset or a step holds, and how.
+    """What the response to a reset or step contains, and in which format.
 
     Attributes:
-        tensors: whether observations are tensors, where their space can travel so.
-        by_column: whether these are transposed, see ``COLUMN_TENSORS``.
-        infos: whether there are infos; without them an answer has an empty one.
-        finals: whether there are the last observations of episodes after which another one began.
+        tensors: whether observations are tensors, if their space allows it.
+        by_column: whether tensors are transposed, see ``COLUMN_TENSORS``.
+        infos: whether infos are included; otherwise the response has an empty one.
+        finals: whether the last observations of episodes that were reset automatically are
+            included.
     """
 
     tensors: bool = False
@@ -84,12 +85,12 @@ JSON_FORM = AnswerForm()
 
 
 class Ready(NamedTuple):
-    """A body from the process of an environment, to which only the request is to be added.
+    """A body from an environment's process that lacks only the request's idempotency key.
 
     Attributes:
         body: the body.
         content_type: its type.
-        steps: how many steps were taken for it, all sub-environments together.
+        steps: the number of steps it took, over all sub-environments.
     """
 
     body: bytes
@@ -98,7 +99,7 @@ class Ready(NamedTuple):
 
 
 def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Response:
-    """Return a frame as a file of one tensor."""
+    """Return a frame as a response with one tensor."""
     file = join_tensors({"frame": Tensor.of(frame, form.by_column)}, b"")
     return Response(200, file, COLUMN_TENSORS if form.by_column else TENSORS)
 
@@ -106,12 +107,12 @@ def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Response:
 def response_to(
     result: dict | Response | Ready | None, request_id: RequestId | None, status: int = 200
 ) -> Response:
-    """Make a response of a route's result.
+    """Turn a route's result into a response.
 
     Args:
-        result: a JSON object, whose observations may be tensors, a response already, a body that
-            is ready, or None for no content (204).
-        request_id: what the client called its request, echoed when given.
+        result: a JSON object, whose observations may be tensors; a finished response; a finished
+            body; or None for no content (204).
+        request_id: the client's idempotency key, echoed if given.
         status: the HTTP status of a JSON object.
     """
     if isinstance(result, Response):
@@ -120,7 +121,7 @@ def response_to(
         return Response(status, _with_request(result, request_id), result.content_type)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
-        # Strictly typed classic clients expect Flask's default type here.
+        # Strictly typed classic clients expect Flask's default content type here.
         return Response(204, b"", "text/html; charset=utf-8", headers)
     if isinstance(observation := result.get("observation"), Parts):
         content_type = COLUMN_TENSORS if observation.by_column else TENSORS
@@ -141,12 +142,12 @@ def _with_request(ready: Ready, request_id: RequestId | None) -> bytes:
 def _dumps_tensors(
     request_id: RequestId | None, observation: Parts, final_obs: Parts | None = None, **others: Any
 ) -> bytes:
-    """Return a reset's or a step's result as a safetensors file."""
+    """Encode the result of a reset or step as a safetensors file."""
     tensors, texts = dict(observation.tensors), dict(observation.texts)
     if final_obs is not None:
         tensors.update(final_obs.tensors)
         texts.update(final_obs.texts)
-    # Done is one of the two flags. With sub-environments they are arrays.
+    # "done" is left out: it is terminated or truncated. With sub-environments these are arrays.
     reward = others.get("reward")
     if isinstance(reward, np.ndarray):
         for name in ("reward", "terminated", "truncated"):
@@ -166,7 +167,7 @@ def _dumps_tensors(
 
 
 def _metadata(name: str, value: object) -> bytes:
-    """Return a value as it stands in the metadata of a file, which are texts: JSON in JSON."""
+    """Return a value as metadata. Metadata values are texts, so this is JSON inside JSON."""
     if value == {}:
         return b'"%b":"{}"' % name.encode("ascii")
     return quoted({name: dumps(value).decode("ascii")})
@@ -176,7 +177,7 @@ def _request_metadata(request_id: RequestId) -> bytes:
     return b'%b%d}"' % (_request_beginning(request_id.key), request_id.number)
 
 
-# A client has one key, and numbers its requests.
+# A client has one key and numbers its requests.
 @lru_cache(maxsize=256)
 def _request_beginning(key: str) -> bytes:
     """Return the metadata that echo a key, up to the number."""

@@ -1,4 +1,4 @@
-"""The bodies of requests: strict JSON, and safetensors."""
+"""Request bodies: strict JSON and safetensors."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ def _refuse_constant(name: str) -> object:
     raise ValueError(f'{name} is not JSON (as a string, "{name}", it is)')
 
 
-# Parsing holds the interpreter, so that nobody else is answered meanwhile: 20 ms for so many bytes,
-# which become up to 25 MiB of objects. Arrays of any size are sent as tensors.
+# Parsing holds the GIL, and no other call is answered meanwhile. This many bytes take 20 ms and
+# become up to 25 MiB of objects. Larger arrays are sent as tensors.
 _LARGEST_JSON = 2**20
 
-# json.loads() would make one each time.
+# json.loads() would create a decoder for each call.
 _decode = json.JSONDecoder(parse_constant=_refuse_constant).decode
 
 
@@ -26,7 +26,7 @@ def loads(raw: bytes) -> dict:
     """Return the JSON object in a request's body.
 
     Args:
-        raw: the body; nothing, ``null``, ``""`` and ``[]`` mean an empty object.
+        raw: the body; an empty body, ``null``, ``""`` and ``[]`` mean an empty object.
 
     Raises:
         GymServerError: ``body_too_large``, ``malformed_json`` or ``not_an_object``.
@@ -34,8 +34,8 @@ def loads(raw: bytes) -> dict:
     if len(raw) > _LARGEST_JSON:
         raise GymServerError(
             "body_too_large",
-            f"A request's body of JSON may have {_LARGEST_JSON:,} bytes, not {len(raw):,}",
-            "arrays may be sent as tensors, in a safetensors file",
+            f"A JSON body may have at most {_LARGEST_JSON:,} bytes, not {len(raw):,}",
+            "send arrays as tensors, in a safetensors file",
         )
     if not raw.strip():
         return {}
@@ -56,13 +56,13 @@ def loads(raw: bytes) -> dict:
 
 
 def loads_tensors(raw: bytes) -> dict:
-    """Return the fields in a request's body that is a safetensors file.
+    """Return the fields of a request whose body is a safetensors file.
 
     Args:
         raw: the body; its metadata holds the other fields as JSON, and the texts by name.
 
     Returns:
-        What ``loads()`` returns, but an action is ``Parts``.
+        The same as ``loads()``, except that an action is ``Parts``.
 
     Raises:
         GymServerError: ``malformed_tensors``.
@@ -72,17 +72,21 @@ def loads_tensors(raw: bytes) -> dict:
 
 def _parse_tensors(raw: bytes) -> dict:
     file = read_tensors(raw)
-    body = {name: _json_metadata(name, text) for name, text in file.metadata.items()}
+    body = {
+        name: _json_text(name, text)
+        for name, text in file.metadata.items()
+        if name in _JSON_METADATA
+    }
     texts = body.pop("texts", {})
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
-        raise malformed_tensors("the metadata 'texts' is no JSON object of texts")
+        raise malformed_tensors("the metadata 'texts' is not a JSON object of texts")
     if any(name.partition("/")[0] == "action" for name in (*file.tensors, *texts)):
         body["action"] = Parts(file.tensors, texts)
     return body
 
 
 def loads_file(raw: bytes) -> dict:
-    """Return the fields in a body that is a safetensors file, and its tensors as ``tensors``.
+    """Return the fields of a safetensors file, and its tensors as the field ``tensors``.
 
     Raises:
         GymServerError: ``malformed_tensors``.
@@ -90,14 +94,10 @@ def loads_file(raw: bytes) -> dict:
     file = read_tensors(raw)
     body: dict = {}
     for name, text in file.metadata.items():
-        # Writers such as safetensors' own add texts of theirs.
+        # Written by safetensors' own library.
         if name != "format":
             body[name] = _json_text(name, text)
     return {**body, "tensors": file.tensors}
-
-
-def _json_metadata(name: str, text: str) -> object:
-    return _json_text(name, text) if name in _JSON_METADATA else None
 
 
 def _json_text(name: str, text: str) -> object:
@@ -107,7 +107,7 @@ def _json_text(name: str, text: str) -> object:
         raise malformed_tensors(f"the metadata {name!r} is not valid JSON: {error}") from None
 
 
-# Writers such as safetensors' own add texts of theirs ("format": "pt").
+# Other metadata are ignored: writers such as safetensors' own library add texts.
 _JSON_METADATA = ("final_obs", "info", "render", "request", "step_mask", "texts")
 
 _KIND_NAMES = {
@@ -120,7 +120,7 @@ _KIND_NAMES = {
 
 
 def parse_path_value(text: str) -> object:
-    """Return a value that stands in a URL: JSON where it is JSON, else the text itself."""
+    """Return a value from a URL: parsed if it is JSON, otherwise the text itself."""
     try:
         return _decode(text)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""The fields of a request: what each may hold, and how it is read."""
+"""The fields of a request: what each may contain, and how to read it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gym_server.errors import invalid_parameter, missing_parameter
 
 @dataclass(frozen=True)
 class Kind:
-    """What a field may hold.
+    """The values that a field may have.
 
     Attributes:
         schema: its JSON schema.
-        wanted: what it must be, in words that follow "must be".
-        parse: turns the JSON value into ours; raises ValueError for what does not fit, and
-            OverflowError for a number that is larger than every float.
-        empty_is_absent: classic clients send "" or [] for a parameter that they do not set.
+        wanted: a description that completes "must be ...".
+        parse: converts the JSON value; raises ValueError if it does not fit, and OverflowError
+            for a number too large for a float.
+        empty_is_absent: whether "" and [] mean that the field is not set, as in classic clients.
     """
 
     schema: dict
@@ -40,12 +40,12 @@ class Field:
 
 
 def read(body: dict, fields: Iterable[Field], values: dict[str, Any] | None = None) -> dict:
-    """Return the fields' values from a request's body; None for those that are absent.
+    """Return the values of the fields in a request's body; None for missing ones.
 
     Args:
         body: the body.
-        fields: what it may hold.
-        values: takes the values, one after the other: when one is refused, it has those before.
+        fields: the fields it may have.
+        values: a dict to add the values to. If a field is refused, it holds those before it.
 
     Raises:
         GymServerError: ``missing_parameter``, ``invalid_parameter``, ``not_supported``.
@@ -69,9 +69,9 @@ def read(body: dict, fields: Iterable[Field], values: dict[str, Any] | None = No
 
 
 def integer(value: object) -> int:
-    """Return an integer or an integer-valued float as an integer >= 0, else raise ValueError.
+    """Read an integer >= 0, which may be written as a float; else raise ValueError.
 
-    An integer that is larger than every float raises OverflowError: JSON has one kind of numbers.
+    Raises OverflowError for an integer too large for a float, as JSON has one kind of number.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError
@@ -81,7 +81,7 @@ def integer(value: object) -> int:
 
 
 def boolean(value: object) -> bool:
-    """Return a flag, which may also be a word or 1 or 0, else raise ValueError."""
+    """Read a flag, which may also be a word, 1 or 0; else raise ValueError."""
     if isinstance(value, str) and value.lower() in ("true", "false"):
         return value.lower() == "true"
     if isinstance(value, (bool, int, float)) and value in (0, 1):
@@ -90,25 +90,25 @@ def boolean(value: object) -> bool:
 
 
 def text(value: object) -> str:
-    """Return a string, else raise ValueError."""
+    """Read a string; else raise ValueError."""
     if not isinstance(value, str):
         raise ValueError
     return value
 
 
 def json_object(value: object) -> dict:
-    """Return a JSON object, else raise ValueError."""
+    """Read a JSON object; else raise ValueError."""
     if not isinstance(value, dict):
         raise ValueError
     return value
 
 
 class RequestId(NamedTuple):
-    """An idempotency key: what a client calls one of its requests, so that it is done only once.
+    """An idempotency key: identifies a client's request, so that it is done only once.
 
     Attributes:
-        key: the client's own, 1 to 64 characters.
-        number: grows with each of its requests.
+        key: the client's own key, 1 to 64 characters.
+        number: grows with each request.
     """
 
     key: str
@@ -120,14 +120,14 @@ _KEY = re.compile("[!-~]{1,64}")
 
 def _request_id(value: object) -> RequestId:
     key = value.get("key") if isinstance(value, dict) else None
-    # It is echoed in a header, where nothing else may stand.
+    # A header echoes it, which allows only these characters.
     if not isinstance(value, dict) or not isinstance(key, str) or _KEY.fullmatch(key) is None:
         raise ValueError
     return RequestId(key, integer(value.get("number")))
 
 
 ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
-# Also as numbers and words, which some classic clients send.
+# Some classic clients send flags as numbers and words.
 TRUE_OR_FALSE = (
     {"type": "boolean"},
     {"enum": [0, 1]},
@@ -153,6 +153,6 @@ REQUEST_ID = Kind(
 REQUEST = Field(
     "request",
     REQUEST_ID,
-    "The idempotency key, by which a request is done once however often it arrives: a key of the "
-    "client's own, a number that grows. An instance takes 256 keys in a quarter of an hour (429).",
+    "An idempotency key: however often the request arrives, it is done once. It has the client's "
+    "own key and a growing number. An instance accepts 256 keys per quarter of an hour (429).",
 )

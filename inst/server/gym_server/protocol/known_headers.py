@@ -1,7 +1,7 @@
-"""Bodies of one tensor whose header is known from the last ones, but for the request's number.
+"""Fast reading of one-tensor bodies whose header differs only in the request's number.
 
-A client that plays sends the same header with each step; only the number of its idempotency key
-grows. To parse one takes longer than the step of many an environment.
+A client that plays sends the same header with every step, except for the growing number of its
+idempotency key. Parsing a header takes longer than a step of many environments.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import NamedTuple
 
 from gym_server.protocol.safetensors import Parts, Tensor
 
-# How the number stands in JSON that is a text in JSON. The same number is always written alike.
+# The number in JSON inside a JSON string. A number is always written in the same way.
 _NUMBER = re.compile(rb'\\"number\\": ?(0|[1-9][0-9]{0,14})(?=[,}])')
 
-# Each connection has a thread, and each thread remembers one header.
+# Each connection has a thread, and each thread remembers one header of at most this size.
 _LONGEST = 4096
 
 
 class KnownHeader(NamedTuple):
-    """A header, but for the digits of the request's number.
+    """A header without the digits of the request's number.
 
     Attributes:
-        before: all bytes of the body that come before the digits, the header's length included.
-        after: what follows them in the header, without the blanks at its end.
+        before: the body's bytes before the digits, including the header's length.
+        after: the rest of the header, without trailing blanks.
         begin: where the data begin.
-        size: of the body.
-        name: of the only tensor, which fills the data.
-        tensor: its dtype and shape.
-        texts: of the action.
+        size: the size of the body.
+        name: the name of its only tensor, which fills the data.
+        tensor: the tensor's dtype and shape.
+        texts: the action's texts.
         fields: the other fields.
         request: the idempotency key, with any number.
     """
@@ -46,7 +46,7 @@ class KnownHeader(NamedTuple):
     request: dict
 
     def read(self, raw: bytes) -> dict | None:
-        """Return the fields of a body that has this header; None where it has another."""
+        """Return the fields of a body with this header; None if it has another."""
         if len(raw) != self.size or not raw.startswith(self.before):
             return None
         rest = raw[len(self.before) : self.begin].rstrip(b" ")
@@ -65,8 +65,8 @@ class _Memory(threading.local):
     """What a thread has seen last.
 
     Attributes:
-        seen: what stands before and after the number in the header that was parsed last.
-        known: that header, once it came twice.
+        seen: the header that was parsed last, before and after the number.
+        known: that header, if it came twice in a row.
     """
 
     seen: tuple[bytes, bytes] | None = None
@@ -81,7 +81,7 @@ def read(raw: bytes, parse: Callable[[bytes], dict]) -> dict:
 
     Args:
         raw: the body.
-        parse: does so for any header, and raises what is wrong with it.
+        parse: reads a body with any header, and raises if it is malformed.
     """
     known = _memory.known
     body = known.read(raw) if known is not None else None
@@ -111,12 +111,12 @@ def _known(
     begin: int,
     parse: Callable[[bytes], dict],
 ) -> KnownHeader | None:
-    """Return the header of a body; None where more than the request's number hangs on the digits.
+    """Return the header of a body; None if the digits affect more than the request's number.
 
     Args:
         raw: the body.
         body: its fields.
-        digits: where they begin and end.
+        digits: where the digits begin and end.
         begin: where the data begin.
         parse: as for ``read()``.
     """
@@ -126,11 +126,11 @@ def _known(
     if len(action.tensors) != 1:
         return None
     (name, sent), *_ = action.tensors.items()
-    # Whether bytes are booleans must be checked each time.
+    # Booleans must be checked in every body.
     if sent.dtype == "BOOL":
         return None
     tensor = sent._replace(data=b"")
-    # With another number everything else must be the same.
+    # Parse it with another number: nothing else may change.
     start, stop = digits
     number = (int(raw[start:stop]) + 1) % 10
     header = raw[8:start] + b"%d" % number + raw[stop:begin]

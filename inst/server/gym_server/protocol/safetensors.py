@@ -1,9 +1,9 @@
-"""Tensors as bytes: one safetensors file, read strictly and written in a fixed order.
+"""Tensors as bytes: a safetensors file, read strictly and written in a fixed order.
 
-A file is 8 bytes with the length of its header, the header (JSON: dtype, shape and place of
-each tensor, and texts as metadata), then the tensors' little-endian bytes.
-https://huggingface.co/docs/safetensors describes it.  PyPI's ``safetensors`` takes twice the
-time for a small answer, orders the header anew in each process, and reads what is ambiguous.
+A file is 8 bytes with the length of its header, the header (JSON: dtype, shape and offsets of each
+tensor, and texts as metadata), and the tensors' little-endian bytes. See
+https://huggingface.co/docs/safetensors. PyPI's ``safetensors`` takes twice as long for a small
+response, orders the header differently in each process, and accepts ambiguous files.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from gym_server.errors import GymServerError
 
 TENSORS = "application/x-safetensors"
 
-# The bytes of arrays are in the order that R and Fortran keep: a tensor with two or more dimensions
-# is transposed, and its shape reversed, because a file's order is by rows by definition.
+# Arrays are in column-major order, as in R and Fortran. A file is row-major by definition, so a
+# tensor with two or more dimensions is transposed and its shape reversed.
 COLUMN_TENSORS = f"{TENSORS}; order=column"
 
 _LARGEST_HEADER = 2**20
@@ -46,17 +46,17 @@ _NATIVE = {name: np.dtype(code) for code, name in _NAMES.items()}
 
 
 def has_tensor(dtype: np.dtype) -> bool:
-    """Tell whether the format has a name for a dtype."""
+    """Return whether the format has a name for a dtype."""
     return dtype.str[1:] in _NAMES
 
 
 def tensor_name(dtype: np.dtype) -> str:
-    """Return the format's name for a dtype that has one."""
+    """Return the format's name for a supported dtype."""
     return _NAMES[dtype.str[1:]]
 
 
 class Tensor(NamedTuple):
-    """An array as it lies in a file; its bytes are only looked at by ``array()``."""
+    """An array in a file; only ``array()`` looks at its bytes."""
 
     dtype: str
     shape: tuple[int, ...]
@@ -67,7 +67,7 @@ class Tensor(NamedTuple):
         """Copy an array.
 
         Args:
-            array: ``has_tensor()`` tells whether its dtype has a name.
+            array: an array with a dtype that ``has_tensor()`` accepts.
             by_column: whether to transpose it, see ``COLUMN_TENSORS``.
         """
         dtype = array.dtype
@@ -83,18 +83,18 @@ class Tensor(NamedTuple):
         return cls(name, array.shape, array.tobytes())
 
     def array(self) -> np.ndarray:
-        """Return the array, as a copy in the machine's own byte order."""
+        """Return a copy of the array in native byte order."""
         array = np.frombuffer(self.data, _DTYPES[self.dtype]).reshape(self.shape)
         return array.astype(_NATIVE[self.dtype])
 
 
 @dataclass(slots=True)
 class Parts:
-    """A value in parts, as a space's members and its batches travel.
+    """A member or batch of a space, in parts.
 
     Attributes:
-        tensors: each part that is made of numbers, by its name.
-        texts: each text, by its name.
+        tensors: the numeric parts by name.
+        texts: the texts by name.
         by_column: whether the tensors are transposed, see ``COLUMN_TENSORS``.
     """
 
@@ -107,7 +107,7 @@ _FEW_COLUMNS = 16
 
 
 def _by_rows(array: np.ndarray) -> np.ndarray:
-    """Return an array that lies by columns, as CartPole's do, by rows; NumPy takes longer."""
+    """Copy a column-major array, such as CartPole's, to rows; faster than NumPy."""
     rows = np.empty(array.shape, array.dtype)
     for column in range(array.shape[1]):
         rows[:, column] = array[:, column]
@@ -115,31 +115,31 @@ def _by_rows(array: np.ndarray) -> np.ndarray:
 
 
 class TensorFile(NamedTuple):
-    """What a file holds."""
+    """The contents of a file."""
 
     tensors: dict[str, Tensor]
     metadata: dict[str, str]
 
 
 def write(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:
-    """Return a file; see ``join()``."""
+    """Return tensors and metadata as a file; see ``join()``."""
     return join(tensors, quoted(metadata))
 
 
 def quoted(metadata: Mapping[str, str]) -> bytes:
-    """Return metadata as they stand in a header."""
+    """Return metadata as they appear in a header."""
     return _encode(metadata)[1:-1].encode("ascii")
 
 
 def join(tensors: Mapping[str, Tensor], metadata: bytes) -> bytes:
-    """Return a file.
+    """Return tensors and metadata as a file.
 
-    The metadata comes last in the header: what lies before it is the same for the same names,
-    dtypes and shapes, so that a reader can know it again.
+    The metadata comes last in the header. The part before it depends only on names, dtypes and
+    shapes, so a reader can recognize it.
 
     Args:
-        tensors: by name.
-        metadata: as ``quoted()`` returns them, joined by commas.
+        tensors: the tensors by name.
+        metadata: results of ``quoted()``, joined by commas.
     """
     names, beginning = _layout(
         tuple([(name, tensor.dtype, tensor.shape) for name, tensor in tensors.items()])
@@ -149,11 +149,11 @@ def join(tensors: Mapping[str, Tensor], metadata: bytes) -> bytes:
 
 
 def add_metadata(file: bytes, metadata: bytes) -> bytes:
-    """Return a file with one more text, after the others that it must have.
+    """Append to the metadata of a file, which must not be empty.
 
     Args:
-        file: as ``join()`` returns it; it is not looked at more closely.
-        metadata: as ``quoted()`` returns them.
+        file: a file from ``join()``.
+        metadata: the result of ``quoted()``.
     """
     end = 8 + int.from_bytes(file[:8], "little")
     header = b"%b,%b}}" % (file[8:end].rstrip(b" ").removesuffix(b"}}"), metadata)
@@ -161,7 +161,7 @@ def add_metadata(file: bytes, metadata: bytes) -> bytes:
 
 
 def _headed(header: bytes) -> tuple[bytes, bytes]:
-    """Return the length of a header and itself, as they begin a file."""
+    """Pad a header; return its length as bytes, and the header."""
     header += b" " * (-len(header) % 8)
     return len(header).to_bytes(8, "little"), header
 
@@ -169,13 +169,13 @@ def _headed(header: bytes) -> tuple[bytes, bytes]:
 _encode = json.JSONEncoder(separators=(",", ":")).encode
 
 
-# Step after step has the same.
+# All steps of an environment have the same.
 @lru_cache(maxsize=256)
 def _layout(entries: tuple[tuple[str, str, tuple[int, ...]], ...]) -> tuple[list[str], bytes]:
-    """Return the order in which tensors lie in a file, and the header before its metadata."""
+    """Return the order of tensors in a file, and the header before its metadata."""
     header: dict[str, object] = {}
     begin = 0
-    # The widest first, so that each lies where its dtype may.
+    # The widest dtypes first, so that all tensors are aligned.
     for name, dtype, shape in sorted(entries, key=lambda entry: -_DTYPES[entry[1]].itemsize):
         end = begin + math.prod(shape) * _DTYPES[dtype].itemsize
         header[name] = {"dtype": dtype, "shape": shape, "data_offsets": (begin, end)}
@@ -185,10 +185,10 @@ def _layout(entries: tuple[tuple[str, str, tuple[int, ...]], ...]) -> tuple[list
 
 
 def read(raw: bytes) -> TensorFile:
-    """Return what a file holds; nothing is allocated on the word of its header.
+    """Read a file. The sizes in its header are checked before anything is allocated.
 
     Raises:
-        GymServerError: ``malformed_tensors`` for anything that is not exactly as it should be.
+        GymServerError: ``malformed_tensors`` if the file violates the format in any way.
     """
     try:
         return _read(raw)
@@ -197,7 +197,7 @@ def read(raw: bytes) -> TensorFile:
 
 
 def malformed_tensors(reason: str) -> GymServerError:
-    """A body is no safetensors file, or not the one that is needed."""
+    """Report a body that is not a safetensors file, or not the required one."""
     return GymServerError("malformed_tensors", f"The request's tensors cannot be read: {reason}")
 
 
@@ -212,10 +212,10 @@ def _read(raw: bytes) -> TensorFile:
         )
     header = _header.decode(raw[8 : 8 + length].decode("utf-8"))
     if not isinstance(header, dict):
-        raise ValueError("the header is no JSON object")
+        raise ValueError("the header is not a JSON object")
     metadata = header.pop("__metadata__", {})
     if not isinstance(metadata, dict) or not all(isinstance(v, str) for v in metadata.values()):
-        raise ValueError("the metadata holds more than texts")
+        raise ValueError("the metadata must be texts")
     data = memoryview(raw)[8 + length :]
     places = {name: _place(name, entry) for name, entry in header.items()}
     _check_places(places, len(data))
@@ -232,7 +232,7 @@ def _read(raw: bytes) -> TensorFile:
 def _unique(pairs: list[tuple[str, object]]) -> dict:
     result = dict(pairs)
     if len(result) < len(pairs):
-        raise ValueError("the header has one name twice")
+        raise ValueError("the header has a name twice")
     return result
 
 
@@ -240,7 +240,7 @@ _header = json.JSONDecoder(object_pairs_hook=_unique)
 
 
 class _Place(NamedTuple):
-    """What a header says of a tensor."""
+    """A tensor's entry in the header."""
 
     dtype: str
     shape: tuple[int, ...]
@@ -253,13 +253,13 @@ def _place(name: str, entry: object) -> _Place:
         raise ValueError(f"tensor {name!r} needs exactly dtype, shape and data_offsets")
     dtype, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
     if not isinstance(dtype, str) or dtype not in _DTYPES:
-        raise ValueError(f"tensor {name!r} has a dtype other than {', '.join(_DTYPES)}")
+        raise ValueError(f"tensor {name!r} must have one of the dtypes {', '.join(_DTYPES)}")
     if not _naturals(shape):
         raise ValueError(f"tensor {name!r} has no shape")
     if not _naturals(offsets) or len(offsets) != 2:
         raise ValueError(f"tensor {name!r} has no offsets")
     if offsets[1] - offsets[0] != math.prod(shape) * _DTYPES[dtype].itemsize:
-        raise ValueError(f"the offsets of tensor {name!r} are not those of its shape")
+        raise ValueError(f"the offsets of tensor {name!r} do not fit its shape")
     return _Place(dtype, tuple(shape), *offsets)
 
 
@@ -268,7 +268,7 @@ def _naturals(value: object) -> bool:
 
 
 def _check_places(places: Mapping[str, _Place], length: int) -> None:
-    """Raise ValueError unless the tensors fill the data, one after the other."""
+    """Raise ValueError unless the tensors fill the data without gaps."""
     end = 0
     for name, place in sorted(places.items(), key=lambda item: (item[1].begin, item[1].end)):
         if place.begin != end:

@@ -1,1 +1,1 @@
-"""The one thread that draws, and pictures as PNG."""
+"""The thread that draws, and pictures as PNG."""

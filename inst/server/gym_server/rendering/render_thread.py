@@ -1,8 +1,8 @@
 """The one thread that draws.
 
-There is one pygame per process: an environment's ``close()`` calls ``pygame.quit()``, which takes
-the fonts of all the others away; and an OpenGL context belongs to the thread that created it.
-So everything that draws, or closes what was drawn, runs here, and pygame ends with the process.
+There is one pygame per process: an environment's ``close()`` calls ``pygame.quit()``, which removes
+the fonts of all other environments. An OpenGL context belongs to the thread that created it. So all
+drawing, and closing of what was drawn, runs here, and pygame ends with the process.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from gym_server.threads.interrupt import interrupt
 ResultT = TypeVar("ResultT")
 
 
-# How often a thread that waits for its turn looks whether it may wait on.
+# How often a thread that waits for its turn asks whether to keep waiting.
 _POLL_SECONDS = 0.02
 
 
 class Occupied(Exception):  # noqa: N818
-    """The render thread has other things to do."""
+    """The render thread is busy with other work."""
 
 
 class _Job:
@@ -35,9 +35,9 @@ class _Job:
 
     Attributes:
         caller: the thread that waits for the result.
-        draw: what is to be done.
-        future: the result.
-        began: since when it runs, in the clock's seconds; None while it waits for its turn.
+        draw: the function to run.
+        future: its result.
+        began: when it started, in the clock's seconds; None while it waits for its turn.
     """
 
     def __init__(self, draw: Callable[[], object]) -> None:
@@ -48,10 +48,10 @@ class _Job:
 
 
 class RenderThread:
-    """Runs one piece of drawing or closing after the other."""
+    """Runs drawing and closing functions one after another."""
 
     def __init__(self) -> None:
-        """Start no thread yet: a server that never draws has none."""
+        """Start no thread yet: a server that never draws needs none."""
         self._lock = threading.Lock()
         self._queue: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
@@ -62,16 +62,16 @@ class RenderThread:
         self._jobs: dict[int, _Job] = {}
 
     def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
-        """Run a function on the render thread; return its result or raise what it raises."""
+        """Run a function on the render thread; return its result or raise its exception."""
         if threading.current_thread() is self._thread:
-            # Drawing calls for drawing, as a monitor does of an environment that always draws.
+            # Drawing may call for drawing, for example in a monitored environment.
             return draw(*args)
         with self._job(draw, *args) as job:
             result: ResultT = job.future.result()
             return result
 
     def close(self, close: Callable[[], object], drawn: bool) -> None:
-        """Close an environment: on the render thread where it was drawn, at once where not."""
+        """Close an environment: on the render thread if it has drawn, else in this thread."""
         if drawn:
             self.run(close)
         else:
@@ -83,9 +83,9 @@ class RenderThread:
         """Run a function on the render thread, unless its turn takes too long to come.
 
         Args:
-            may_wait: tells whether to wait on; asked every 20 ms until the function begins.
+            may_wait: returns whether to keep waiting; called every 20 ms until the function starts.
             draw: the function.
-            *args: what it is called with.
+            *args: its arguments.
 
         Raises:
             Occupied: its turn did not come, and it will not run.
@@ -113,7 +113,7 @@ class RenderThread:
             self._jobs.pop(job.caller, None)
 
     def _start(self) -> None:
-        # A daemon: drawing that never ends must not keep the process.
+        # A daemon thread, so that drawing that never ends does not keep the process alive.
         self._thread = threading.Thread(target=self._work, name="render", daemon=True)
         self._thread.start()
 
@@ -122,11 +122,11 @@ class RenderThread:
             self._running = job
             if not self._do(job):
                 return
-            # The picture must not be kept until the next job comes.
+            # Do not keep the picture until the next job comes.
             self._running = job = None
 
     def _do(self, job: _Job) -> bool:
-        """Do a job; return False when another thread has become the render thread meanwhile."""
+        """Run a job; return False if another thread has replaced this one meanwhile."""
         job.began = time.monotonic()
         if not job.future.set_running_or_notify_cancel():
             return True
@@ -144,10 +144,9 @@ class RenderThread:
         return True
 
     def began(self, thread: int) -> float | None:
-        """Return since when the job that a thread waits for has been running.
+        """Return when the job that a thread waits for started, in the clock's seconds.
 
-        In the clock's seconds; None when it does not wait for the render thread, now when it
-        waits for its turn.
+        None if the thread does not wait for a job, the current time if the job has not started.
         """
         job = self._jobs.get(thread)
         if job is None:
@@ -155,14 +154,14 @@ class RenderThread:
         return time.monotonic() if job.began is None else job.began
 
     def abandon(self, thread: int, why: Exception) -> bool:
-        """Leave the render thread alone if it hangs in a thread's job; another one does the rest.
+        """Replace the render thread if it is stuck in a thread's job.
 
         Args:
-            thread: the one that waits for the job's result, or the render thread itself.
-            why: what is raised in the thread that waits.
+            thread: the thread that waits for the job's result, or the render thread itself.
+            why: the exception to raise in the waiting thread.
 
         Returns:
-            Whether it was so.
+            Whether the render thread was stuck there and was replaced.
         """
         with self._lock:
             job = self._running
@@ -173,21 +172,21 @@ class RenderThread:
                 return False
             job.future.set_exception(why)
             self._running = None
-            # Before anything that waits: the thread could end then, and another get its identity.
+            # Interrupt before waiting: the thread could end, and another get its identity.
             interrupt(hanging)
             self._in_progress.answered(job)
             self._start()
             return True
 
     def abandon_if_began_before(self, moment: float, why: Exception) -> bool:
-        """Leave the render thread alone if its job takes too long; another one does the rest.
+        """Replace the render thread if its job takes too long.
 
         Args:
-            moment: a job that began before it takes too long, in the clock's seconds.
-            why: what is raised in the thread that waits for the result.
+            moment: the latest allowed start of the job, in the clock's seconds.
+            why: the exception to raise in the thread that waits for the result.
 
         Returns:
-            Whether it was so.
+            Whether the render thread was replaced.
         """
         job = self._running
         if job is None or job.began is None or job.began >= moment:
@@ -195,7 +194,7 @@ class RenderThread:
         return self.abandon(job.caller, why)
 
     def stop(self) -> None:
-        """Let what is queued finish, and end the thread."""
+        """Finish the queued jobs, and end the thread."""
         with self._lock:
             self._stopped = True
             self._queue.put(None)
@@ -204,9 +203,8 @@ class RenderThread:
 
 
 def _keep_pygame_and(draw: Callable[..., ResultT], *args: object) -> ResultT:
-    # Environments import pygame when they first draw and quit it when they close, so looking
-    # before each piece of work is early enough, and a server that never draws never pays for
-    # the import.
+    # Environments import pygame when they first draw and quit it when they close. Checking before
+    # each job is early enough, and a server that never draws never pays for the import.
     if "pygame" in sys.modules:
         import pygame
 
@@ -215,4 +213,4 @@ def _keep_pygame_and(draw: Callable[..., ResultT], *args: object) -> ResultT:
 
 
 def _quit_later() -> None:
-    """Stand in for pygame's quit, which pygame itself runs when the process ends."""
+    """Replace pygame's quit functions; pygame runs its own at the end of the process."""

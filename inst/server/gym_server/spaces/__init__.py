@@ -1,12 +1,12 @@
-"""Spaces on the wire: describe them, encode their members, decode what a client sends.
+"""Spaces in requests and responses: describe them, encode their members, decode client values.
 
-Each of the three is a ``functools.singledispatch`` function; every kind of space registers its
-own in a file of its name.  ``tensor_parts`` encodes and decodes members as tensors.
+Each of the three is a ``functools.singledispatch`` function. Every kind of space registers its
+implementations in a file of its name. ``tensor_parts`` encodes and decodes members as tensors.
 """
 
 from gym_server.protocol.safetensors import Parts
 
-# Importing a kind registers it.
+# Importing a kind registers its functions.
 from gym_server.spaces import (  # noqa: F401
     box,
     dict_,

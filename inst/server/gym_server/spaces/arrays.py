@@ -14,7 +14,7 @@ from gym_server.spaces.kinds import NotInSpace
 
 
 class ArraySpace(Protocol):
-    """What is needed of a space whose members are arrays, or of a batch of such members."""
+    """A space whose members are arrays, or a batch of such members."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -22,23 +22,23 @@ class ArraySpace(Protocol):
 
     @property
     def dtype(self) -> np.dtype:
-        """Their dtype."""
+        """The dtype of the arrays."""
 
 
 def is_number(value: object) -> bool:
-    """Tell whether a JSON value is a number; a boolean is none."""
+    """Return whether a JSON value is a number; booleans are not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def read_integer(value: Any) -> int:
-    """Return the integer that a JSON number stands for, else raise TypeError."""
+    """Read an integer from a JSON number, else raise TypeError."""
     if not is_number(value) or value % 1 != 0:
         raise TypeError("not an integer")
     return int(value)
 
 
 def read_bit(value: object) -> bool:
-    """Return the bit that a JSON boolean, 0 or 1 stands for, else raise TypeError."""
+    """Read a bit from a JSON boolean, 0 or 1, else raise TypeError."""
     if not isinstance(value, (int, float)) or value not in (0, 1):
         raise TypeError("not a bit")
     return bool(value)
@@ -63,17 +63,17 @@ _READERS = {"f": _float, "i": read_integer, "u": _natural, "b": read_bit}
 
 
 def reader_of(dtype: np.dtype) -> Callable[[object], object]:
-    """Return what reads one element of an array of a dtype out of JSON."""
+    """Return the function that reads one array element of a dtype from JSON."""
     return _READERS[dtype.kind]
 
 
 def as_number(value: object) -> object:
-    """Return true and false as 1 and 0, for Discrete and MultiDiscrete; others as they are."""
+    """Convert true and false to 1 and 0, for Discrete and MultiDiscrete."""
     return int(value) if isinstance(value, bool) else value
 
 
 def choice_reader_of(dtype: np.dtype) -> Callable[[object], object]:
-    """Return what reads one element of a MultiDiscrete of a dtype out of JSON."""
+    """Return the function that reads one element of a MultiDiscrete from JSON."""
     read = reader_of(dtype)
     return lambda value: read(as_number(value))
 
@@ -87,8 +87,8 @@ class Bounds:
 
     @cached_property
     def _same_for_all(self) -> tuple[Any, Any] | None:
-        """The bounds as two numbers, where all elements have the same."""
-        # What is derived from NumPy's arrays compares as it likes.
+        """The bounds as two numbers, if all elements have the same bounds."""
+        # Subclasses of ndarray may compare differently.
         if not {type(self.low), type(self.high)} <= {np.ndarray, int}:
             return None
         low, high = np.asarray(self.low), np.asarray(self.high)
@@ -97,25 +97,25 @@ class Bounds:
         return low.flat[0].item(), high.flat[0].item()
 
     def hold(self, array: np.ndarray) -> bool:
-        """Tell whether all elements of an array lie inside; NaN does not."""
+        """Return whether all elements are within the bounds; NaN is not."""
         same = self._same_for_all
         if same is None or not array.size:
             inside = (array >= self.low) & (array <= self.high)
             return bool(inside.all())
         low, high = same
-        # Two passes without an array between them.
+        # Two passes, without a temporary array.
         least, most = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
         return bool(least >= low and most <= high)
 
 
 @singledispatch
 def bounds_of(space: object) -> Bounds:
-    """Return the smallest and the largest member of a space of arrays; batches have the same."""
+    """Return the bounds of a space of arrays. They apply to batches too."""
     raise TypeError(f"no bounds for {type(space).__name__}")
 
 
 def check_bounds(space: object, bounds: Bounds, array: np.ndarray) -> None:
-    """Raise NotInSpace, with the index, for the first element that lies outside (or is NaN)."""
+    """Raise NotInSpace, with the index, for the first element outside the bounds, or NaN."""
     if not bounds.hold(array):
         inside = (array >= bounds.low) & (array <= bounds.high)
         first = tuple(int(index) for index in np.argwhere(~inside)[0])
@@ -127,17 +127,17 @@ def check_bounds(space: object, bounds: Bounds, array: np.ndarray) -> None:
 def read_array(
     space: ArraySpace, bounds: Bounds, read_element: Callable[[object], object], value: object
 ) -> np.ndarray:
-    """Return a JSON value as an array of a space's dtype and shape.
+    """Read a JSON value as an array of a space's dtype and shape.
 
     Args:
         space: the space.
-        bounds: what its members lie between.
+        bounds: the bounds of its members.
         read_element: reads one element, or raises TypeError, ValueError or OverflowError.
-        value: nested lists of the space's shape, a flat list of as many elements, or for the
-            shape (1,) a bare element.
+        value: nested lists of the space's shape, a flat list with as many elements, or for the
+            shape (1,) a single element.
 
     Raises:
-        NotInSpace: with the path to the element that does not fit, when it is one element.
+        NotInSpace: the value does not fit; with the path to the first element that does not.
     """
     is_bare = space.shape == (1,) and not isinstance(value, list)
     nested = [value] if is_bare else value
@@ -151,7 +151,7 @@ def read_array(
         if is_bare:
             refusal.path.clear()
         elif array.shape != space.shape:
-            # The client sent a flat list, and the path must lead to the element there.
+            # The client sent a flat list, so the path must be an index into it.
             index: tuple[Any, ...] = tuple(refusal.path)
             refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
         raise
@@ -179,14 +179,14 @@ def _float_array(numbers: object, dtype: np.dtype) -> np.ndarray:
     doubles = np.array(numbers, dtype=np.float64)
     with np.errstate(over="ignore", under="ignore"):
         array = doubles.astype(dtype)
-    # A number that the dtype cannot hold must not slip in as an infinity.
+    # Numbers outside the dtype's range must not become infinite.
     if np.any(np.isinf(array) & np.isfinite(doubles)):
         raise OverflowError("out of the dtype's range")
     return array
 
 
 def _integer_array(numbers: object, dtype: np.dtype) -> np.ndarray:
-    # NumPy 1 wraps a number that a small dtype cannot hold, so the widest one comes first.
+    # NumPy 1 wraps numbers outside a small dtype's range, so read into the widest first.
     wide = np.array(numbers, dtype=np.uint64 if dtype.kind == "u" else np.int64)
     array = wide.astype(dtype)
     if np.any(array != wide):
@@ -195,7 +195,7 @@ def _integer_array(numbers: object, dtype: np.dtype) -> np.ndarray:
 
 
 def _refusal(space: ArraySpace, read_element: Callable, value: object) -> NotInSpace:
-    """Return the refusal of the first bad element; of the whole value when each element is good."""
+    """Return the error for the first bad element, or for the whole value if none is bad."""
     to_array = _float_array if space.dtype.kind == "f" else _integer_array
     for path, element in _elements(value, len(space.shape), ()):
         try:

@@ -1,8 +1,8 @@
-"""Batches of members of a space, one for each sub-environment, as in Gymnasium's vector classes.
+"""Batches of members, one per sub-environment, as in Gymnasium's vector environments.
 
-Arrays have the sub-environments along their first axis, Tuples and Dicts are batched part by part,
-and Text, Sequence, Graph and OneOf have one entry for each sub-environment.  Nothing here loops
-over the sub-environments of an array.
+Arrays have the sub-environments along their first axis. Tuples and Dicts are batched part by part.
+Text, Sequence, Graph and OneOf have a tuple with one entry per sub-environment. Arrays are handled
+without a loop over the sub-environments.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gym_server.spaces.tensor_parts import Rows
 
 @singledispatch
 def encode_batch(space: Space, batch: Any) -> Any:
-    """Return a batch of members of a space as JSON values (floats may still be non-finite)."""
+    """Encode a batch of members as JSON values (floats may still be non-finite)."""
     return [encode(space, member) for member in batch]
 
 
@@ -55,21 +55,21 @@ def _(space: Dict, batch: dict) -> object:
 
 
 def encode_sub_envs(space: Space, batch: object) -> list:
-    """Return a batch as a list of JSON values, as ``decode_sub_envs()`` reads it."""
+    """Encode a batch as a list of JSON values, the format that ``decode_sub_envs()`` reads."""
     return [encode(space, member) for member in unstack(space, batch)]
 
 
 def decode_sub_envs(space: Space, value: object, rows: Rows) -> object:
-    """Return the batch that a list of JSON values stands for, one for each sub-environment.
+    """Decode a list of JSON values, one per sub-environment, to a batch.
 
     Args:
-        space: of one sub-environment.
+        space: the space of one sub-environment.
         value: the list.
         rows: the sub-environments.
 
     Raises:
-        NotInSpace: for a wrong number of sub-environments; for a value that is no member, with the
-            sub-environment (from 0) as the first step of its path.
+        NotInSpace: the list has the wrong length, or a value is not a member. The path then starts
+            with the sub-environment's index, from 0.
     """
     if not isinstance(value, list) or len(value) != rows.number:
         found = f", not {len(value)}" if isinstance(value, list) else ", as a list"
@@ -78,14 +78,14 @@ def decode_sub_envs(space: Space, value: object, rows: Rows) -> object:
         try:
             return _all_at_once(space, value)
         except (TypeError, ValueError, OverflowError, NotInSpace):
-            # Some values may be written in another way that is allowed; else the refusal must name
-            # the sub-environment. So decode them one by one.
+            # Decode one by one: some values may be written in another allowed way. If not, the
+            # error names the sub-environment.
             pass
     return stack(space, [decode_part(space, item, sub_env) for sub_env, item in enumerate(value)])
 
 
 class _Batched(NamedTuple):
-    """As much of a batched space as ``read_array()`` needs."""
+    """The part of a batched space that ``read_array()`` needs."""
 
     shape: tuple[int, ...]
     dtype: np.dtype

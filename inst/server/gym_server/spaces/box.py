@@ -1,4 +1,4 @@
-"""Box: numbers between bounds, of any dtype and shape."""
+"""Box: numbers within bounds, of any dtype and shape."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from gym_server.spaces.arrays import Bounds, bounds_of, read_array, reader_of
 from gym_server.spaces.kinds import decode, description, encode
 
-# Classic clients cannot read infinities; they know this number instead.
+# Classic clients cannot read infinities; they use this number instead.
 _INFINITIES = {math.inf: 1e100, -math.inf: -1e100}
 
 

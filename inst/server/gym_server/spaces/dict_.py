@@ -1,4 +1,4 @@
-"""Dict: members by name, each of a space of its own."""
+"""Dict: members by name, each with its own space."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _(space: Dict) -> dict[str, object]:
     return {
         "name": "Dict",
         "dtype": None,
-        # A list: not every reader of JSON keeps the order of an object.
+        # A list, because not every JSON reader keeps the order of an object.
         "spaces": [
             {"key": str(key), "space": description(part)} for key, part in space.spaces.items()
         ],
@@ -30,7 +30,7 @@ def _(space: Dict, value: Any) -> Any:
 @decode.register
 def _(space: Dict, value: object) -> object:
     if value == [] and not space.spaces:
-        # R writes an empty list and an empty object alike.
+        # R's empty list and empty object look the same.
         return {}
     if not isinstance(value, dict):
         raise NotInSpace(space, value, "an object is needed")
@@ -38,5 +38,5 @@ def _(space: Dict, value: object) -> object:
     for text in by_text.keys() - value.keys():
         raise NotInSpace(space, value, f"{brief(text)} is missing")
     for text in value.keys() - by_text.keys():
-        raise NotInSpace(space, value, f"{brief(text)} is none of its keys")
+        raise NotInSpace(space, value, f"{brief(text)} is not one of its keys")
     return {key: decode_part(space.spaces[key], value[text], text) for text, key in by_text.items()}

@@ -28,12 +28,12 @@ def _(space: Discrete, value: Any) -> Any:
 
 @bounds_of.register
 def _(space: Discrete) -> Bounds:
-    # Python's own integers: an array is compared with them in its own dtype.
+    # Python integers: NumPy compares an array with them in the array's dtype.
     return Bounds(int(space.start), int(space.start) + int(space.n) - 1)
 
 
 def wide_dtype(space: Discrete) -> np.dtype:
-    """Return the dtype in which the members of a Discrete space travel as tensors."""
+    """Return the dtype of a Discrete space's tensors."""
     return np.dtype(np.uint64 if space.dtype == np.uint64 else np.int64)
 
 

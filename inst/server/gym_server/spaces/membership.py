@@ -1,4 +1,4 @@
-"""Answer whether a value is a member of a space, or whether a description fits it."""
+"""Check whether a value is a member of a space, or a description matches it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from gym_server.spaces.kinds import NotInSpace
 
 
 def contains(claim: dict, decode: Callable[[object], object], describe: Callable[[], dict]) -> bool:
-    """Answer "contains" as a client asks it.
+    """Answer a client's "contains" question.
 
     Args:
-        claim: ``{"value": ...}`` asks whether a JSON value stands for a member; anything else is
-            a classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
-            whether all of it is true of the space.
-        decode: returns the member that a JSON value stands for, or raises ``NotInSpace``.
+        claim: ``{"value": ...}`` asks whether a JSON value represents a member. Anything else is a
+            classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
+            whether all of it matches the space.
+        decode: returns the member that a JSON value represents, or raises ``NotInSpace``.
         describe: returns the space's description.
     """
     if "value" not in claim:
@@ -30,7 +30,7 @@ def contains(claim: dict, decode: Callable[[object], object], describe: Callable
 
 
 def _describes(claim: dict, space_info: dict) -> bool:
-    """Tell whether all of a classic client's description is true of a space."""
+    """Return whether all of a classic client's description matches a space."""
     return all(
         name in space_info and _same(value, space_info[name]) for name, value in claim.items()
     )
@@ -50,6 +50,6 @@ def _same(claimed: Any, real: object) -> bool:
     if isinstance(real, bool):
         return claimed is real
     if is_number(claimed) and isinstance(real, float):
-        # R's jsonlite writes only 15 digits of a bound that has 17.
+        # R's jsonlite writes only 15 of up to 17 digits.
         return math.isclose(claimed, real, rel_tol=1e-12)
     return type(claimed) is not bool and bool(claimed == real)

@@ -1,4 +1,4 @@
-"""MultiDiscrete: an array of integers, each with a start and a number of values of its own."""
+"""MultiDiscrete: an array of integers, each with its own start and number of values."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def _(space: MultiDiscrete, value: object) -> object:
 
 @bounds_of.register
 def _(space: MultiDiscrete) -> Bounds:
-    # The largest fits the dtype where start + nvec does not.
+    # start + nvec may exceed the dtype where the largest value does not.
     return Bounds(space.start, space.start + (space.nvec - 1))

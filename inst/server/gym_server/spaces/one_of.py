@@ -1,4 +1,4 @@
-"""OneOf: a member of one of some spaces, and which one it is."""
+"""OneOf: a member of one of several spaces, and the index of that space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Members of one space as a batch, as Gymnasium stacks them, and apart again."""
+"""Stack members of a space to a batch, as Gymnasium does, and take batches apart."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
 
 @singledispatch
 def stack(space: Space, members: list) -> Any:
-    """Return members of a space as one batch: arrays with the members along the first axis.
+    """Stack members of a space to a batch: arrays with the members along the first axis.
 
-    Tuples and Dicts are stacked part by part; Text, Sequence, Graph and OneOf have no batch but
-    a tuple.
+    Tuples and Dicts are stacked part by part. Text, Sequence, Graph and OneOf become a tuple of the
+    members.
     """
     return tuple(members)
 
@@ -64,7 +64,7 @@ def _(space: Dict, batch: dict) -> list:
 
 
 def member_of(space: Space, batch: Any, row: int) -> object:
-    """Return one member of a batch as Gymnasium's vector environments have it."""
+    """Return one member of a batch, in the format of Gymnasium's vector environments."""
     match space:
         case Dict():
             return {key: member_of(part, batch[key], row) for key, part in space.spaces.items()}
@@ -76,7 +76,7 @@ def member_of(space: Space, batch: Any, row: int) -> object:
 
 
 def join(space: Space, batches: list) -> Any:
-    """Return batches as Gymnasium's vector environments have them as one batch."""
+    """Concatenate batches in the format of Gymnasium's vector environments."""
     if len(batches) == 1:
         return batches[0]
     match space:

@@ -9,16 +9,16 @@ from gymnasium.spaces import Box, Dict, Graph, OneOf, Sequence, Space, Tuple
 from gym_server.errors import GymServerError
 from gym_server.spaces.kinds import brief_space, description
 
-# How deep the lists and objects of a member may be nested as JSON. Recursion has a limit in Python
-# and in JSON readers, and a space that contains itself must be refused.
+# How deeply a member's JSON may be nested. Python and JSON readers limit recursion, and a space
+# that contains itself must be refused.
 DEEPEST = 100
 
 
 def describe(space: Space) -> dict[str, object]:
-    """Return a space's name, dtype and all that its constructor needs, as JSON values.
+    """Return a space's name, dtype and constructor arguments as JSON values.
 
     Raises:
-        GymServerError: ``unsupported_space`` for one that cannot be described in full.
+        GymServerError: ``unsupported_space`` if it cannot be described in full.
     """
     _check(space, space, 0)
     return description(space)
@@ -28,14 +28,14 @@ def _check(space: Space, whole: Space, depth: int) -> None:
     if description.dispatch(type(space)) is description.dispatch(object):
         raise _unsupported(
             brief_space(whole),
-            f"spaces of kind {type(space).__name__} are not supported",
+            f"spaces of type {type(space).__name__} are not supported",
             "supported are " + ", ".join(sorted(_supported())),
         )
     if depth + len(space.shape or ()) > DEEPEST:
-        # Its text would be as deep: a destructor that Python runs there would fail.
+        # Do not print it: its repr() recurses as deeply, and a destructor that runs there fails.
         raise _unsupported(type(whole).__name__, f"it is nested deeper than {DEEPEST} levels")
     if isinstance(space, Box) and space.dtype.kind == "f" and space.dtype.itemsize > 8:
-        wide = f"its dtype {space.dtype.name} has more digits than the wire"
+        wide = f"its dtype {space.dtype.name} has more digits than can be sent"
         raise _unsupported(brief_space(whole), wide)
     if isinstance(space, Dict) and len(set(map(str, space.spaces))) < len(space.spaces):
         raise _unsupported(brief_space(whole), "two of its keys are the same as text")

@@ -1,11 +1,11 @@
-"""Members of a space, and batches of them, as tensors; parts are named by JSON pointer.
+"""Members of a space, and batches, as tensors; parts are named by JSON pointers.
 
-A batch has the sub-environments along the first axes of its tensors: a member is a batch without
-that axis. Only Text differs: it has a text for each sub-environment.
+The tensors of a batch have the sub-environments along their first axis; those of a member lack that
+axis. Text is the exception: it has one text per sub-environment.
 
-Sequence, Graph and OneOf have no fixed parts and travel as JSON only, and so does a space that
-holds one of them.  What takes a space's members apart and puts them together is made once for a
-space, with the names of all its parts.
+Sequence, Graph, OneOf and spaces that contain them have no fixed parts and are sent as JSON only.
+The functions that take members apart and put them together are created once per space, together
+with the names of all parts.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from gym_server.spaces.stacking import ARRAYS
 
 
 class Rows(NamedTuple):
-    """How many members a batch has to have.
+    """The number of members in a batch.
 
     Attributes:
-        number: so many; None for one member without a batch.
-        whose: names the sub-environments, in words that follow "for each of".
+        number: the number; None for a single member instead of a batch.
+        whose: names the sub-environments, to complete "for each of ...".
     """
 
     number: int | None = None
@@ -47,18 +47,19 @@ class Rows(NamedTuple):
 
 ONE = Rows()
 
-# What leads to a part of a member.
+# Leads to a part of a member.
 Path = tuple[str | int, ...]
-# Puts the parts of a value into others.
+# Adds the parts of a value to the given ones.
 TakeApart = Callable[[Any, Parts], None]
-# Takes a value's parts out of others, and returns the value.
+# Removes a value's parts from the given ones, and returns the value.
 PutTogether = Callable[[Parts, Rows], object]
 
 
 def tensor_writer(space: Space, name: str, is_batch: bool) -> Callable[[Any, bool], Parts]:
-    """Return what returns a member of a space as tensors of a name; see ``travels_as_tensors()``.
+    """Return a function that writes members, or batches, of a space as tensors.
 
-    It is given the member, or the batch, and whether the tensors are wanted by column.
+    Its arguments are the member or batch, and whether to transpose the tensors. See
+    ``travels_as_tensors()`` for the spaces that it supports.
     """
     take_apart = _take_apart(space, name, is_batch)
 
@@ -71,10 +72,10 @@ def tensor_writer(space: Space, name: str, is_batch: bool) -> Callable[[Any, boo
 
 
 def tensor_reader(space: Space, name: str) -> Callable[[Parts, Rows], object]:
-    """Return what returns the member, or the batch, of a space that tensors of a name are.
+    """Return a function that reads a member, or a batch, of a space from tensors.
 
-    It raises NotInSpace when they are none: a part too few or too many, another dtype, shape or
-    number of rows, or outside the bounds.
+    It raises NotInSpace if a part is missing or unknown, has another dtype, shape or number of
+    rows, or is out of bounds.
     """
     put_together = _put_together(space, name, ())
 
@@ -91,7 +92,7 @@ def tensor_reader(space: Space, name: str) -> Callable[[Parts, Rows], object]:
 
 @singledispatch
 def travels_as_tensors(space: Space) -> bool:
-    """Tell whether the members of a space may travel as tensors."""
+    """Return whether the members of a space can be sent as tensors."""
     return isinstance(space, (*ARRAYS, Text))
 
 
@@ -102,7 +103,7 @@ def _take_apart(space: Space, name: str, is_batch: bool) -> TakeApart:
 
 @singledispatch
 def _put_together(space: Space, name: str, path: Path) -> PutTogether:
-    """Return what puts a value together, which a path leads to inside of the whole value."""
+    """Return the function that reads a part of a value, given the path to that part."""
 
     def refuse(parts: Parts, rows: Rows) -> object:
         refusal = NotInSpace(space, name, "its members travel as JSON")
@@ -113,7 +114,7 @@ def _put_together(space: Space, name: str, path: Path) -> PutTogether:
 
 
 def _part_name(name: str, key: object) -> str:
-    """Return the name of a part of what has a name: a JSON pointer."""
+    """Return the name of a part: a JSON pointer."""
     return f"{name}/{str(key).replace('~', '~0').replace('/', '~1')}"
 
 
@@ -156,7 +157,7 @@ def _(space: Any, name: str, path: Path) -> PutTogether:
 @_put_together.register
 def _(space: Discrete, name: str, path: Path) -> PutTogether:
     of_wide = _array_together(space, name, wide_dtype(space), path)
-    # R has only 32 bit integers, and sends a batch as such.
+    # R has only 32-bit integers, and sends batches of them.
     of_short = _array_together(space, name, np.dtype(np.int32), path)
     may_be_short = wide_dtype(space) == np.int64
 
@@ -185,7 +186,7 @@ def _array_together(
         try:
             check_bounds(space, bounds, array)
         except NotInSpace as refusal:
-            # The first step of its path is the sub-environment.
+            # The first step of the path is the sub-environment.
             at = 0 if rows.number is None else 1
             refusal.path[at:at] = path
             raise
@@ -195,7 +196,7 @@ def _array_together(
 
 
 def _misfit(space: Space, name: str, sent: Tensor | None, wanted: str, rows: Rows) -> NotInSpace:
-    """Return the refusal of a tensor that is missing, or of another dtype or shape."""
+    """Return the error for a tensor that is missing, or has another dtype or shape."""
     if sent is None:
         return NotInSpace(space, None, f"there is no tensor {name!r}")
     reason = f"{wanted} is needed"

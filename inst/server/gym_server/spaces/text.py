@@ -1,4 +1,4 @@
-"""Text: strings of some characters."""
+"""Text: strings over a set of characters."""
 
 from __future__ import annotations
 

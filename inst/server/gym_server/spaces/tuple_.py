@@ -1,4 +1,4 @@
-"""Tuple: a fixed number of members, each of a space of its own."""
+"""Tuple: a fixed number of members, each with its own space."""
 
 from __future__ import annotations
 

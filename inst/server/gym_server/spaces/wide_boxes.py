@@ -1,7 +1,7 @@
-"""Spaces for reading actions, with Boxes whose bounds are the limits of their dtype.
+"""Action spaces for reading, with Boxes as wide as their dtype.
 
-Gymnasium does not check the bounds of a Box when an environment steps. What happens to an action
-outside of them is up to the environment; most clip it.
+Gymnasium does not check the bounds of a Box in ``step()``. The environment decides what an action
+outside of them does; most environments clip it.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from gymnasium.spaces import Box, Dict, Graph, OneOf, Sequence, Space, Tuple
 
 
 class _WideBox(Box):
-    """A Box with the limits of its dtype as bounds, whose ``repr()`` is that of the original.
+    """A Box with its dtype's limits as bounds, and the ``repr()`` of the original.
 
-    An infinite bound stays infinite, because an infinity is a member only there.
+    Infinite bounds stay infinite, because only then is an infinity a member.
     """
 
     def __init__(self, space: Box) -> None:

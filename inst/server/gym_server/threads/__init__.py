@@ -1,1 +1,1 @@
-"""What one thread can do about another one that is stuck."""
+"""What one thread can do about another that is stuck."""

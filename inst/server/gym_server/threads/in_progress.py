@@ -1,4 +1,4 @@
-"""Work that is in progress, which exactly one thread ends: its own, or one that answers for it."""
+"""Work in progress that exactly one thread ends: its own, or the watchdog that answers for it."""
 
 from __future__ import annotations
 
@@ -9,30 +9,29 @@ from typing import Generic, TypeVar
 KeyT = TypeVar("KeyT", bound=Hashable)
 ValueT = TypeVar("ValueT")
 
-# Longer than it takes to send a short answer to a client that does not read.
+# Longer than it takes to send a short response to a client that does not read.
 ANSWERED_SECONDS = 5.0
 
 
 class InProgress(Generic[KeyT, ValueT]):
-    """What threads are working on, each piece of it under a key.
+    """The work that threads are doing, each piece under a key.
 
-    A thread that is stuck in an environment cannot answer its client, so a watchdog abandons its
-    work and answers on its behalf. The thread may come back at that very moment with a result
-    after all. A timeline:
+    A thread that is stuck in an environment cannot answer its client. A watchdog abandons its work
+    and answers for it. The thread may return with a result at that very moment:
 
-    1. The worker calls ``begin()`` and enters what may take too long.
-    2. Either the worker comes back first and calls ``finish()``, which returns True: the result is
-       valid, and the watchdog's ``abandon()`` returns False from now on.
-    3. Or the watchdog calls ``abandon()`` first, which returns True: the watchdog has to answer,
-       and the worker's ``finish()`` returns False from now on. When both come at once, one of them
-       takes the key out of a dict, which only one thread can, and the other one finds it gone.
-    4. The watchdog answers the client, and interrupts the worker.
-    5. The worker, where it comes back meanwhile, drops its result, puts away what is left, and
-       calls ``wait_until_answered()``. Had it gone on, its thread could be serving the next
-       request when the answer of 4 or the interrupt arrives.
-    6. The watchdog calls ``answered()``, and the worker goes on.
+    1. The worker calls ``begin()`` and starts something that may take too long.
+    2. Either the worker returns first and calls ``finish()``, which returns True: the result is
+       valid, and the watchdog's ``abandon()`` returns False from then on.
+    3. Or the watchdog calls ``abandon()`` first, which returns True: the watchdog must answer, and
+       the worker's ``finish()`` returns False from then on. If both call at once, only one of them
+       can take the key out of the dict, and the other finds it gone.
+    4. The watchdog answers the client and interrupts the worker.
+    5. If the worker returns meanwhile, it drops its result, cleans up, and calls
+       ``wait_until_answered()``. Otherwise its thread could already be serving the next request
+       when the answer or the interrupt of step 4 arrives.
+    6. The watchdog calls ``answered()``, and the worker continues.
 
-    A worker that serves no client itself may skip 5, and end.
+    A worker that does not serve clients itself may skip step 5 and end.
     """
 
     __slots__ = ("_abandoned", "_in_progress")
@@ -46,25 +45,25 @@ class InProgress(Generic[KeyT, ValueT]):
         return len(self._in_progress)
 
     def items(self) -> list[tuple[KeyT, ValueT]]:
-        """Return the work in progress, each piece's key with its value."""
+        """Return the key and value of each piece of work in progress."""
         return list(self._in_progress.items())
 
     def begin(self, key: KeyT, value: ValueT) -> None:
-        """Begin a piece of work.
+        """Start a piece of work.
 
         Args:
-            key: what it is known by; no other work has it at the same time.
-            value: whatever is to be known of it.
+            key: its key, unique among the work in progress.
+            value: any information about it.
         """
         self._in_progress[key] = value
 
     def finish(self, key: KeyT) -> bool:
-        """End a piece of work; return False when it was abandoned, or ended before."""
+        """End a piece of work; return False if it was abandoned or has ended."""
         return self._in_progress.pop(key, _NONE) is not _NONE
 
     def abandon(self, key: KeyT) -> bool:
-        """Take a piece of work away from its thread; return False when it is not in progress."""
-        # Before the worker can find its work gone, and wait for the answer.
+        """Take a piece of work from its thread; return False if it is not in progress."""
+        # Set the event first: the worker may find its work gone and wait for the answer.
         answered = threading.Event()
         if self._abandoned.setdefault(key, answered) is not answered:
             return False
@@ -74,13 +73,13 @@ class InProgress(Generic[KeyT, ValueT]):
         return False
 
     def answered(self, key: KeyT) -> None:
-        """Let the thread go on from which the work was taken, as it was answered for."""
+        """Let the thread whose work was abandoned continue: its client was answered."""
         answered = self._abandoned.pop(key, None)
         if answered is not None:
             answered.set()
 
     def wait_until_answered(self, key: KeyT) -> None:
-        """Wait, in a thread whose work was abandoned, until it was answered for."""
+        """Wait until the watchdog has answered; called by the thread whose work was abandoned."""
         answered = self._abandoned.get(key)
         if answered is not None:
             answered.wait(ANSWERED_SECONDS)

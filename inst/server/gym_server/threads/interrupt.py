@@ -1,4 +1,4 @@
-"""Break off what a thread does in an environment, once nobody waits for its result any more."""
+"""Interrupt a thread in an environment when nobody waits for its result any more."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 _lock = threading.Lock()
-# By the thread that is to be interrupted by them.
+# By the thread that they interrupt.
 _break_offs: dict[int, Callable[[], object]] = {}
 
 
@@ -16,10 +16,10 @@ _break_offs: dict[int, Callable[[], object]] = {}
 def interrupted_by(break_off: Callable[[], object]) -> Iterator[None]:
     """Let an interrupt of this thread call a function, and raise ``SystemExit`` only at the end.
 
-    For what must not end halfway, or waits for something that no exception breaks off.
+    Use it for work that must not end halfway, or that waits for something that no exception ends.
 
     Args:
-        break_off: lets the thread get to the end soon; called in the thread that interrupts.
+        break_off: makes the thread reach the end soon; runs in the interrupting thread.
     """
     thread = threading.get_ident()
     with _lock:
@@ -36,11 +36,11 @@ def interrupted_by(break_off: Callable[[], object]) -> Iterator[None]:
 def interrupt(thread: int) -> None:
     """Raise ``SystemExit`` in a thread whose work was abandoned, so that it ends silently.
 
-    The exception comes at the next step of Python code: a loop ends at once, a call into C that
-    never comes back does not. The caller must know that the thread has not gone on to other work.
+    Python raises it at the thread's next step of Python code: it ends a loop at once, but not a C
+    call that never returns. The caller must know that the thread has not moved on to other work.
 
     Args:
-        thread: its identity.
+        thread: the thread's identity.
     """
     with _lock:
         break_off = _break_offs.pop(thread, None)

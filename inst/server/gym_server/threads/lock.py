@@ -1,4 +1,4 @@
-"""The lock of an instance: one thread at a time resets or steps the environment, or looks at it."""
+"""An instance's lock: one thread at a time resets, steps or looks at the environment."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from gym_server.threads.in_progress import InProgress
 
 
 class InstanceLock:
-    """A lock that can be taken away from a thread that is stuck; a context for resets and steps.
+    """A lock that can be taken from a stuck thread; a context manager for resets and steps.
 
     Attributes:
-        closed: whether the environment is gone.
-        why: why the server closed it; None while it is open, or where its owner closed it.
+        closed: whether the environment is closed.
+        why: why the server closed it; None while it is open, or if its owner closed it.
         used: when the environment was last reset or stepped, in the clock's seconds.
-        watched: when somebody was last found to watch it, in the clock's seconds.
+        watched: when somebody was last seen watching it, in the clock's seconds.
     """
 
     def __init__(
@@ -26,21 +26,21 @@ class InstanceLock:
         close_abandoned: Callable[[], None],
         drawing_since: Callable[[int], float | None] = lambda thread: None,
     ) -> None:
-        """Make a lock that no thread has.
+        """Create a lock that no thread holds.
 
         Args:
             unknown: returns the error for an environment that its owner closed.
-            close_abandoned: closes the environment; called in a thread that comes back after the
-                lock was taken away from it.
-            drawing_since: returns since when the job has been running that a thread waits for the
-                render thread to do; see ``RenderThread.began()``.
+            close_abandoned: closes the environment; called by a thread that returns after the
+                lock was taken from it.
+            drawing_since: returns when the render thread started the job that a thread waits for;
+                see ``RenderThread.began()``.
         """
         self._unknown = unknown
         self._close_abandoned = close_abandoned
         self._drawing_since = drawing_since
         self._lock = threading.Lock()
-        # The thread that has the lock, and since when. The thread that ends this work, its own or
-        # the watchdog's, releases the lock.
+        # The thread that holds the lock, and since when. Whoever ends this work, the thread itself
+        # or the watchdog, releases the lock.
         self._held: InProgress[int, float] = InProgress()
         self._abandoned: int | None = None
         self.closed = False
@@ -52,7 +52,7 @@ class InstanceLock:
         """Wait for the lock, to reset or step the environment.
 
         Raises:
-            GymServerError: when the environment was closed meanwhile, see ``refusal()``.
+            GymServerError: the environment was closed meanwhile; see ``refusal()``.
         """
         self._lock.acquire()
         self.used = now = time.monotonic()
@@ -68,16 +68,16 @@ class InstanceLock:
             self._come_back(error)
 
     def acquire(self, timeout: float) -> bool:
-        """Take the lock only to look, which does not count as using the environment.
+        """Take the lock only to look, which does not count as use of the environment.
 
         Args:
-            timeout: how long to wait for it, in seconds.
+            timeout: how long to wait, in seconds.
 
         Returns:
-            Whether the caller has the lock now, and must ``release()`` it.
+            Whether the caller now holds the lock and must ``release()`` it.
 
         Raises:
-            GymServerError: when the environment was closed meanwhile, see ``refusal()``.
+            GymServerError: the environment was closed meanwhile; see ``refusal()``.
         """
         acquired = self._lock.acquire(timeout=timeout)
         if acquired:
@@ -95,9 +95,9 @@ class InstanceLock:
 
     @property
     def busy_since(self) -> float | None:
-        """Since when the thread with the lock has been working, in the clock's seconds, or None.
+        """When the thread that holds the lock started to work, in the clock's seconds, or None.
 
-        The work of a thread that waits for the render thread has not begun.
+        While that thread waits for the render thread, its work has not started.
         """
         for thread, since in self._held.items():
             began = self._drawing_since(thread)
@@ -105,14 +105,14 @@ class InstanceLock:
         return None
 
     def abandon(self, why: GymServerError) -> int | None:
-        """Close the environment, and take the lock away from the thread that has it.
+        """Close the environment, and take the lock from the thread that holds it.
 
         Args:
-            why: the error for every thread that waits for the lock, or will.
+            why: the error for every thread that waits for the lock, now or later.
 
         Returns:
-            The thread that had the lock, which gets the error when it comes back; None when no
-            thread had it.
+            The thread that held the lock, which gets the error when it returns; None if no thread
+            held it.
         """
         self.why, self.closed = why, True
         for thread, _ in self._held.items():
@@ -123,23 +123,23 @@ class InstanceLock:
         return None
 
     def answered(self) -> None:
-        """Let the thread go on from which the lock was taken, as it was answered for."""
+        """Let the thread that lost the lock continue: its client was answered."""
         if self._abandoned is not None:
             self._held.answered(self._abandoned)
 
     def refusal(self) -> GymServerError:
-        """Return the error for calls on an environment that is gone."""
+        """Return the error for calls on a closed environment."""
         return self.why.again() if self.why else self._unknown()
 
     def when_free(self) -> threading.Lock:
-        """Return the bare lock, for what is done after the end."""
+        """Return the bare lock, for work after the environment is closed."""
         return self._lock
 
     def _come_back(self, error: object) -> None:
-        """End a thread's work from which the lock was taken away meanwhile."""
-        # The environment has to be closed, unless this thread only waited for the render thread.
-        # Then the error is the reason for abandoning it, which RenderThread.abandon() passes on,
-        # and the render thread is still in the environment, so nothing else may touch it.
+        """End the work of a thread from which the lock was taken."""
+        # Close the environment, unless this thread only waited for the render thread. In that case
+        # the error is the reason passed to RenderThread.abandon(), and the render thread is still
+        # in the environment, so nothing else may touch it.
         if error is not self.why:
             self._close_abandoned()
         self._held.wait_until_answered(threading.get_ident())

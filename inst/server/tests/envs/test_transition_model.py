@@ -156,7 +156,7 @@ def test_a_wrapper_that_changes_something_is_named(client, create, name, kwargs)
     chosen = [{"name": name, "kwargs": kwargs}, around]
     said = refusal(client, create("FrozenLake-v1", wrappers=chosen))
     assert said["message"] == (
-        f"The table of the transitions of FrozenLake-v1 does not hold with its wrapper {name}"
+        f"The transition table of FrozenLake-v1 is wrong with its wrapper {name}"
     )
     assert "create it without this wrapper" in said["hint"]
 
@@ -183,16 +183,14 @@ def test_wrappers_that_change_nothing_may_stay(client, create):
 )
 def test_a_table_that_leaves_something_out_is_refused(client, create):
     said = refusal(client, create("Taxi-v4", kwargs={"fickle_passenger": True}))
-    assert said["message"] == (
-        "The table of the transitions of Taxi-v4 does not hold with a fickle_passenger"
-    )
+    assert said["message"] == ("The transition table of Taxi-v4 is wrong with fickle_passenger")
     assert said["hint"] == "create it without fickle_passenger"
 
 
 @pytest.mark.parametrize("name", sorted(TABLES.keys() - {"sound", "of NumPy", "a number"}))
 def test_an_unsound_table_is_refused_with_its_place(client, faulty, name):
     said = refusal(client, faulty("Table", P=name))
-    beginning = "The table of the transitions of faulty_envs:Table-v0 is unsound: "
+    beginning = "The transition table of faulty_envs:Table-v0 is invalid: "
     assert said["message"].startswith(beginning)
     place = "P[0][0]" if name in ("nothing", "names", "lists") else "P[1]["
     assert place in said["message"]
@@ -207,9 +205,9 @@ def test_an_unsound_beginning_is_refused(client, faulty, name):
 
 def test_words_say_what_is_unsound(client, create, faulty):
     said = refusal(client, faulty("Table", P="half a probability"))["message"]
-    assert said.endswith("is unsound: the probabilities in P[1][1] add up to 0.5")
+    assert said.endswith("is invalid: the probabilities in P[1][1] add up to 0.5")
     said = refusal(client, faulty("Table", P="a state beyond the last"))["message"]
-    assert said.endswith("is unsound: P[1][1] holds [1.0, 2, 0.0, false]")
+    assert said.endswith("is invalid: P[1][1] holds [1.0, 2, 0.0, false]")
     said = refusal(client, faulty("Table", start="too short"))["message"]
     assert "must hold a probability for each of the 2 states" in said
     if "success_rate" in inspect.signature(FrozenLakeEnv).parameters:

@@ -366,7 +366,9 @@ def test_a_reward_that_is_no_number_is_named(client, create, num_envs, reward):
     answer = client.post(f"{url}/step/", json={"action": 0 if num_envs is None else [0, 1]})
     assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
     shown = "null" if reward is None else "[1.0, 2.0]"
-    assert answer.json["message"] == f"A reward must be a number, and the environment's is {shown}"
+    assert (
+        answer.json["message"] == f"A reward must be a number, and the environment returned {shown}"
+    )
 
 
 @pytest.mark.parametrize("num_envs", [None, 2])
@@ -379,5 +381,5 @@ def test_an_info_that_is_no_dict_is_named(client, create, num_envs, info, in_res
     if not in_reset:
         answer = client.post(f"{url}/step/", json={"action": 0 if num_envs is None else [0, 1]})
     assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
-    assert "An info must be a dict, and the environment's is " in answer.json["message"]
-    assert answer.json["hint"] == "return {} where there is nothing to tell"
+    assert "An info must be a dict, and the environment returned " in answer.json["message"]
+    assert answer.json["hint"] == "return {} for an empty info"

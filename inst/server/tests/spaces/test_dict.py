@@ -27,7 +27,7 @@ def test_an_empty_one_is_also_rs_empty_list():
     ("value", "reason"),
     [
         ({"b": 1}, '"a" is missing'),
-        ({"a": {"x": 1}, "b": 1, "c": 2}, '"c" is none of its keys'),
+        ({"a": {"x": 1}, "b": 1, "c": 2}, '"c" is not one of its keys'),
         ([1, 2], "an object is needed"),
         ([], "an object is needed"),
         (1, "an object is needed"),
