@@ -1,1 +1,1 @@
-"""One environment on the server: its lock, its episodes, its resets and steps."""
+"""One environment on the server: its lock, episodes, resets and steps."""

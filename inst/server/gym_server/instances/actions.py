@@ -1,4 +1,4 @@
-"""Read the actions that clients send, and add a hint where an environment refuses one."""
+"""Read the actions that clients send, and add a hint when an environment rejects one."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from gym_server import spaces
 from gym_server.errors import GymServerError
 
 _CLIP = (
-    "the action lies outside of the bounds of its Box; the wrapper ClipAction keeps actions "
-    'inside, in R by gym_wrap(..., "ClipAction")'
+    "the action is outside the bounds of its Box; the wrapper ClipAction clips actions to them, "
+    'in R by gym_wrap(..., "ClipAction")'
 )
 
 
 class ActionReader:
-    """Reads what is sent as an action of one space.
+    """Reads the actions of one space.
 
-    The bounds of a Box are left to the environment, as in Gymnasium; everything else that makes a
-    member of the space is checked.
+    As in Gymnasium, the bounds of a Box are left to the environment. All other requirements of the
+    space are checked.
     """
 
     def __init__(self, space: Space, num_envs: int | None) -> None:
-        """Name the space.
+        """Create the readers.
 
         Args:
-            space: of one action.
-            num_envs: how many sub-environments there are; None for a single environment.
+            space: the space of one action.
+            num_envs: the number of sub-environments; None for a single environment.
         """
         self._space = space
         self._all = spaces.Rows(num_envs, f"the {num_envs} sub-environments")
         self._taken = _Reader(spaces.with_wide_boxes(space))
 
     def read(self, action: object, rows: int | None = None) -> object:
-        """Return the action, or with sub-environments the batch of actions, that was sent.
+        """Decode an action, or with sub-environments a batch of actions.
 
         Args:
             action: a JSON value or ``Parts``.
-            rows: how many sub-environments step; None for all, or a single environment.
+            rows: how many sub-environments step; None for all, or for a single environment.
 
         Raises:
             GymServerError: ``action_not_in_space``.
@@ -49,7 +49,7 @@ class ActionReader:
             ) from None
 
     def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
-        """Give an environment's own failure a hint, where the action was outside of a Box."""
+        """Add a hint to an environment's error if the action was outside its Box."""
         if failure.code != "environment_error":
             return
         try:
@@ -64,7 +64,7 @@ class ActionReader:
 
 
 class _Reader:
-    """What reads the actions of a space, made once for it."""
+    """Reads the actions of a space from JSON or tensors."""
 
     def __init__(self, space: Space) -> None:
         self._space = space
@@ -80,7 +80,7 @@ class _Reader:
 
 
 def _possible_actions(space: Space) -> str | None:
-    """Return the actions of a Discrete space in words, as users may count from 1."""
+    """Describe the actions of a Discrete space, because users may count from 1."""
     if not isinstance(space, Discrete):
         return None
     first, last = int(space.start), int(space.start) + int(space.n) - 1

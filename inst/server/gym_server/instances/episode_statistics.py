@@ -1,4 +1,4 @@
-"""The episodes of an environment as they go by: their number, and what they returned."""
+"""Statistics of an environment's episodes: their number and returns."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _KEPT = 100
 
 
 class Standing(NamedTuple):
-    """Where an episode stands.
+    """The state of an episode.
 
     Attributes:
         episode: its number, from 1; 0 before the first.
-        step: how many steps it has taken.
-        episode_return: the sum of its rewards so far.
+        step: the number of steps so far.
+        episode_return: the sum of rewards so far.
         ended: whether it has ended.
     """
 
@@ -31,14 +31,14 @@ class Standing(NamedTuple):
 class EpisodeStatistics:
     """Counts the episodes of a single environment.
 
-    A class of its own, because plain numbers take 0.1 us a step, and arrays of one element 4.
+    A class of its own, because plain numbers take 0.1 us per step, and arrays of one element 4.
 
     Attributes:
-        returns: of the last episodes that ended; one that was cut short by a reset is none.
+        returns: the returns of the last episodes that ended; not of those cut short by a reset.
     """
 
     def __init__(self) -> None:
-        """Begin before the first episode."""
+        """Start before the first episode."""
         self.returns: deque[float] = deque(maxlen=_KEPT)
         self._episode = 0
         self._step = 0
@@ -46,7 +46,7 @@ class EpisodeStatistics:
         self._ended = False
 
     def begin(self, mask: np.ndarray | None = None) -> None:
-        """Count an episode that begins; one without steps before it was none."""
+        """Count a new episode; a previous one without steps does not count."""
         if self._step or not self._episode:
             self._episode += 1
         self._step = 0
@@ -54,7 +54,7 @@ class EpisodeStatistics:
         self._ended = False
 
     def step(self, reward: float, done: bool) -> None:
-        """Count a step; what an environment does after an episode's end is no part of it."""
+        """Count a step; steps after the end of an episode do not count."""
         if self._ended:
             return
         self._step += 1
@@ -64,7 +64,7 @@ class EpisodeStatistics:
             self.returns.append(self._return)
 
     def of(self, sub_env: int) -> Standing:
-        """Return where the episode stands."""
+        """Return the state of the episode."""
         return Standing(self._episode, self._step, self._return, self._ended)
 
 
@@ -72,21 +72,21 @@ class VectorEpisodeStatistics:
     """Counts the episodes of many sub-environments.
 
     Attributes:
-        returns: of the last episodes that ended, in any sub-environment.
+        returns: the returns of the last episodes that ended, in any sub-environment.
     """
 
     def __init__(self, num_envs: int, mode: AutoresetMode) -> None:
-        """Begin before the first episode of each sub-environment."""
+        """Start before the first episode of each sub-environment."""
         self.returns: deque[float] = deque(maxlen=_KEPT)
         self._mode = mode
         self._episodes = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._returns = np.zeros(num_envs)
-        # Sub-environments whose next step is a reset, or that wait for one.
+        # Sub-environments that will be reset by the next step, or wait for a reset.
         self._ended = np.zeros(num_envs, dtype=bool)
 
     def begin(self, mask: np.ndarray | None) -> None:
-        """Count the episodes that begin in the sub-environments of a mask; None for all of them."""
+        """Count the episodes that start in the sub-environments of a mask; None for all."""
         sub_envs = slice(None) if mask is None else mask
         self._episodes[sub_envs] += (self._steps[sub_envs] > 0) | (self._episodes[sub_envs] == 0)
         self._clear(sub_envs)
@@ -97,7 +97,7 @@ class VectorEpisodeStatistics:
         self._ended[sub_envs] = False
 
     def step(self, reward: np.ndarray, done: np.ndarray, which: np.ndarray | None) -> None:
-        """Count a step of some sub-environments, one row for each; None for all of them."""
+        """Count a step of some sub-environments, one row each; None for all."""
         if which is None:
             self._steps += 1
             self._returns += reward
@@ -119,7 +119,7 @@ class VectorEpisodeStatistics:
                 self._ended[over] = True
 
     def of(self, sub_env: int) -> Standing:
-        """Return where the episode of a sub-environment stands."""
+        """Return the state of a sub-environment's episode."""
         return Standing(
             int(self._episodes[sub_env]),
             int(self._steps[sub_env]),
@@ -129,12 +129,12 @@ class VectorEpisodeStatistics:
 
 
 def _any(flags: np.ndarray) -> bool:
-    """Tell whether one is true; ``any()`` takes 2.5 us for 32 of them, and this 0.7."""
+    """Return whether a flag is true, in 0.7 us for 32 flags; ``any()`` takes 2.5."""
     return b"\1" in flags.tobytes()
 
 
 def facts_of(statistics: EpisodeStatistics | VectorEpisodeStatistics, sub_env: int) -> dict:
-    """Return the statistics of a sub-environment's episodes as JSON values for its watchers."""
+    """Return the statistics of a sub-environment as JSON values for its watchers."""
     standing = statistics.of(sub_env)
     return {
         "state": "ended" if standing.ended else "running",

@@ -30,11 +30,11 @@ def make_instance(
 
     Args:
         config: what the client chose.
-        allowed_modules: names of the modules that an env_id may import.
-        max_num_envs: how many sub-environments it may have.
+        allowed_modules: the modules that an env_id may import.
+        max_num_envs: the largest number of sub-environments.
         renderer: the process's render thread.
-        undo: closes the environment when something goes wrong from here on.
-        reservation: what its memory is charged to.
+        undo: closes the environment if a later step fails.
+        reservation: reserves its memory.
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
@@ -53,10 +53,10 @@ def make_instance(
 
 def _closing_quietly(close: Callable[[], object]) -> Callable[..., None]:
     def close_it(kind: type | None, error: BaseException | None, *_: object) -> None:
-        # Where the render thread hangs in the environment, it must be left alone.
+        # If the render thread hangs in the environment, leave it alone.
         if isinstance(error, GymServerError) and error.code == "call_too_long":
             return
-        # The error for the client is the one that was raised, not one of closing.
+        # The client gets the original error, not one from closing.
         with contextlib.suppress(BaseException):
             close()
 

@@ -1,4 +1,4 @@
-"""One environment on the server: what all have in common, whatever process runs them."""
+"""One environment on the server: the common part, whatever process runs it."""
 
 from __future__ import annotations
 
@@ -27,26 +27,25 @@ log = logging.getLogger(__name__)
 
 Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
-# How often it is looked at what a monitor writes: less often than the shortest episodes end.
+# How often a monitor's files are measured; episodes may be shorter.
 _MEASURE_SECONDS = 1.0
 
 
 class Instance(Watchable):
-    """One environment that a client has created.
+    """An environment that a client created.
 
-    ``LocalInstance`` plays it in this process, ``IsolatedInstance`` in one of its own. What differs
-    is in their methods of the names that begin with an underscore here; those are called by a
-    thread that has the lock.
+    ``LocalInstance`` plays it in this process, ``IsolatedInstance`` in a process of its own. They
+    implement the methods that start with an underscore, which are called with the lock held.
 
-    Every method that resets, steps or draws the environment waits for its lock; one that waited
-    while the instance was being closed raises ``unknown_instance``, or why it was closed.
+    Every method that resets, steps or draws the environment waits for its lock. If the instance is
+    closed meanwhile, the method raises ``unknown_instance``, or why it was closed.
 
     Attributes:
-        instance_id: given when the instance is listed, "" before.
-        env_id: what the environment can be created by again.
-        config: what its client wanted.
+        instance_id: set when the instance is listed; "" before.
+        env_id: an id that creates the same environment again.
+        config: what its client chose.
         viewer: shows it to watchers.
-        steps: how many steps its sub-environments have taken.
+        steps: the number of steps of its sub-environments.
         can_be_killed: whether ``kill()`` ends every call on it, so that none can be stuck.
     """
 
@@ -57,7 +56,7 @@ class Instance(Watchable):
         """Prepare the lock and the viewer.
 
         Args:
-            config: what its client wants.
+            config: what its client chose.
             renderer: the process's render thread.
         """
         self.instance_id = ""
@@ -71,7 +70,7 @@ class Instance(Watchable):
         self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
-        # Where a monitor writes, if one does; when that was measured; why the last one stopped.
+        # Where a monitor writes, if any; when that was last measured; why the last one stopped.
         self._monitored: tuple[Path, DiskUse] | None = None
         self._measured = 0.0
         self._monitor_full: GymServerError | None = None
@@ -85,20 +84,20 @@ class Instance(Watchable):
         form: AnswerForm = JSON_FORM,
         mask: np.ndarray | None = None,
     ) -> dict | Ready:
-        """Start an episode; in every sub-environment, or in those of a mask.
+        """Start an episode in every sub-environment, or in those of a mask.
 
         Args:
-            seed: seeds the environment and the action space; None leaves both as they are, or
-                takes the seed given at creation in the first reset. For sub-environments one for
-                all, each of which makes its own of it, or one for each.
-            options: the environment's own.
-            form: what is wanted of the answer.
-            mask: a boolean for each sub-environment; None for all of them.
+            seed: seeds the environment and the action space. None leaves both unchanged, or in the
+                first reset uses the seed given at creation. With sub-environments, one seed from
+                which each derives its own, or one seed each.
+            options: options for the environment.
+            form: the format of the response.
+            mask: a boolean per sub-environment; None for all.
 
         Returns:
-            ``{"observation", "info"}`` as JSON values; the observation as ``Parts`` when tensors
-            are wanted and its space can travel so; with sub-environments a batch. ``Ready`` from
-            the process of an isolated environment.
+            ``{"observation", "info"}`` as JSON values. The observation is ``Parts`` if tensors are
+            wanted and its space supports them; with sub-environments it is a batch. The process of
+            an isolated environment returns ``Ready``.
 
         Raises:
             GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
@@ -122,27 +121,26 @@ class Instance(Watchable):
         mask: np.ndarray | None = None,
         in_real_time: bool = False,
     ) -> dict | Ready:
-        """Take one step; in every sub-environment, or in those of a mask.
+        """Take one step in every sub-environment, or in those of a mask.
 
         Args:
-            action: the JSON value of an action, or the action as ``Parts``; the bounds of a
-                Box are the environment's affair. With sub-environments a list of one JSON value
-                for each that steps, or a batch as ``Parts``.
-            form: what is wanted of the answer.
-            mask: a boolean for each sub-environment; None for all of them.
-            in_real_time: whether people want to see it: not faster than in real time, then, while
-                somebody watches.
+            action: an action as a JSON value or ``Parts``; the environment checks the bounds of a
+                Box. With sub-environments, a list with a JSON value for each that steps, or a batch
+                as ``Parts``.
+            form: the format of the response.
+            mask: a boolean per sub-environment; None for all.
+            in_real_time: whether to slow down to real time while somebody watches.
 
         Returns:
             ``{"observation", "reward", "done", "terminated", "truncated", "info"}`` as JSON
-            values; the observation as for ``reset()``. With sub-environments one row for each
-            that stepped: arrays where the observation is ``Parts``, else lists. When
-            sub-environments ended and were reset at once also ``final_obs``, a batch of their last
-            observations, and ``final_sub_envs``, the rows that they are.
+            values; the observation as for ``reset()``. With sub-environments, one row for each
+            that stepped: arrays if the observation is ``Parts``, else lists. If sub-environments
+            ended and were reset at once, also ``final_obs``, a batch of their last observations,
+            and ``final_sub_envs``, their row numbers.
 
         Raises:
             GymServerError: ``reset_needed`` (also for a sub-environment that ended and is not
-                reset by itself), ``action_not_in_space``, ``invalid_parameter`` or
+                reset automatically), ``action_not_in_space``, ``invalid_parameter`` or
                 ``not_supported``, each before the environment is stepped; ``environment_error``.
         """
         if mask is not None and self._is_single:
@@ -153,7 +151,7 @@ class Instance(Watchable):
             return self._step(action, form, mask)
 
     def sample_action(self) -> object:
-        """Draw an action, for each sub-environment, from the action space's own generator."""
+        """Sample an action, for each sub-environment, with the action space's generator."""
         with self.lock:
             return self._sample_action()
 
@@ -177,7 +175,7 @@ class Instance(Watchable):
             raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
 
     def transition_model(self) -> dict | Ready:
-        """Tell how an environment moves that has a table of it.
+        """Return the transition model of an environment that has one.
 
         Returns:
             ``{"model"}``, see ``envs.transition_model``; ``Ready`` from the process of an isolated
@@ -189,8 +187,8 @@ class Instance(Watchable):
         if not self._is_single:
             raise GymServerError(
                 "not_supported",
-                f"{self.env_id} has sub-environments here, and a transition model is that of a "
-                "single environment",
+                f"{self.env_id} has sub-environments here, and only single environments have a "
+                "transition model",
                 "create it without num_envs",
             )
         with self.lock:
@@ -199,7 +197,7 @@ class Instance(Watchable):
     # At any time ----------------------------------------------------------------------------
 
     def space_info(self, name: str) -> dict:
-        """Return the description of a space, of sub-environments that of the batched one.
+        """Return the description of a space; with sub-environments, of the batched space.
 
         Args:
             name: "action_space" or "observation_space".
@@ -207,16 +205,16 @@ class Instance(Watchable):
         raise NotImplementedError
 
     def contains(self, name: str, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``spaces.contains()``.
+        """Answer a client's "contains" question; see ``spaces.contains()``.
 
         Args:
-            name: of the space, as for ``space_info()``.
-            claim: a value has an entry for each sub-environment.
+            name: the space, as for ``space_info()``.
+            claim: with sub-environments, its value has an entry for each.
         """
         raise NotImplementedError
 
     def list_entry(self) -> dict:
-        """Return what the list of instances shows of it."""
+        """Return the entry in the list of instances."""
         now = time.monotonic()
         return {
             "instance_id": self.instance_id,
@@ -230,23 +228,23 @@ class Instance(Watchable):
         }
 
     def about(self) -> dict:
-        """Return all that is known of the instance, without waiting for its environment."""
+        """Return everything known about the instance, without waiting for its environment."""
         about = self._about()
         entry = self.list_entry()
-        # The entry comes last, because what the process of an isolated environment sends has an
-        # entry of that process, which knows neither the id nor the watchers. It also comes first,
-        # so that its values stand at the beginning of the answer.
+        # The process of an isolated environment sends an entry of its own, which lacks the id and
+        # the watchers. So put the entry last, and also first, to keep it at the start of the
+        # response.
         return {**entry, **about, **entry}
 
     @property
     def busy_since(self) -> float | None:
-        """Since when a call has waited for the environment, in the clock's seconds, or None."""
+        """When the current call on the environment started, in the clock's seconds, or None."""
         since = (self.lock.busy_since, self.query_since)
         return min((one for one in since if one is not None), default=None)
 
     @property
     def query_since(self) -> float | None:
-        """Since when a call that needs no lock has waited, in the clock's seconds, or None."""
+        """When the current call without the lock started, in the clock's seconds, or None."""
         return None
 
     @property
@@ -256,7 +254,7 @@ class Instance(Watchable):
 
     @property
     def pids(self) -> Sequence[int]:
-        """The processes that run it, beside the server's."""
+        """The processes that run it, besides the server's."""
         raise NotImplementedError
 
     # Monitors -------------------------------------------------------------------------------
@@ -268,8 +266,8 @@ class Instance(Watchable):
         if not self._is_single:
             raise GymServerError(
                 "not_supported",
-                f"Instance {self.instance_id} has sub-environments, and a monitor records single "
-                "environments",
+                f"Instance {self.instance_id} has sub-environments, and monitors record only "
+                "single environments",
                 "create it without num_envs",
             )
         with self.lock:
@@ -282,30 +280,30 @@ class Instance(Watchable):
     def record(
         self, path: Path, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        """Record the episodes that start from now on; the caller has the lock.
+        """Record the episodes that start from now on; the caller holds the lock.
 
         Args:
-            path: the directory that is allowed; see ``take_directory()``, also for the next three.
-            directory: as the client names it.
-            force: whether to delete what is there.
-            resume: whether to go on counting.
-            video_every: record a video of each episode whose number this divides; 0 for none.
+            path: the directory, already checked; see ``take_directory()``, also for the next three.
+            directory: its name as the client sent it.
+            force: whether to delete its contents.
+            resume: whether to continue the numbering.
+            video_every: record a video of every episode whose number is a multiple; 0 for none.
         """
         raise NotImplementedError
 
     def close_monitor(self) -> None:
-        """Stop recording and finish the files, if it is recorded.
+        """Stop recording, if active, and finish the files.
 
         Raises:
-            GymServerError: ``monitors_full`` when something was not recorded for that reason;
-                ``monitor_directory`` when something could not be written.
+            GymServerError: ``monitors_full`` if episodes were not recorded for that reason;
+                ``monitor_directory`` if something could not be written.
         """
         with self.lock, self._monitor_ends():
             self._close_monitor()
 
     @contextlib.contextmanager
     def _monitor_ends(self) -> Iterator[None]:
-        """Measure what a monitor leaves, and say whether it had no more room."""
+        """Measure a monitor's files at its end; raise if it had no more space."""
         try:
             yield
         finally:
@@ -322,7 +320,7 @@ class Instance(Watchable):
             self._measured = time.monotonic()
 
     def _stop_full_monitor(self, path: Path, disk_use: DiskUse) -> None:
-        """Stop to record, if monitors may write no more; the environment goes on."""
+        """Stop recording if monitors have no more space; the environment continues."""
         if time.monotonic() < self._measured + _MEASURE_SECONDS:
             return
         self._measure_monitor()
@@ -337,10 +335,10 @@ class Instance(Watchable):
     # Beginning and end ----------------------------------------------------------------------
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """From now on report when the environment's process ends by itself, or at once if it has.
+        """Report from now on if the environment's process ends unexpectedly, or at once if it has.
 
         Args:
-            on_end: called with the reason, after the watchers got it.
+            on_end: called with the reason, after the watchers were told.
         """
 
         def end(why: GymServerError) -> None:
@@ -365,7 +363,7 @@ class Instance(Watchable):
             why: the error for every call that waits for the instance.
 
         Returns:
-            The thread that is stuck in the environment and cannot answer for itself, or None.
+            The thread that is stuck in the environment and cannot answer its client, or None.
         """
         if self.can_be_killed:
             self.kill(why)
@@ -375,13 +373,13 @@ class Instance(Watchable):
         self.viewer.end(why)
         self.kill(why)
         if stuck is None:
-            # The call has just come back.
+            # The call has just returned.
             threading.Thread(target=self._close_abandoned_when_free, daemon=True).start()
             return None
         return None if self.renderer.abandon(stuck, why) else stuck
 
     def kill(self, why: GymServerError) -> None:
-        """Kill the processes that the environment runs in, if it has any of its own.
+        """Kill the environment's own processes, if any.
 
         Args:
             why: the error for the calls that this ends.
@@ -412,22 +410,22 @@ class Instance(Watchable):
         raise NotImplementedError
 
     def _close_monitor(self) -> None:
-        """Stop recording and finish the files, if it is recorded."""
+        """Stop recording, if active, and finish the files."""
         raise NotImplementedError
 
     def _about(self) -> dict:
-        """Return what is known of the environment, without waiting for it."""
+        """Return everything known about the environment, without waiting for it."""
         raise NotImplementedError
 
     def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         raise NotImplementedError
 
     def _close(self, why: GymServerError) -> None:
-        """Finish the monitor and close the environment; the reason is for calls that come late."""
+        """Finish the monitor and close the environment; later calls raise the reason."""
         raise NotImplementedError
 
     def _close_abandoned(self) -> None:
-        """Close what was abandoned, once the call that took too long has come back."""
+        """Close an abandoned environment, once the call that took too long has returned."""
         raise NotImplementedError
 
 

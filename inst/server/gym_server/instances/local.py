@@ -1,4 +1,4 @@
-"""Plays an environment in this process: what single and vector environments have in common."""
+"""Environments played in this process: the common part of single and vector environments."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class LocalInstance(Instance):
     """Plays an environment in this process.
 
     Attributes:
-        gym_env: Gymnasium's environment, or a vector environment.
-        single_action_space: of an action of one sub-environment.
-        single_observation_space: of an observation of one sub-environment.
-        drawing: how it is drawn, and closed.
-        statistics: of its episodes.
+        gym_env: Gymnasium's environment or vector environment.
+        single_action_space: the action space of one sub-environment.
+        single_observation_space: the observation space of one sub-environment.
+        drawing: draws and closes the environment.
+        statistics: the statistics of its episodes.
         vectorization_mode: what runs the sub-environments; None for a single environment.
-        num_workers: how many processes run them; None for a single environment, and for an
-            implementation of the environment's own.
-        autoreset_mode: what becomes of a sub-environment whose episode ended; None as above.
+        num_workers: the number of worker processes; None for a single environment, and for the
+            environment's own vector implementation.
+        autoreset_mode: when a sub-environment whose episode ended is reset; None as above.
     """
 
     # Threads cannot be killed.
@@ -61,7 +61,7 @@ class LocalInstance(Instance):
     autoreset_mode: str | None = None
 
     def __init__(self, env: Any, config: EnvConfig, renderer: RenderThread) -> None:
-        """Take over an environment, whose spaces are known.
+        """Take over an environment; subclasses set the spaces first.
 
         Raises:
             GymServerError: ``unsupported_space``.
@@ -85,7 +85,7 @@ class LocalInstance(Instance):
             self._seed_actions(config.seed)
 
     def _seed_actions(self, seed: Seed) -> None:
-        # One generator serves all sub-environments.
+        # All sub-environments share one generator.
         seeds = seed if isinstance(seed, tuple) else (seed,)
         first = next((one for one in seeds if one is not None), None)
         if first is not None:
@@ -115,7 +115,7 @@ class LocalInstance(Instance):
         }
 
     def _check_reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> None:
-        """Raise ``invalid_parameter``, ``not_supported`` or ``reset_needed`` before a reset."""
+        """Check a reset; raise ``invalid_parameter``, ``not_supported`` or ``reset_needed``."""
         raise NotImplementedError
 
     def _reset_env(
@@ -124,21 +124,21 @@ class LocalInstance(Instance):
         raise NotImplementedError
 
     def _begin(self, reset_or_step: Callable[..., tuple], *args: object) -> tuple:
-        """Reset or step the environment, on the render thread where it draws meanwhile."""
+        """Reset or step the environment, on the render thread if it draws meanwhile."""
         self.begin_reset_or_step()
         if self.draws_when_stepped:
             return self.renderer.run(reset_or_step, *args)
         return reset_or_step(*args)
 
     def _encode(self, observation: Any, form: AnswerForm, name: str = "observation") -> object:
-        """Return an observation, or a batch, as JSON values or as ``Parts`` of a name."""
+        """Encode an observation, or a batch, as JSON values or ``Parts``."""
         if form.tensors and self._write_tensors:
             return self._write_tensors[name](observation, form.by_column)
         return self._write_json(self.single_observation_space, observation)
 
     @cached_property
     def _write_json(self) -> Callable[[Space, Any], Any]:
-        # The kind of the space is not looked up for each observation.
+        # Saves the dispatch on the space for each observation.
         encode = spaces.encode if self._is_single else spaces.encode_batch
         write: Callable[[Space, Any], Any] = encode.dispatch(type(self.single_observation_space))
         return write
@@ -163,11 +163,11 @@ class LocalInstance(Instance):
             return picture(frame)
         except ValueError as error:
             raise GymServerError(
-                "cannot_render", f"What {self.env_id} draws is no picture: {error}"
+                "cannot_render", f"{self.env_id} does not return a picture: {error}"
             ) from error
 
     def draw(self, sub_env: int) -> object:
-        """Draw a sub-environment; return whatever the environment draws."""
+        """Draw a sub-environment; return the environment's result unchecked."""
         raise NotImplementedError
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
@@ -199,7 +199,7 @@ class LocalInstance(Instance):
     # At any time ----------------------------------------------------------------------------
 
     def space_info(self, name: str) -> dict:
-        """Return the description of a space; of a vector environment it may be large."""
+        """Return the description of a space, which is large for a large vector environment."""
         return self._action_space_info if name == "action_space" else self._observation_space_info
 
     @cached_property
@@ -211,19 +211,19 @@ class LocalInstance(Instance):
         return spaces.describe(self.gym_env.observation_space)
 
     def contains(self, name: str, claim: dict) -> bool:
-        """Answer a client's "contains"; see ``Instance.contains()``."""
+        """Answer a client's "contains" question; see ``Instance.contains()``."""
         space: Space = getattr(self, f"single_{name}")
         return spaces.contains(
             claim, lambda value: self._decode(space, value), lambda: self.space_info(name)
         )
 
     def _decode(self, space: Space, value: object) -> object:
-        """Return the member of a space, or one for each sub-environment, that JSON stands for."""
+        """Decode JSON to a member of the space, or to one per sub-environment."""
         raise NotImplementedError
 
     @property
     def has_ended(self) -> bool:
-        """Tell whether an episode ended that only a reset of the client's follows."""
+        """Whether an episode ended that only the client can reset."""
         raise NotImplementedError
 
     def _about(self) -> dict:
@@ -249,7 +249,7 @@ class LocalInstance(Instance):
 
     @property
     def grown(self) -> int:
-        """By how many bytes drawing and seeds for later episodes have made this process grow."""
+        """By how many bytes drawing, and seeds for later episodes, made this process grow."""
         return self.drawing.grown + self._seed_bytes
 
     # The end --------------------------------------------------------------------------------
@@ -267,17 +267,17 @@ class LocalInstance(Instance):
         with contextlib.suppress(BaseException):
             self._close_monitor()
         with contextlib.suppress(BaseException):
-            # It may hang once more, and the watchdog looks at the render thread.
+            # It may hang again; the watchdog watches the render thread.
             self.renderer.run(self._close_env)
 
 
 def env_id_of(config: EnvConfig, gym_env: Any) -> str:
-    """Return what an environment can be created by again: its module, and the version found."""
+    """Return an id that creates the same environment: its module, and the version found."""
     module, colon, name = str(config.env_id).rpartition(":")
     return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"
 
 
 def _held_by(seed: Seed) -> int:
-    """Return the bytes of the seeds for later episodes: each is an object in a list."""
+    """Return the bytes of seeds for later episodes, which are objects in lists."""
     lists = [one for one in seed if isinstance(one, tuple)] if isinstance(seed, tuple) else []
     return 40 * sum(map(len, lists))

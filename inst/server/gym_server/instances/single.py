@@ -81,7 +81,7 @@ class SingleInstance(LocalInstance):
             "done": done,
             "terminated": terminated,
             "truncated": truncated,
-            # Converted while the environment cannot change it.
+            # Convert it now, before the environment can change it.
             "info": plain(checked_info(info)) if form.infos else {},
         }
 
@@ -130,7 +130,7 @@ class SingleInstance(LocalInstance):
 
     @property
     def pids(self) -> Sequence[int]:
-        """The process that encodes a video, if there is one."""
+        """The process that encodes a video, if any."""
         monitor = self._monitor
         return monitor.pids if monitor is not None else ()
 

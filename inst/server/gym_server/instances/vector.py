@@ -1,4 +1,4 @@
-"""A vector environment: actions, observations and the rest have a row for each sub-environment."""
+"""A vector environment: actions, observations and rewards have a row per sub-environment."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class VectorInstance(LocalInstance):
         if _has_empty_part(self.single_action_space):
             raise GymServerError(
                 "unsupported_space",
-                "Gymnasium cannot give each sub-environment its action where it is of "
+                "Gymnasium cannot split the actions of sub-environments with "
                 f"{spaces.brief_space(self.single_action_space)}",
-                "an empty Tuple or Dict is the reason; create the environment without num_envs",
+                "it has an empty Tuple or Dict; create the environment without num_envs",
             )
         super().__init__(env, config, renderer)
         self._num_envs = env.num_envs
@@ -70,8 +70,8 @@ class VectorInstance(LocalInstance):
         if options and "reset_mask" in options:
             raise GymServerError(
                 "invalid_parameter",
-                "The parameter 'options' must not carry 'reset_mask'",
-                "reset_mask is a parameter of its own",
+                "The parameter 'options' must not contain 'reset_mask'",
+                "send reset_mask as its own parameter",
             )
         if mask is not None:
             self._check_reset_mask(mask)
@@ -89,8 +89,8 @@ class VectorInstance(LocalInstance):
                     raise invalid_parameter(
                         "seed",
                         list(one),
-                        "an integer, 0 or greater, or null, for each sub-environment, as with "
-                        "autoreset_mode 'Disabled' none begins an episode by itself",
+                        "an integer, 0 or greater, or null, for each sub-environment, because with "
+                        "autoreset_mode 'Disabled' none starts an episode automatically",
                     )
 
     def _check_reset_mask(self, mask: np.ndarray) -> None:
@@ -100,7 +100,7 @@ class VectorInstance(LocalInstance):
         if not self._was_reset:
             raise GymServerError(
                 "reset_needed",
-                "reset() with a mask needs sub-environments that have been reset",
+                "reset() with a mask needs sub-environments that were reset before",
                 "reset all of them first",
             )
 
@@ -116,7 +116,7 @@ class VectorInstance(LocalInstance):
     def _not_supported(self, what: str) -> GymServerError:
         return GymServerError(
             "not_supported",
-            f"With vectorization_mode '{self.vectorization_mode}' there is no {what}",
+            f"vectorization_mode '{self.vectorization_mode}' does not support {what}",
             "create the environment with vectorization_mode 'sync'",
         )
 
@@ -144,14 +144,14 @@ class VectorInstance(LocalInstance):
             raise
 
     def _select(self, mask: np.ndarray) -> np.ndarray:
-        """Return which sub-environments a mask selects."""
+        """Return the numbers of the sub-environments in a mask."""
         self._check_mask("step_mask", mask)
         if not self.gym_env.runs_each:
             raise self._not_supported("step_mask")
         return np.flatnonzero(mask)
 
     def _check_running(self, which: np.ndarray | None) -> None:
-        """Raise ``reset_needed`` when sub-environments ended that do not reset themselves."""
+        """Raise ``reset_needed`` if sub-environments ended that are not reset automatically."""
         if self.gym_env.autoreset_mode is not AutoresetMode.DISABLED:
             return
         waiting = self.gym_env.ended
@@ -165,7 +165,7 @@ class VectorInstance(LocalInstance):
             )
 
     def _step_env(self, which: np.ndarray | None, action: object, form: AnswerForm) -> dict:
-        """Take a step; return arrays where ``Parts`` are wanted, else lists."""
+        """Take a step; return arrays if ``Parts`` are wanted, else lists."""
         outcome = self._begin(self.gym_env.step, which, action, form.infos)
         observation, reward, terminated, truncated, info = outcome
         terminated = np.asarray(terminated, dtype=bool)
@@ -201,7 +201,7 @@ class VectorInstance(LocalInstance):
         self.steps += len(reward)
 
     def _take_final(self, info: dict, form: AnswerForm) -> dict:
-        """Take the last observations of the sub-environments that were reset out of an info."""
+        """Remove the last observations of sub-environments that were reset from an info."""
         if "final_obs" not in info:
             return {}
         final, which = info.pop("final_obs"), info.pop("_final_obs")
@@ -226,12 +226,12 @@ class VectorInstance(LocalInstance):
 
     @property
     def pids(self) -> Sequence[int]:
-        """The processes that they run in."""
+        """The processes that the sub-environments run in."""
         return list(self.gym_env.pids)
 
     @property
     def has_ended(self) -> bool:
-        """Whether an episode ended that only a reset of the client's follows."""
+        """Whether an episode ended that only the client can reset."""
         return bool(self.gym_env.ended.any())
 
     def _observed(self, sub_env: int) -> object:
@@ -253,12 +253,12 @@ class VectorInstance(LocalInstance):
         self.gym_env.report_end(on_end)
 
     def kill(self, why: GymServerError) -> None:
-        """Kill the processes that they run in, if they have any."""
+        """Kill the processes that the sub-environments run in, if any."""
         self.gym_env.kill(why)
 
 
 def _has_empty_part(space: Space) -> bool:
-    """Tell whether a space is an empty Tuple or Dict, or has such a part."""
+    """Return whether a space is an empty Tuple or Dict, or contains one."""
     match space:
         case Dict() | Tuple():
             parts = space.spaces.values() if isinstance(space, Dict) else space.spaces

@@ -1,4 +1,4 @@
-"""Runs an environment in a process of its own."""
+"""Run an environment in its own process."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-# An environment that lets no other thread of its process run cannot answer; after this long the
-# last known answer is given.
+# An environment may block all threads of its process. After this long, the last known answer is
+# used.
 _ABOUT_SECONDS = 1.0
 
 
 class IsolatedInstance(Instance):
-    """Runs an environment in a process of its own.
+    """Runs an environment in its own process.
 
-    The process has an ordinary ``Instance``, which is asked for everything but the lock, the
-    watchers and their pace: those are with the instance here. When the process ends by itself,
-    every call raises ``environment_died``.
+    The process has an ordinary ``Instance``, which does everything except the lock, the watchers
+    and their pace: this instance has those. If the process ends unexpectedly, every call raises
+    ``environment_died``.
     """
 
     # Its frames are drawn in its own process.
@@ -48,15 +48,15 @@ class IsolatedInstance(Instance):
         """Take a process; ``create()`` creates the environment there.
 
         Args:
-            config: what the client wants.
-            settings: what the process is to know of the server.
+            config: what the client chose.
+            settings: the server's settings for the process.
             renderer: the server's render thread.
         """
         super().__init__(config, renderer)
         self.env_id = str(config.env_id)
         self._last_about: dict = {}
         self._create_args = config, settings
-        hint = f"the server's option --max-worker-mb lets it have {settings.max_mb} MiB"
+        hint = f"the server's option --max-worker-mb limits it to {settings.max_mb} MiB"
         self._process = pool.take(
             worker.__name__,
             trusted=False,
@@ -68,7 +68,7 @@ class IsolatedInstance(Instance):
         """Create the environment.
 
         Args:
-            reservation: what its memory is charged to, as far as its process reports it.
+            reservation: reserves the memory that its process reports.
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``environment_died``.
@@ -96,7 +96,7 @@ class IsolatedInstance(Instance):
         self.steps += answer.steps
         return answer
 
-    # The form goes as a plain tuple: to pickle and to read a class takes 8 us longer.
+    # The form is sent as a plain tuple: pickling and unpickling a class takes 8 us longer.
     def _begin(self, method: str, *args: object) -> Ready:
         self.begin_reset_or_step()
         return cast(Ready, self._process.call(method, *args))
@@ -127,7 +127,7 @@ class IsolatedInstance(Instance):
         return _dict(self._process.query("space_info", name))
 
     def contains(self, name: str, claim: dict) -> bool:
-        """Answer a client's "contains"."""
+        """Answer a client's "contains" question."""
         return bool(self._process.query("contains", name, claim).value)
 
     def _about(self) -> dict:
@@ -144,7 +144,7 @@ class IsolatedInstance(Instance):
 
     @property
     def query_since(self) -> float | None:
-        """Since when a query has waited for the process, in the clock's seconds, or None."""
+        """When the current query to the process started, in the clock's seconds, or None."""
         return self._process.query_since
 
     # Monitors -------------------------------------------------------------------------------

@@ -1,14 +1,14 @@
-"""Which environments get a process of their own, and why not all or none.
+"""Decide which environments get their own process, and why not all or none.
 
-A thread cannot be killed, and code in C that crashes, or ``os._exit``, ends its whole process. So
-what is not trusted needs a process. Gymnasium's own environments and ale_py's do not do that, and
-in the server's process they are faster and need no memory of their own; an environment that an
-operator allowed by ``--allow-module`` may be anybody's first one. Hence "foreign". One process
-for several of them would save the memory, and let the second one die with the first.
+A thread cannot be killed, and C code that crashes, or ``os._exit()``, ends its whole process. So
+environments that are not trusted need a process. Gymnasium's own environments and ale_py's do
+neither, and in the server's process they are faster and need less memory. An environment that an
+operator allowed by ``--allow-module`` may be somebody's first attempt. Hence the mode "foreign".
+One process for several of these would save memory, but if one died the others would, too.
 
-One that may take much memory at once gets a process on Linux, where the system limits what it has:
-an estimate may be wrong, and to make, reset or draw such an environment, or to write what is
-observed as JSON, holds the interpreter for seconds.
+On Linux, where the system can limit its memory, an environment that may suddenly take much memory
+gets a process, too: an estimate may be wrong, and making, resetting or drawing such an environment,
+or writing its observations as JSON, holds the GIL for seconds.
 
 Measured on two noisy cores that others used, too (Python 3.11, Gymnasium 1.4, CartPole):
 
@@ -16,17 +16,17 @@ Measured on two noisy cores that others used, too (Python 3.11, Gymnasium 1.4, C
 what                                   server process  a process by fork-     by spawn (as on
                                                        server, an instance    Windows)
 =====================================  ==============  =====================  ================
-to create one, ms                      2               20 (the first: 1000)   530 to 1000
-memory an instance, MiB (PSS)          0.02            7.7                    29
+creation, ms                           2               20 (the first: 1000)   530 to 1000
+memory per instance, MiB (PSS)         0.02            7.7                    29
 processor time of a step by HTTP, us   202             350 (both processes)   as by forkserver
 single steps a second from R           420             384 (9.6 % lost)
 steps of 1,024 sub-environments a second from R   235,000         203,000 (14.5 % lost)
 =====================================  ==============  =====================  ================
 
-(Rates: medians of 60 interleaved runs of 300 and 60 calls, and of the ratios of their pairs;
-six more such runs lost 24 to 40 % of the single steps and 13 to 39 % of the sub-environments'.
-Waking another process takes 10 us there at best, 50 in the median and 300 in one case of ten, and a
-step does so twice; with an environment that takes its time itself the share is smaller.)
+(Rates: medians of 60 interleaved runs of 300 and 60 calls, and of the ratios of their pairs. In six
+more such runs, single steps lost 24 to 40 % and those of sub-environments 13 to 39 %. Waking
+another process takes 10 us at best, 50 in the median and 300 in one case of ten. A step does it
+twice. With a slower environment the loss is smaller.)
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ log = logging.getLogger(__name__)
 
 MODES = ("none", "foreign", "all")
 
-# What one environment, or one sub-environment, may be estimated to take in the server's process:
-# more than the usual ones (MuJoCo 2 MiB, pictures as observations 50). What is observed of one so
-# large has a million numbers, which as JSON stop everybody for half a second.
+# The largest estimate for one environment, or sub-environment, in the server's process: more than
+# the usual ones (MuJoCo 2 MiB, pictures as observations 50). Observations this large have a million
+# numbers, and writing them as JSON blocks all calls for half a second.
 _MOST_BYTES_HERE = 64 * 2**20
 
 
 class Isolation:
-    """Decides which environments get a process, and what the processes know of the server.
+    """Decides which environments get a process, and which settings the processes get.
 
     Attributes:
         mode: one of ``MODES``.
@@ -68,7 +68,7 @@ class Isolation:
 
         Args:
             mode: one of ``MODES``.
-            max_mb: how much memory a process may have, in MiB; 0 for no limit.
+            max_mb: the memory limit of a process in MiB; 0 for no limit.
         """
         self.mode = mode
         self._max_mb = max_mb
@@ -80,27 +80,27 @@ class Isolation:
         allowed_modules: Collection[str],
         vectorization_mode: str | None = None,
     ) -> bool:
-        """Tell whether an environment gets a process, without importing its module.
+        """Return whether an environment gets a process, without importing its module.
 
         Args:
-            env_id: what is to be created; whatever is no id gets no process.
-            allowed_modules: names of the modules that an env_id may import.
-            vectorization_mode: what was asked for.
+            env_id: the id of the environment; invalid ids get no process.
+            allowed_modules: the modules that an env_id may import.
+            vectorization_mode: the requested mode.
         """
-        # Looking for ids that resemble a very long one would take minutes.
+        # Finding ids similar to a very long one would take minutes.
         if self.mode == "none" or not isinstance(env_id, str) or len(env_id) > registry.LONGEST_ID:
             return False
         module, colon, name = env_id.rpartition(":")
         if colon and module not in allowed_modules:
             return False
         home = module or _home(name, allowed_modules)
-        # Making Atari's own vector environment holds the interpreter, for 88 ms a sub-environment.
+        # Making Atari's own vector environment holds the GIL for 88 ms per sub-environment.
         holds = vectorization_mode == "vector_entry_point" and home.startswith("ale_py")
         return self.mode == "all" or holds or (home != "" and not registry.is_known(home))
 
     @property
     def most_bytes_here(self) -> float:
-        """How large an environment may be without a process of its own."""
+        """The largest estimate for an environment without its own process, in bytes."""
         return _MOST_BYTES_HERE if self.mode == "foreign" and sys.platform == "linux" else math.inf
 
     def settings(
@@ -110,10 +110,10 @@ class Isolation:
         max_num_envs: int,
         memory: float = math.inf,
     ) -> WorkerSettings:
-        """Return what the process of an environment is to know; see ``WorkerSettings``."""
+        """Return the settings for an environment's process."""
         allowed = frozenset(allowed_modules)
-        # An id from the registry's list names no module, and any of the modules may have
-        # registered it.
+        # An id from the list of the registry has no module; any allowed module may have registered
+        # it.
         is_unknown = (
             isinstance(env_id, str) and ":" not in env_id and _home(env_id, allowed) is _UNKNOWN
         )
@@ -123,15 +123,15 @@ class Isolation:
     def search(
         self, text: str | None, allowed_modules: Collection[str], seconds: float
     ) -> list[dict]:
-        """Return what is registered when the allowed modules are imported, elsewhere.
+        """List the registered environments in a process that imports the allowed modules.
 
         Args:
             text: see ``registry.search()``.
-            allowed_modules: names of the modules.
-            seconds: how long that may take; 0 for as long as it takes.
+            allowed_modules: the modules.
+            seconds: the time limit; 0 for no limit.
         """
         try:
-            # One at a time: anybody may search, and each search takes a process.
+            # One at a time: anybody may search, and each search needs a process.
             if not self._searching.acquire(timeout=seconds or -1):
                 raise _search_too_long(seconds)
             try:
@@ -155,7 +155,7 @@ class Isolation:
             return cast(list[dict], process.call("list_registry", text, settings).value)
         finally:
             overdue.cancel()
-            # It has answered, and a thread that a module has started could keep it from ending.
+            # A thread started by a module could keep the process from exiting.
             process.kill()
 
 
@@ -169,11 +169,11 @@ _UNKNOWN = "?"
 
 
 def _home(name: str, allowed_modules: Collection[str]) -> str:
-    """Return the module that an id without one belongs to, "" for an id that is in error."""
+    """Return the module of an id without one; "" for an invalid id."""
     try:
         spec = registry.look_up(name)
     except (error.NameNotFound, error.NamespaceNotFound, error.VersionNotFound):
-        # One of the modules may register it, and the server's process does not import them.
+        # An allowed module may register it, but the server's process does not import these.
         return _UNKNOWN if allowed_modules else ""
     except (error.Error, GymServerError):
         return ""

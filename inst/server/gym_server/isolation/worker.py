@@ -1,7 +1,7 @@
-"""What the process of an isolated environment does: it creates it and does what the server asks.
+"""What the process of an isolated environment does for the server.
 
-The process has an ordinary ``Instance`` of the environment, with a render thread and a monitor of
-its own; the server has an ``IsolatedInstance``, which asks this one.
+The process has an ordinary ``Instance`` with its own render thread and monitor. The server has an
+``IsolatedInstance``, which calls this one.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from gym_server.rendering.render_thread import RenderThread
 
 log = logging.getLogger(__name__)
 
-# Its imports take longer than the start of a process.
+# Importing it takes longer than starting a process.
 start.preload(__name__)
 
 
 @dataclass(frozen=True)
 class WorkerSettings:
-    """What a process is to know of the server.
+    """The server's settings for a process.
 
     Attributes:
-        allowed_modules: names of the modules that an env_id may import.
-        imported: those that are imported before anything is created.
-        max_num_envs: how many sub-environments an environment may have.
-        memory: how many bytes the environment may be estimated to take; see ``memory_estimate``.
-        max_mb: how much memory the process may have, in MiB; 0 for what is left for all.
+        allowed_modules: the modules that an env_id may import.
+        imported: those to import before the environment is created.
+        max_num_envs: the largest number of sub-environments.
+        memory: the largest estimate for the environment in bytes; see ``memory_estimate``.
+        max_mb: the memory limit of the process in MiB; 0 for what is left for all environments.
     """
 
     allowed_modules: frozenset[str]
@@ -54,7 +54,7 @@ class WorkerSettings:
 
     @property
     def most_mb(self) -> int:
-        """How much memory the system lets the process have, in MiB; 0 for no limit."""
+        """The memory limit that the system enforces, in MiB; 0 for no limit."""
         left = int(self.memory / 2**20) + OWN_MB if math.isfinite(self.memory) else 0
         return self.max_mb or left
 
@@ -63,12 +63,12 @@ _instance: Instance
 
 
 def list_registry(search: str | None, settings: WorkerSettings) -> Result:
-    """Return what can be created with the allowed modules."""
+    """List the environments that can be created with the allowed modules."""
     return Result(registry.search(search, settings.allowed_modules))
 
 
 def create(config: EnvConfig, settings: WorkerSettings) -> Result:
-    """Create the environment that everything below is about."""
+    """Create the environment that the functions below use."""
     global _instance
     for module in settings.imported:
         with contextlib.suppress(Exception):
@@ -91,7 +91,7 @@ def create(config: EnvConfig, settings: WorkerSettings) -> Result:
 
 
 def _exit(why: GymServerError) -> None:
-    """Exit with a process of sub-environments that has ended."""
+    """Exit when a process of sub-environments has ended."""
     log.warning("%s", why.message)
     os._exit(1)
 

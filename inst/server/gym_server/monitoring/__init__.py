@@ -1,1 +1,1 @@
-"""Recordings of episodes in files, as Gym's monitor wrote them."""
+"""Record episodes to files, as Gym's monitor did."""

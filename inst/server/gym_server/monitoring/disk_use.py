@@ -1,4 +1,4 @@
-"""How much monitors have written on the disk, all together, and whether that is too much."""
+"""How much all monitors have written to the disk, and whether that is too much."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gym_server.errors import GymServerError
 
-# Every file takes whole blocks.
+# Files take whole blocks.
 _BLOCK_BYTES = 4096
 
 _WRITTEN_BY_MONITORS = ("episodes", "rl-video")
@@ -19,13 +19,13 @@ _INSTANCE_ID = re.compile("[0-9a-f]{8}")
 
 
 class DiskUse:
-    """What the directories take that monitors have written since the server started."""
+    """The disk space of the directories that monitors have written since the server started."""
 
     def __init__(self, most_bytes: float) -> None:
-        """Start with none.
+        """Start with no directories.
 
         Args:
-            most_bytes: what they may take together.
+            most_bytes: the limit for all of them together.
         """
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
@@ -33,18 +33,18 @@ class DiskUse:
         self._total = 0
 
     def measure(self, path: Path) -> None:
-        """Note what the files of monitors in a directory take now."""
+        """Measure the monitors' files in a directory."""
         with self._lock:
             size = _size(path)
             self._total += size - self._sizes.get(path, 0)
             self._sizes[path] = size
 
     def check(self, path: Path, emptied: bool = False) -> None:
-        """Refuse to write more, if all directories together take too much.
+        """Refuse to write more if all directories together take too much.
 
         Args:
-            path: the directory to write into.
-            emptied: whether what it holds is going to be deleted.
+            path: the directory to write to.
+            emptied: whether its contents will be deleted first.
 
         Raises:
             GymServerError: ``monitors_full``.
@@ -52,22 +52,22 @@ class DiskUse:
         if self._total - (self._sizes.get(path, 0) if emptied else 0) >= self._most_bytes:
             raise GymServerError(
                 "monitors_full",
-                f"Nothing more is recorded in {path}: all monitors together have written "
+                f"Recording stopped in {path}: all monitors together have written "
                 f"{self._total / 2**20:.0f} MiB since this server started, and may write "
                 f"{self._most_bytes / 2**20:.0f}",
-                "record with force = true into a directory whose recordings nobody needs; the "
+                "record with force = true into a directory whose recordings are not needed; the "
                 "server's option --max-monitor-mb sets the limit",
             )
 
 
 def own_directories(path: Path) -> list[Path]:
-    """Return the directories below one of those monitors that found another one writing there."""
+    """Return the subdirectories of monitors that shared this directory with another one."""
     return [path / name for name in os.listdir(path) if _INSTANCE_ID.fullmatch(name)]
 
 
 def _size(path: Path) -> int:
     blocks = 0
-    # Somebody may just have removed a directory, or one of its files.
+    # Directories and files may just have been removed.
     with contextlib.suppress(OSError):
         for directory in (path, *own_directories(path)):
             blocks += 1

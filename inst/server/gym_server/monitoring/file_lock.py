@@ -1,4 +1,4 @@
-"""Lock a file for one process alone, until the file is closed or the process ends somehow."""
+"""Lock a file for one process, until the file is closed or the process ends."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import IO
 if sys.platform == "win32":
     import msvcrt
 
-    # Windows keeps others from reading what is locked, so that lies far behind the file's end.
+    # Windows prevents others from reading a locked part, so lock one far behind the file's end.
     _FAR_BEHIND = 2**30
 
     def _lock(descriptor: int) -> None:
@@ -24,16 +24,16 @@ else:
     import fcntl
 
     def _lock(descriptor: int) -> None:
-        # Not lockf(): its locks belong to the process, which could take them twice, and they end
-        # when any other handle of the file is closed.
+        # lockf() locks belong to the process, which could take one twice, and they end when any
+        # other handle of the file is closed.
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def try_lock(file: IO) -> bool:
-    """Lock an open file until it is closed; return False when another process has.
+    """Lock an open file until it is closed; return False if it is already locked.
 
     Raises:
-        OSError: the file system has no locks.
+        OSError: the file system does not support locks.
     """
     try:
         _lock(file.fileno())

@@ -1,4 +1,4 @@
-"""Record an environment's episodes: a table always, videos where they are asked for."""
+"""Record an environment's episodes: always a table, and videos on request."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ log = logging.getLogger(__name__)
 
 
 class Monitor:
-    """Records the episodes of one environment into a directory.
+    """Records the episodes of one environment to a directory.
 
-    The table gets a row when an episode is done: its number, the sum of its rewards, its steps
-    and its duration in seconds.  Numbers count the resets since the start of monitoring,
-    from 0, so an episode that a reset cuts short leaves a gap, and a video has the number of its
-    episode.
+    The table gets a row when an episode ends: its number, the sum of its rewards, its steps, and
+    its duration in seconds. Numbers count the resets since monitoring started, from 0. An episode
+    that a reset cuts short leaves a gap. A video has the number of its episode.
 
-    The caller makes only one call at a time.
+    Only one thread at a time may call it.
     """
 
     def __init__(
@@ -39,9 +38,9 @@ class Monitor:
         """Start to record the episodes that begin from now on.
 
         Args:
-            env: the environment; it is recorded, never closed.
-            directory: what ``take_directory()`` returned.
-            video_every: record a video of each episode whose number this divides; 0 for none. See
+            env: the environment, which is recorded but never closed.
+            directory: the result of ``take_directory()``.
+            video_every: record a video of every episode whose number is a multiple; 0 for none. See
                 ``require_video()``.
             draw: draws the environment.
         """
@@ -71,7 +70,7 @@ class Monitor:
         return result
 
     def step(self, action: object) -> tuple:
-        """Take a step; write the episode's row when it is done."""
+        """Take a step; write a row if the episode ends."""
         result: tuple = self._env.step(action)
         if self._video is not None:
             self._record(self._video.add)
@@ -84,10 +83,10 @@ class Monitor:
         return result
 
     def close(self) -> None:
-        """Finish the files; the environment goes on.
+        """Finish the files; the environment stays open.
 
         Raises:
-            GymServerError: ``monitor_directory`` when something could not be written.
+            GymServerError: ``monitor_directory`` if something could not be written.
         """
         self._finish_video()
         try:
@@ -97,12 +96,12 @@ class Monitor:
         if self._failure is not None:
             raise GymServerError(
                 "monitor_directory",
-                f"What was recorded in {self._directory.path} is incomplete: {self._failure}",
+                f"The recording in {self._directory.path} is incomplete: {self._failure}",
             ) from self._failure
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """The process that encodes a video, if one is being recorded."""
+        """The process that encodes the current video, if any."""
         video = self._video
         return (video.pid,) if video is not None else ()
 
@@ -120,7 +119,7 @@ class Monitor:
         self._episode = None
         try:
             self._rows.writerow(row)
-            # So that the file has every episode that is done, for readers and after a crash.
+            # So that readers see every finished episode, even after a crash.
             self._directory.table.flush()
             self._episodes += 1
         except OSError as error:
@@ -135,7 +134,7 @@ class Monitor:
 
     def _record(self, add: Callable[..., None], *args: object) -> None:
         frame = self._draw()
-        # Not on the render thread: encoding draws nothing, and others may need the thread.
+        # Not on the render thread, which others may need: encoding does not draw.
         try:
             add(*args, frame)
         except Exception as error:
@@ -151,13 +150,13 @@ class Monitor:
             self._remember(error)
 
     def _remember(self, error: Exception) -> None:
-        # The step or reset that ends an episode was taken and must be answered; close() raises.
+        # The step or reset itself succeeded and must be answered; close() raises the error.
         self._failure = self._failure or error
         log.error("A monitor in %s lost something", self._directory.path, exc_info=error)
 
 
 def require_video(env: gymnasium.Env) -> None:
-    """Raise ``video_unavailable`` where no videos of an environment can be made."""
+    """Raise ``video_unavailable`` if no videos of an environment can be made."""
     if env.render_mode != "rgb_array":
         raise GymServerError(
             "video_unavailable",

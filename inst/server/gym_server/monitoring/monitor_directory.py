@@ -1,4 +1,4 @@
-"""Directories that monitors write: which are allowed, and what a monitor finds and writes there."""
+"""Directories for monitors: which are allowed, and their contents."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from gym_server.monitoring.file_lock import try_lock
 TABLE = "episodes.csv"
 _HEADER = "episode,return,length,seconds\n"
 
-# As Gymnasium's RecordVideo has it.
+# The names of Gymnasium's RecordVideo.
 _VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
 
-# A greater number was not counted by a monitor, and names of files could become too long.
+# Monitors never count higher, and file names could become too long.
 _MOST_EPISODES = 10**15
 
 
 class MonitorRoot:
-    """Where the monitors of a server may write.
+    """The directories that a server's monitors may write to.
 
     Attributes:
         disk_use: how much they have written, and may write.
@@ -40,11 +40,11 @@ class MonitorRoot:
         """Set the limits.
 
         Args:
-            root: relative directories lie below it, and absolute ones may; None for a temporary
-                directory, created when the first monitor starts.
-            allow_temporary: whether absolute ones may also lie below the system's temporary
-                directory, as the classic examples have it.
-            most_bytes: what all of them together may write.
+            root: the parent of relative directories, and of allowed absolute ones; None for a
+                temporary directory, created when the first monitor starts.
+            allow_temporary: whether absolute ones may also be below the system's temporary
+                directory, as in the classic examples.
+            most_bytes: how much all monitors together may write.
         """
         self.disk_use = DiskUse(most_bytes)
         self._root = root
@@ -57,28 +57,28 @@ class MonitorRoot:
         self._lock = threading.Lock()
 
     def resolve(self, directory: str) -> Path:
-        """Return where a directory is that a client names, for ``take_directory()``.
+        """Return the path of a directory that a client names, for ``take_directory()``.
 
         Raises:
-            GymServerError: ``monitor_directory`` for one that monitors may not write.
+            GymServerError: ``monitor_directory`` if monitors may not write there.
         """
         if "\0" in directory:
             raise _refuse(directory, "it contains a NUL")
         if ".." in PurePosixPath(directory).parts or ".." in PureWindowsPath(directory).parts:
-            raise _refuse(directory, "it climbs")
+            raise _refuse(directory, "it contains '..'")
         try:
-            # Links are followed before the comparison, so that none leads out.
+            # Resolve links before comparing, so that none leads outside.
             own = self._find_root()
             path = Path(own, directory).resolve()
             allowed = [root.resolve() for root in (own, *self._allowed)]
         except (OSError, RuntimeError, ValueError) as error:
             raise _refuse(directory, str(error)) from error
         if not any(root in path.parents for root in allowed):
-            raise _refuse(directory, "it is outside the directory that this server may write")
+            raise _refuse(directory, "it is outside the directory that this server may write to")
         return path
 
     def close(self) -> None:
-        """Remove the temporary directory unless something was written there."""
+        """Remove the temporary directory if it is empty."""
         if self._own_root is not None:
             with contextlib.suppress(OSError):
                 self._own_root.rmdir()
@@ -91,27 +91,27 @@ class MonitorRoot:
 
 
 class MonitorDirectory:
-    """The directory of one monitor, with its table and its videos.
+    """The directory of one monitor, with its table and videos.
 
-    A monitor that writes has the table locked. The system releases the lock when the process ends,
-    so a directory whose table can be locked is that of a monitor that is gone.
+    An active monitor locks the table. The system releases the lock when the process ends, so a
+    directory whose table can be locked belongs to a monitor that has ended.
 
     Attributes:
         path: the directory.
-        next_episode: the number of the episode that begins next.
-        table: the table, open for appending, while the directory is taken.
+        next_episode: the number of the next episode.
+        table: the table, open for appending, after ``take()``.
     """
 
     table: TextIO
 
     def __init__(self, path: Path) -> None:
-        """Name the directory; ``take()`` takes it."""
+        """Set the path; ``take()`` takes the directory."""
         self.path = path
         self.next_episode = 0
         self._is_new = False
 
     def take(self) -> bool:
-        """Take the directory, unless a monitor writes there.
+        """Lock the directory's table; return False if an active monitor has it.
 
         Raises:
             OSError: the table cannot be opened or locked.
@@ -125,15 +125,16 @@ class MonitorDirectory:
                 )
                 if not try_lock(table):
                     return False
-                # Else the monitor that had it has deleted it after it was opened here.
+                # Otherwise another monitor deleted the file after it was opened here.
                 if _is_at(table, path):
                     undo.pop_all()
                     self.table = table
                     return True
 
     def leave(self) -> None:
-        """Give the directory back as it was."""
-        # While it is locked, so that no other monitor has it; Windows deletes no open file.
+        """Restore the directory as it was before ``take()``."""
+        # Unlink while it is locked, so that no other monitor has it. Windows cannot delete open
+        # files.
         if os.name == "nt":
             self.table.close()
         if self._is_new:
@@ -144,18 +145,18 @@ class MonitorDirectory:
         """Finish the table.
 
         Raises:
-            OSError: it is not there any more, or cannot be written.
+            OSError: it was removed, or cannot be written.
         """
         with self.table:
             self.check()
 
     def check(self) -> None:
-        """Raise FileNotFoundError where the table was taken away: others may write there by now."""
+        """Raise FileNotFoundError if the table was removed: others may write there by now."""
         if not _is_at(self.table, self.path / TABLE):
-            raise FileNotFoundError(f"{TABLE} was taken away")
+            raise FileNotFoundError(f"{TABLE} was removed")
 
     def prepare(self, force: bool, resume: bool) -> None:
-        """Keep what an earlier monitor left, delete it or refuse; then begin the table.
+        """Keep, delete or refuse an earlier monitor's files; then start the table.
 
         Raises:
             OSError: something cannot be read, written or deleted.
@@ -170,7 +171,7 @@ class MonitorDirectory:
             raise _refuse(
                 self.path,
                 "it holds the files of an earlier monitor",
-                "take force = true to delete them, or resume = true to go on counting",
+                "use force = true to delete them, or resume = true to continue the numbering",
             )
         elif self._size:
             numbers = [int(number) for number in videos.values()] + self._episodes()
@@ -180,7 +181,7 @@ class MonitorDirectory:
             self.table.flush()
 
     def empty(self) -> None:
-        """Delete what a monitor left that is gone, and the directory unless it holds more."""
+        """Delete the files of a monitor that has ended, and the directory if it is then empty."""
         for name in self.videos():
             (self.path / name).unlink()
         self._is_new = True
@@ -189,10 +190,10 @@ class MonitorDirectory:
             self.path.rmdir()
 
     def videos(self) -> dict[str, str]:
-        """Return the names of earlier videos, each with the number of its episode.
+        """Return the names of earlier videos, each with its episode's number.
 
         Raises:
-            GymServerError: ``monitor_directory`` where files of such names are not a monitor's.
+            GymServerError: ``monitor_directory`` if files with these names are not a monitor's.
         """
         found = {
             match[0]: match[1] for match in map(_VIDEO.fullmatch, os.listdir(self.path)) if match
@@ -204,11 +205,11 @@ class MonitorDirectory:
             raise _refuse(
                 self.path,
                 f"it holds {foreign[0]}, which no monitor of this server wrote",
-                "move that file away, or take another directory",
+                "move that file away, or use another directory",
             )
         for name in (TABLE, *found):
             if not stat.S_ISREG((self.path / name).lstat().st_mode):
-                raise _refuse(self.path, f"{name} is no ordinary file")
+                raise _refuse(self.path, f"{name} is not a regular file")
         return found
 
     @property
@@ -216,16 +217,16 @@ class MonitorDirectory:
         return os.fstat(self.table.fileno()).st_size
 
     def _episodes(self) -> list[int]:
-        """Return the numbers in the table, whose header was read."""
+        """Return the episode numbers in the table, whose header was already read."""
         try:
             numbers = [int(line.split(",")[0]) for line in self.table.read().splitlines() if line]
             if not all(0 <= number <= _MOST_EPISODES for number in numbers):
-                raise ValueError("it holds what is no episode's number")
+                raise ValueError("it holds a value that is not an episode's number")
         except ValueError as error:
             raise _refuse(
                 self.path,
                 f"{TABLE} is damaged: {error}",
-                "mend that file, or move it away, or take another directory",
+                "repair that file, or move it away, or use another directory",
             ) from error
         return numbers
 
@@ -233,15 +234,15 @@ class MonitorDirectory:
 def take_directory(
     path: Path, directory: str, instance_id: str, force: bool, resume: bool
 ) -> MonitorDirectory:
-    """Give a monitor a directory of its own.
+    """Give a monitor its own directory.
 
     Args:
-        path: what ``MonitorRoot.resolve()`` returned.
-        directory: as the client names it.
-        instance_id: the recorded instance's: while another monitor writes in the directory, this
-            one has a directory of this name below it.
-        force: delete what monitors left there that are gone.
-        resume: keep it, and go on counting; ``force`` goes first.
+        path: the result of ``MonitorRoot.resolve()``.
+        directory: its name as the client sent it.
+        instance_id: the recorded instance. While another monitor writes to the directory, this one
+            uses a subdirectory with this name.
+        force: delete the files of monitors that have ended.
+        resume: keep these files, and continue the numbering. ``force`` takes precedence.
 
     Raises:
         GymServerError: ``monitor_directory``.
@@ -264,7 +265,7 @@ def take_directory(
 
 
 def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
-    # An instance goes on with what it began in a directory of its own.
+    # An instance continues in its own subdirectory if it has one.
     for one in (own, path) if resume and own.exists() else (path, own):
         one.mkdir(exist_ok=True)
         taken = MonitorDirectory(one)
@@ -276,14 +277,14 @@ def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
 def _empty_those_of_gone_monitors(path: Path) -> None:
     for one in own_directories(path):
         other = MonitorDirectory(one)
-        # A monitor that is just starting has locked its table before it writes into it.
+        # A monitor that is just starting has locked its table before it writes to it.
         has_begun = (one / TABLE).exists() and (one / TABLE).stat().st_size > 0
         if has_begun and other.take():
             other.empty()
 
 
 def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServerError:
-    """A directory cannot be used by a monitor."""
+    """Report a directory that a monitor cannot use."""
     return GymServerError(
         "monitor_directory",
         f"The directory {brief(str(directory))} cannot be used: {reason}",
@@ -292,13 +293,13 @@ def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServe
 
 
 def _opener(path: str, flags: int) -> int:
-    # Follow no link, and do not wait for a reader of a pipe of that name.
+    # Follow no link, and if it is a named pipe, do not wait for a reader.
     careful = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     return os.open(path, flags | careful, 0o666)
 
 
 def _is_at(file: TextIO, path: Path) -> bool:
-    """Tell whether an open file is the one at a path."""
+    """Return whether an open file is the one at a path."""
     try:
         return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
     except FileNotFoundError:

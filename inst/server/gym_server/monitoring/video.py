@@ -1,4 +1,4 @@
-"""The video of one episode, encoded while the episode is played."""
+"""Encode the video of an episode while it is played."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from gym_server.rendering.png import picture
 
 
 class Video:
-    """Writes frames to a file as they come, and keeps none.
+    """Writes frames to a file as they come, without keeping them.
 
     Attributes:
-        pid: of the process that encodes them.
+        pid: the process that encodes them.
     """
 
     def __init__(self, path: Path, fps: float, frame: object) -> None:
-        """Start the encoder; ``add()`` also the first frame.
+        """Start the encoder; ``add()`` must also be called for the first frame.
 
         Args:
-            path: of the file, an mp4.
-            fps: frames a second.
-            frame: the first frame; all others must be of its size.
+            path: the file, an mp4.
+            fps: frames per second.
+            frame: the first frame; all frames must have its size.
 
         Raises:
-            ValueError: it is no picture.
+            ValueError: the frame is not a picture.
         """
-        # It takes a second to import.
+        # Importing it takes a second.
         from moviepy.video.io.ffmpeg_writer import FFMPEG_VideoWriter
 
         height, width, _ = self._shape = picture(frame).shape
         self._name = path.name
-        # x264 looks 40 frames ahead by default, and keeps them meanwhile.
+        # By default x264 keeps 40 frames to look ahead.
         ahead = ["-x264-params", "rc-lookahead=10"]
         with _signals_held():
             self._writer = FFMPEG_VideoWriter(str(path), (width, height), fps, ffmpeg_params=ahead)
@@ -44,16 +44,16 @@ class Video:
         self.pid: int = self._process.pid
 
     def add(self, frame: object) -> None:
-        """Encode one more frame.
+        """Encode a frame.
 
         Raises:
-            ValueError: it is no picture, or one of another size.
+            ValueError: the frame is not a picture, or has another size.
             OSError: it cannot be written.
         """
         pixels = picture(frame)
         if pixels.shape != self._shape:
             raise ValueError(f"a frame of shape {pixels.shape} follows one of {self._shape}")
-        # Grey becomes RGB, and RGBA loses its last channel.
+        # Turns grey into RGB, and drops the last channel of RGBA.
         self._writer.write_frame(np.broadcast_to(pixels[:, :, :3], (*pixels.shape[:2], 3)))
 
     def close(self) -> None:
@@ -70,9 +70,9 @@ class Video:
 
 @contextlib.contextmanager
 def _signals_held() -> Iterator[None]:
-    """Let a process that is started meanwhile live on when all of the server's are asked to stop.
+    """Protect a process that is started meanwhile from signals to the whole server.
 
-    Ctrl-C and systemd reach it as well, and the server finishes its video when it stops.
+    Ctrl-C and systemd signal all processes, but the server finishes its videos when it stops.
     """
     if sys.platform == "win32":
         yield

@@ -1,10 +1,10 @@
-"""Sub-environments that are copies of the first one, where that plays the same as new ones.
+"""Sub-environments that are copies of the first one, if those play the same as new ones.
 
-Gymnasium's toy-text environments compute a table of all transitions when they are made, which takes
-longer than a short episode, and never change it afterwards. With copies 256 sub-environments are
-made in 5 ms instead of 140 (FrozenLake), in 9 instead of 1,900 (Taxi), 6 instead of 580
-(CliffWalking) and 2.5 instead of 10 (Blackjack, which has spaces only): medians of two to four
-groups each way, in turn in one process.
+Gymnasium's toy-text environments compute a table of all transitions when they are made, and never
+change it afterwards. That takes longer than a short episode. Copies reduce the time to make 256
+sub-environments from 140 to 5 ms (FrozenLake), 1,900 to 9 (Taxi), 580 to 6 (CliffWalking) and 10 to
+2.5 (Blackjack, which has only spaces): medians of two to four groups each, made in turn in one
+process.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from gymnasium.wrappers import OrderEnforcing, TimeLimit
 
 _TOY_TEXT = ("gymnasium.envs.toy_text.", "gymnasium.envs.toy_text:")
 
-# Others may hold what they change in place; RecordEpisodeStatistics has queues.
+# Other wrappers may keep objects that they change in place; RecordEpisodeStatistics keeps queues.
 _KEEP_NUMBERS_ONLY = (OrderEnforcing, TimeLimit)
 
 
 def can_copy(env: gymnasium.Env) -> bool:
-    """Tell whether a copy of an environment that was just made plays as another new one."""
+    """Return whether a copy of a newly made environment plays the same as a new one."""
     while isinstance(env, gymnasium.Wrapper):
         if type(env) not in _KEEP_NUMBERS_ONLY:
             return False
@@ -29,16 +29,16 @@ def can_copy(env: gymnasium.Env) -> bool:
     spec = env.spec
     if spec is None or not isinstance(spec.entry_point, str):
         return False
-    # FrozenLake draws a map at random where it has neither a name of one nor a map.
+    # Without a map and the name of a map, FrozenLake generates a random one.
     is_random = spec.kwargs.get("map_name", "") is None and spec.kwargs.get("desc") is None
     return spec.entry_point.startswith(_TOY_TEXT) and not is_random
 
 
 def copy_new(env: gymnasium.Env) -> gymnasium.Env:
-    """Copy an environment for which ``can_copy()``, and the wrappers around it.
+    """Copy an environment that ``can_copy()`` accepts, and its wrappers.
 
-    It must not have been reset, nor its generator used, nor have been drawn: the copy shares what
-    there is, such as the spaces and the table, and only what comes later is its own.
+    It must not have been reset or drawn, nor its generator used. The copy shares its existing
+    objects, such as spaces and the table; only objects created later are its own.
     """
     copied = copy.copy(env)
     if isinstance(copied, gymnasium.Wrapper):

@@ -1,4 +1,4 @@
-"""Vector environments that bring an implementation of their own."""
+"""Vector environments with their own implementation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gym_server.errors import GymServerError
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import member_of
 
-# An environment that draws all its sub-environments at once may have no more than these.
+# The most sub-environments of an environment that draws all of them at once.
 _MOST_DRAWN_AT_ONCE = 16
 
 
 class EntryPointEnv:
-    """An environment's own implementation, which has one generator for all sub-environments.
+    """An environment's own implementation, with one generator for all sub-environments.
 
     It has the attributes and methods of ``SubEnvs``.
     """
@@ -53,37 +53,37 @@ class EntryPointEnv:
     def reset(
         self, seed: int | None, options: dict | None, mask: None, with_infos: bool = True
     ) -> tuple[Any, dict]:
-        """Begin an episode in all of them."""
+        """Start an episode in all sub-environments."""
         observation, info = self._env.reset(seed=seed, options=options)
         self.ended[:] = False
         return observation, info if with_infos else {}
 
     def step(self, which: None, actions: Any, with_infos: bool = True) -> tuple:
-        """Step all of them."""
+        """Step all sub-environments."""
         observation, reward, terminated, truncated, info = self._env.step(actions)
         if self.autoreset_mode is AutoresetMode.DISABLED:
             self.ended = np.asarray(terminated, dtype=bool) | np.asarray(truncated, dtype=bool)
         if not with_infos:
             info = {name: info[name] for name in ("final_obs", "_final_obs") if name in info}
-        # An environment may change its arrays in the next step, before these are sent.
+        # The environment may change its arrays in the next step, before these are sent.
         results = [np.array(result) for result in (reward, terminated, truncated)]
         return observation, *results, info
 
     def draw(self, sub_env: int) -> object:
-        """Draw all sub-environments, and return one of the frames."""
+        """Draw all sub-environments, and return the frame of one."""
         if self.num_envs > _MOST_DRAWN_AT_ONCE:
             raise GymServerError(
                 "cannot_render",
                 f"{self.spec.id if self.spec else 'This environment'} draws all of its "
-                f"{self.num_envs} sub-environments at once, and the most that this server lets it "
-                f"draw are {_MOST_DRAWN_AT_ONCE}",
+                f"{self.num_envs} sub-environments at once, and this server allows at most "
+                f"{_MOST_DRAWN_AT_ONCE} for that",
                 "create the environment with vectorization_mode 'sync'",
             )
         frames: Any = self.drawing.draw(self._env.render)
         return frames[sub_env]
 
     def observed(self, sub_env: int, batch: object) -> object:
-        """Return the last observation of a sub-environment, given that of the last move."""
+        """Return the last observation of a sub-environment, given the last batch."""
         return member_of(self.single_observation_space, batch, sub_env)
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:

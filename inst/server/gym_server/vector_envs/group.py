@@ -1,4 +1,4 @@
-"""Sub-environments that are played one after the other in one process."""
+"""Sub-environments that are played one after another in one process."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from gym_server.vector_envs.sub_env import SubEnv
 
 
 class Info(NamedTuple):
-    """What a sub-environment told in a move.
+    """The infos of a sub-environment after a reset or step.
 
     Attributes:
-        info: of the move, or of the reset that followed it in the same step.
-        final: of the step that ended an episode, where a reset followed in the same step.
+        info: the info of the step, or of the reset that followed in the same step.
+        final: the info of the step that ended an episode, if a reset followed in the same step.
     """
 
     info: dict
@@ -33,16 +33,16 @@ class Info(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of a step, a row for each sub-environment that stepped.
+    """The outcome of a step, with a row per sub-environment that stepped.
 
     Attributes:
         observation: a batch.
         reward: float64.
         terminated: booleans.
         truncated: booleans.
-        final: the last observations, by row, of episodes after which another one began in the same
-            step.
-        infos: one for each row; empty where none were wanted.
+        final: the last observations of episodes that were followed by a reset in the same step, by
+            row.
+        infos: one per row; empty if none are wanted.
     """
 
     observation: Any
@@ -57,8 +57,8 @@ class Group:
     """Some of the sub-environments of a vector environment.
 
     Attributes:
-        envs: they themselves.
-        render_mode: that of each of them.
+        envs: the sub-environments.
+        render_mode: the render mode of each.
     """
 
     def __init__(
@@ -67,11 +67,11 @@ class Group:
         numbers: Sequence[int],
         autoreset_mode: AutoresetMode,
     ) -> None:
-        """Make them.
+        """Make the sub-environments.
 
         Args:
             sub_env: makes them.
-            numbers: theirs among all sub-environments, from 0; for errors.
+            numbers: their numbers among all sub-environments, from 0; for errors.
             autoreset_mode: when a sub-environment whose episode ended is reset.
         """
         self._numbers = numbers
@@ -84,17 +84,17 @@ class Group:
             self._check_spaces()
             undo.pop_all()
         self._observation_space = self.envs[0].observation_space
-        # Of those that nobody has drawn so far.
+        # Of sub-environments that have not been drawn yet.
         self._render_modes = [save_drawing(env) for env in self.envs]
         self.render_mode = self._render_modes[0] or self.envs[0].render_mode
         self._steps = [env.step for env in self.envs]
         self._last: list[object] = [None] * len(numbers)
-        # These have played all episodes that they had seeds for, and move no more.
+        # Whether each has played all episodes for which it had seeds, and does not move any more.
         self._rests = [False] * len(numbers)
-        # The next move of these begins an episode, with mode NEXT_STEP.
+        # In mode NEXT_STEP: whether the next step of each starts an episode.
         self._ended = [False] * len(numbers)
-        # The seeds of the episodes that they begin by themselves, the next one last; None for
-        # episodes without end and without seeds.
+        # The seeds of the episodes that each starts automatically, in reverse order; None for
+        # endless episodes without seeds.
         self._seeds: list[list[int] | None] = [None] * len(numbers)
 
     def _check_spaces(self) -> None:
@@ -117,21 +117,22 @@ class Group:
         later: Sequence[Sequence[int] | None],
         options: dict | None,
     ) -> tuple[Any, list[Info]]:
-        """Begin episodes in some of them.
+        """Start episodes in some sub-environments.
 
         Args:
-            which: their places in this group.
-            seeds: theirs.
-            later: for each the seeds of the episodes that it begins by itself after this one, and
-                then it rests; None for episodes without seeds, one after the other.
-            options: the environment's own.
+            which: their indices in this group.
+            seeds: their seeds.
+            later: for each, the seeds of the episodes that it starts automatically afterwards,
+                until it rests; None for endless episodes without seeds.
+            options: options for the environments.
 
         Returns:
-            The observations of all of them as a batch, and the infos of those that were reset.
+            The observations of all sub-environments as a batch, and the infos of those that were
+            reset.
         """
         infos = []
         for index, seed, seeds_later in zip(which, seeds, later, strict=True):
-            # An environment may change them.
+            # The environment may change its options.
             own = copy.deepcopy(options)
             with self._naming(index):
                 self._last[index], info = self.envs[index].reset(seed=seed, options=own)
@@ -143,16 +144,16 @@ class Group:
     def step(
         self, which: Sequence[int] | None, actions: Iterable[object], with_infos: bool
     ) -> Outcome:
-        """Step some of them.
+        """Step some sub-environments.
 
         Args:
-            which: their places in this group, in increasing order; None for all. One that rests
-                returns its last observation and the reward 0.
+            which: their indices in this group, in increasing order; None for all. One that rests
+                returns its last observation and a reward of 0.
             actions: one for each of them.
             with_infos: whether infos are wanted.
         """
         which = range(len(self.envs)) if which is None else which
-        # Before any steps, and where no sub-environment is to blame.
+        # Evaluate them before any step, while no sub-environment is to blame for an error.
         actions = list(actions)
         if len(actions) != len(which):
             raise ValueError(f"{len(actions)} actions for {len(which)} sub-environments")
@@ -184,7 +185,7 @@ class Group:
                         elif self._mode is AutoresetMode.NEXT_STEP:
                             ended[index] = True
                         else:
-                            # The reset may change in place what the step returned.
+                            # The reset may change the returned observation in place.
                             final[row] = copy.deepcopy(last[index])
                             final_info = _copied(info) if with_infos else None
                             last[index], info = self._begin_next(index)
@@ -216,17 +217,17 @@ class Group:
     # Looks ----------------------------------------------------------------------------------
 
     def render(self, index: int) -> object:
-        """Draw one of them."""
+        """Draw a sub-environment."""
         with self._naming(index):
             allow_drawing(self.envs[index], self._render_modes[index])
             return self.envs[index].render()
 
     def observed(self, index: int) -> object:
-        """Return the last observation of one of them."""
+        """Return the last observation of a sub-environment."""
         return self._last[index]
 
     def close(self) -> None:
-        """Close all of them, whatever goes wrong with one; raise the first error."""
+        """Close all sub-environments, even if some fail; raise the first error."""
         with contextlib.ExitStack() as closing:
             for env in self.envs:
                 closing.callback(env.close)
@@ -246,12 +247,12 @@ class Group:
         return environment_error(failure, f"Sub-environment {self._numbers[index]}")
 
 
-# Deeper than any honest info; one that holds itself is not followed further.
+# Deeper than any reasonable info. An info that contains itself is cut off here.
 _DEEPEST = 128
 
 
 def _copied(value: Any, depth: int = 0) -> Any:
-    """Copy the arrays, dicts and lists of an info; what else it holds may have no copy."""
+    """Copy the arrays, dicts and lists of an info; other objects may have no copy."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if depth < _DEEPEST:
@@ -263,14 +264,14 @@ def _copied(value: Any, depth: int = 0) -> Any:
 
 
 def stack_observations(space: Space, observations: list) -> Any:
-    """Return observations of a space as a batch, as Gymnasium's vector environments have it."""
+    """Batch observations, in the format of Gymnasium's vector environments."""
     if isinstance(space, ARRAYS):
         batch: np.ndarray | None
         try:
             batch = np.array(observations)
         except ValueError:
             batch = None
-        # Gymnasium's function takes three times as long, and says what does not fit.
+        # Gymnasium's function takes three times as long, but explains what does not fit.
         shape = (len(observations), *(space.shape or ()))
         if batch is not None and batch.dtype == space.dtype and batch.shape == shape:
             return batch

@@ -1,4 +1,4 @@
-"""Calls of several groups at the same time."""
+"""Call several groups at the same time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ AnyGroup = LocalGroup | WorkerProcess
 
 
 def call_all(calls: Iterable[tuple[AnyGroup, str, tuple]]) -> list:
-    """Begin all calls, wait for all results; then raise the first error.
+    """Start all calls and wait for all results; then raise the first error.
 
     Args:
         calls: a group, the name of one of its methods, and the arguments.
@@ -26,7 +26,7 @@ def call_all(calls: Iterable[tuple[AnyGroup, str, tuple]]) -> list:
     except BaseException as refusal:
         failure = refusal
     for group in begun:
-        # All must be taken: a result that is left would be taken for that of the next call.
+        # Take all results: one that is left over would be taken for the next call's.
         try:
             results.append(group.finish())
         except BaseException as refusal:

@@ -1,4 +1,4 @@
-"""What a process of the pool does for a group of sub-environments, one group at a time."""
+"""What a worker process does for a group of sub-environments, one group at a time."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from gym_server.processes import start
 from gym_server.vector_envs.group import Group
 from gym_server.vector_envs.sub_env import SubEnv
 
-# Its imports take longer than the start of a process.
+# Importing it takes longer than starting a process.
 start.preload(__name__)
 
 _group: Group
 
 
 def make(pickled: bytes, numbers: Sequence[int], mode: AutoresetMode) -> None:
-    """Make the group; its arguments are those of ``Group``.
+    """Make the group; the arguments are those of ``Group``.
 
-    The first one is pickled by itself: a call that cannot be read ends the process, and this is an
-    error.
+    The first argument is pickled separately: if it cannot be unpickled here, that is an error. A
+    call that cannot be unpickled would end the process.
     """
     global _group
     sub_env: SubEnv = pickle.loads(pickled)
@@ -51,7 +51,7 @@ def observed(index: int) -> object:
 
 
 def close() -> None:
-    """Close the group, and forget it."""
+    """Close and forget the group."""
     global _group
     group = _group
     del _group

@@ -1,8 +1,8 @@
-"""The infos of sub-environments as one, in the form of Gymnasium's vector environments.
+"""Combine the infos of sub-environments, in the format of Gymnasium's vector environments.
 
-Each key has an array with an entry for each sub-environment, and beside it, under the key with
-``_`` before it, a mask of those that have the key. A dict becomes such a dict again.
-https://gymnasium.farama.org/api/vector/ describes it.
+Each key has an array with an entry per sub-environment. A second array, under the key with a
+leading ``_``, is a mask of the sub-environments that have the key. A dict is combined in the same
+way. See https://gymnasium.farama.org/api/vector/.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import numpy as np
 
 from gym_server.vector_envs.group import Info
 
-# The values of one key, by the sub-environments that have it.
+# The values of one key, by sub-environment.
 Values = dict[int, object]
 
 
 def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: int) -> dict:
-    """Return the infos of sub-environments as one.
+    """Combine the infos of sub-environments.
 
     Args:
-        infos: of each sub-environment, None for one that has none; empty where none are wanted.
+        infos: one per sub-environment, or None for one without; empty if none are wanted.
         final: the last observations of episodes that ended, by sub-environment.
-        num_envs: how many sub-environments there are.
+        num_envs: the number of sub-environments.
     """
     by_key: dict[str, Values] = {}
     for row, info in enumerate(infos):
@@ -52,7 +52,7 @@ def _arrays(by_key: Mapping[str, Values], num_envs: int) -> dict:
 
 
 def _numbers(key: str, values: Values, num_envs: int) -> dict | None:
-    """Return an array of a type that holds all of them; None where there is no such type."""
+    """Return the values as one array; None if no dtype fits all of them."""
     if not all(_is_number(value) or isinstance(value, np.ndarray) for value in values.values()):
         return None
     rows = {row: np.asarray(value) for row, value in values.items()}

@@ -1,4 +1,4 @@
-"""A group of sub-environments in this process, called as one in another process is."""
+"""A group of sub-environments in this process, with the interface of a worker process."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from gym_server.vector_envs.group import Group
 
 
 class LocalGroup:
-    """Has the methods of ``WorkerProcess`` by which a group is called."""
+    """Has those methods of ``WorkerProcess`` that are used to call a group."""
 
     def __init__(self, group: Group, drawing: Drawing) -> None:
-        """Take over a group, and how it is drawn."""
+        """Take over a group, and the object that draws it."""
         self._group = group
         self._drawing = drawing
         self._call: Callable[[], Any] = lambda: None
 
     def begin(self, method: str, *args: object) -> None:
-        """Note a call of one of the group's methods."""
+        """Prepare a call of one of the group's methods."""
         self._call = lambda: getattr(self._group, method)(*args)
         if method == "render":
             self._call = lambda: self._drawing.draw(self._group.render, *args)

@@ -1,4 +1,4 @@
-"""Make a vector environment by the mode that was chosen, or by the fastest that fits."""
+"""Make a vector environment in the requested mode, or in the fastest mode that works."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def make_vector_env(
     """Make a vector environment.
 
     Args:
-        config: what the client chose, with a num_envs; its wrappers are allowed ones.
+        config: what the client chose, with a num_envs and allowed wrappers.
         allowed_modules: as for ``make.make_env()``.
-        max_num_envs: how many sub-environments the server allows.
+        max_num_envs: the server's limit of sub-environments.
         renderer: the process's render thread.
-        memory: what reserves its memory.
+        memory: reserves its memory.
 
     Returns:
         The vector environment, and its vectorization_mode.
@@ -77,7 +77,7 @@ def make_own_implementation(
     """Make an environment's own vector implementation; see ``make_vector_env()``.
 
     Returns:
-        None where it has none that is known to play as the single environment does.
+        The vector environment; None if there is none that is known to play like the single one.
     """
     make.check_kwargs(config.kwargs or {})
     request = _request(make.find_spec(config.env_id, allowed_modules), config, renderer, memory)
@@ -94,7 +94,7 @@ def _request(
 
 @dataclass(frozen=True)
 class _Request:
-    """What all functions below need to make a vector environment."""
+    """The arguments of the functions below."""
 
     spec: EnvSpec
     config: EnvConfig
@@ -122,7 +122,7 @@ def check_single(config: EnvConfig) -> None:
             raise GymServerError(
                 "invalid_parameter",
                 f"{what} is for vector environments, and 'num_envs' was not provided",
-                "give num_envs, the number of sub-environments, which may also be 1",
+                "send num_envs, the number of sub-environments, which may also be 1",
             )
 
 
@@ -132,7 +132,7 @@ def _check(config: EnvConfig, num_envs: int, max_num_envs: int) -> None:
     if num_envs > max_num_envs:
         raise GymServerError(
             "too_many_sub_envs",
-            f"This server takes at most {max_num_envs} sub-environments, not {num_envs}",
+            f"This server allows at most {max_num_envs} sub-environments, not {num_envs}",
             "the server's option --max-num-envs sets the limit",
         )
     if config.num_workers is not None:
@@ -161,24 +161,24 @@ def _check_num_workers(config: EnvConfig, num_workers: int, num_envs: int) -> No
 
 
 def _why_no_entry_point(request: _Request) -> str | None:
-    """Return why the environment's own implementation cannot do it, if that is known beforehand."""
+    """Return why the environment's own implementation cannot be used, if known in advance."""
     if request.spec.vector_entry_point is None:
         return f"{request.spec.id} has none"
     if request.config.num_workers is not None:
         return "it runs in the server's process, and num_workers was given"
     if request.config.wrappers or request.spec.additional_wrappers:
-        return "it takes no wrappers"
+        return "it supports no wrappers"
     if request.kwargs.get("max_episode_steps", 1) in (-1, None):
-        return "it has no value for no time limit"
+        return "it always has a time limit"
     if isinstance(request.config.seed, tuple):
-        return "it has one generator for all sub-environments, so it takes one seed"
+        return "it has one generator for all sub-environments, so it needs a single seed"
     return None
 
 
 def _is_the_same_task(request: _Request) -> bool:
-    """Tell whether an environment's own implementation is known to play as the single one does.
+    """Return whether an environment's own implementation is known to play like the single one.
 
-    Gymnasium's own do. Atari's observes other pictures.
+    Gymnasium's own do. Atari's has different observations.
     """
     return module_of(request.spec).startswith("gymnasium.") and not _why_no_entry_point(request)
 
@@ -201,18 +201,18 @@ def _require_entry_point(request: _Request) -> VectorEnv:
     raise GymServerError(
         "not_supported",
         f"vectorization_mode 'vector_entry_point' is not possible: {reason}",
-        "vectorization_mode 'sync' does it, and so does leaving vectorization_mode out",
+        "use vectorization_mode 'sync', or leave vectorization_mode out",
     )
 
 
 class _NotPossibleError(Exception):
-    """An environment's own implementation cannot do what the client chose."""
+    """An environment's own implementation does not support what the client chose."""
 
 
 def _make_entry_point(request: _Request) -> VectorEnv:
     request.memory.reserve(vector_bytes(request.spec, request.kwargs), request.spec.id)
     vector_spec = copy.copy(request.spec)
-    # The type ignored: load_creator() is to load the class of the vector environment.
+    # The type is ignored: load_creator() is to load the vector environment's class.
     vector_spec.entry_point = request.spec.vector_entry_point  # type: ignore[assignment]
     creator = make.load_creator(vector_spec)
     try:
@@ -238,7 +238,7 @@ def _make_entry_point(request: _Request) -> VectorEnv:
 
 
 def _with_time_limit(request: _Request) -> EnvSpec:
-    """Return the spec with the smallest of the time limits of a sub-environment."""
+    """Return the spec with the smallest time limit of a sub-environment."""
     spec = copy.copy(request.spec)
     chosen = request.kwargs.get("max_episode_steps")
     if chosen is not None:
@@ -289,6 +289,6 @@ def _make_with(request: _Request, sub_env: SubEnv, num_workers: int) -> SubEnvs:
         request.autoreset_mode,
         num_workers,
         request.renderer,
-        # Who knows what others leave in theirs.
+        # Environments of other packages may leave anything in their processes.
         keeps_processes=is_known(module_of(request.spec)),
     )

@@ -1,8 +1,8 @@
-"""How many processes run the sub-environments of a vector environment, where nobody said.
+"""Choose how many processes run the sub-environments of a vector environment.
 
-A message to a process and its answer cost some 0.1 ms, whatever is in them, so processes pay where
-the steps of a group take longer than that. What is chosen never decides what is drawn: any number
-of processes gives the same results.
+A message to a process and the answer take about 0.1 ms, whatever their contents. So processes pay
+off if the steps of a group take longer than that. The choice never affects the results, which are
+the same for any number of processes.
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ from gym_server.processes.cores import usable_cores
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
 
-# A process has at least so many sub-environments, and so many seconds of work in a step.
+# The fewest sub-environments per process, and the least seconds of work per step.
 _FEWEST_SUB_ENVS = 16
 _LEAST_SECONDS = 0.0005
 
-# Seconds of a step, by the beginning of the module's name, the more particular one before the more
-# general one (Gymnasium 1.4, ale_py 0.12, Python 3.11; the median of 3,000 steps with random
-# actions).
+# Seconds per step, by a prefix of the module's name, specific ones first (Gymnasium 1.4, ale_py
+# 0.12, Python 3.11; the median of 3,000 steps with random actions).
 _STEP_SECONDS = {
     "gymnasium.envs.toy_text": 5e-6,
     "gymnasium.envs.classic_control.acrobot": 27e-6,
@@ -41,12 +40,12 @@ _STEP_SECONDS = {
 }
 _MEASURED_STEPS = 20
 
-# Clients say what is measured: of so many kinds, the latest, the seconds are remembered.
+# Clients decide what is measured, so only this many results are remembered, the latest ones.
 _MOST_MEASURED = 1000
 
 
 def most_workers(config: EnvConfig) -> int:
-    """Return how many processes may be chosen at most for what a client wants."""
+    """Return the largest number of processes that may be chosen for a client's request."""
     num_envs = config.num_envs or 1
     if config.num_workers is not None:
         return config.num_workers
@@ -64,9 +63,9 @@ def choose_num_workers(
     """Return how many processes run the sub-environments.
 
     Args:
-        config: what the client wants, and the most that may be.
-        spec: the environment's.
-        sub_env: makes one, to measure a step where that is not known.
+        config: what the client chose, and the largest number allowed.
+        spec: the environment's spec.
+        sub_env: makes a sub-environment, to measure a step if its duration is unknown.
         renderer: the process's render thread.
     """
     most = min(most_workers(config), config.max_workers)
@@ -87,7 +86,7 @@ def _step_seconds(
         if module.startswith(beginning):
             return seconds
     kind = json.dumps([spec.id, config.kwargs, config.wrappers], default=str, sort_keys=True)
-    # A kind may be as long as a request.
+    # This text may be as long as a request, so store its hash.
     key = blake2b(kind.encode()).digest()
     known = _measured.get(key)
     if known is not None:
@@ -105,7 +104,7 @@ _measured: dict[bytes, float] = {}
 
 
 def _measure(env: gymnasium.Env, renderer: RenderThread) -> float:
-    """Return the seconds of a step, of an environment that is closed then."""
+    """Return the seconds per step of an environment, and close it."""
     try:
         env.reset(seed=0)
         env.action_space.seed(0)

@@ -1,4 +1,4 @@
-"""What makes sub-environments: in this process, or after a journey in another one."""
+"""Make sub-environments, in this process or after being sent to another one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gym_server.vector_envs.copies import can_copy, copy_new
 
 
 class SubEnv:
-    """Makes sub-environments, each an environment and the wrappers around it."""
+    """Makes sub-environments: environments with their wrappers."""
 
     def __init__(
         self,
@@ -28,16 +28,16 @@ class SubEnv:
         renderer: RenderThread,
         memory: MemoryReservation,
     ) -> None:
-        """Keep the arguments; each call makes one.
+        """Keep the arguments; each call makes a sub-environment.
 
         Args:
-            spec: of the environment.
-            render_mode: handed to it, or None.
-            kwargs: handed to it.
+            spec: the environment's spec.
+            render_mode: its render mode, or None.
+            kwargs: its arguments.
             wrappers: see ``wrappers.wrap()``.
-            renderer: where wrappers that draw are made.
-            memory: reserves the memory of the wrappers for all sub-environments when the first one
-                is made.
+            renderer: the render thread for making wrappers that draw.
+            memory: reserves the wrappers' memory for all sub-environments when the first one is
+                made.
         """
         self._make_args = spec, render_mode, kwargs
         self._wrappers = wrappers
@@ -49,28 +49,28 @@ class SubEnv:
         return {**self.__dict__, "_renderer": ThisThread(), "_memory": None}
 
     def prepare(self) -> None:
-        """Import what makes it; once in each process, before the first one is made."""
+        """Import the environment's class; call once per process, before making any."""
         load_creator(self._make_args[0])
 
     def __call__(self) -> gymnasium.Env:
-        """Make another one."""
+        """Make a sub-environment."""
         memory, self._memory = self._memory, None
         return wrap(make_from_spec(*self._make_args), self._wrappers, self._renderer, memory)
 
     def make_all(self, count: int) -> Iterator[gymnasium.Env]:
-        """Make some, one after the other; none may be played or drawn before the last is made."""
+        """Make several, one by one; none may be played or drawn before the last one is made."""
         first = self()
         yield first
-        # The client's wrappers may hold what they change in place, such as queues.
+        # The client's wrappers may keep objects that they change in place, such as queues.
         copies = not self._wrappers and can_copy(first)
         for _ in range(count - 1):
             yield copy_new(first) if copies else self()
 
 
 class ThisThread:
-    """Stands for the render thread in a process with a single thread.
+    """Replaces the render thread in a process with a single thread.
 
-    It has the one method that wrappers call.
+    It has the only method that wrappers call.
     """
 
     def run(self, draw: Callable, *args: object) -> Any:

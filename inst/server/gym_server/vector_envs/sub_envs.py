@@ -1,7 +1,7 @@
-"""Vector environments whose sub-environments are environments of their own.
+"""Vector environments made of separate sub-environments.
 
-They are groups, in this process or in processes of their own, and one call is sent to each group
-for a step of all. What comes of it is the same for any number of processes.
+They form groups, in this process or in worker processes. A step of all sends one call to each
+group. The results are the same for any number of processes.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from gym_server.vector_envs.infos import gather
 from gym_server.vector_envs.local_group import LocalGroup
 from gym_server.vector_envs.sub_env import SubEnv
 
-# How long closing may take in a process before that is killed.
+# How long closing may take in a process before it is killed.
 _CLOSE_SECONDS = 3.0
 
 
@@ -43,20 +43,20 @@ class SubEnvs:
     """A vector environment of sub-environments of one kind.
 
     Attributes:
-        num_envs: how many there are.
+        num_envs: the number of sub-environments.
         num_workers: how many processes run them; 0 for this process.
         autoreset_mode: when a sub-environment whose episode ended is reset.
         ended: which of them have ended and do not move until they are reset.
         moved: which rows of the last step moved; None for all.
         draws_when_stepped: whether its steps must run on the render thread.
         draws_in_process: whether sub-environments draw in this process.
-        metadata, render_mode: as Gymnasium's environments have them.
-        spec: the environment's, set by whoever makes it.
-        single_observation_space, single_action_space: of one sub-environment.
-        observation_space, action_space: of all together.
+        metadata, render_mode: as in Gymnasium.
+        spec: the environment's spec, set by the function that makes it.
+        single_observation_space, single_action_space: the spaces of one sub-environment.
+        observation_space, action_space: the batched spaces.
     """
 
-    # Each takes a seed and a reset of its own, and some can step while the others wait.
+    # Each has its own seed and resets, and some can step while the others wait.
     runs_each = True
 
     def __init__(
@@ -71,16 +71,16 @@ class SubEnvs:
         """Make all sub-environments.
 
         Args:
-            sub_env: makes one of them.
+            sub_env: makes a sub-environment.
             num_envs: how many to make.
-            autoreset_mode: as above.
+            autoreset_mode: see above.
             num_workers: how many processes run them; 0 for this process.
             renderer: the process's render thread.
             keeps_processes: whether the processes may run other environments afterwards.
 
         Raises:
             GymServerError: ``unsupported_space``, ``not_supported``, ``environment_died``; and
-                whatever an environment raises.
+                exceptions of the environment.
         """
         self.num_envs = num_envs
         self.num_workers = num_workers
@@ -93,9 +93,9 @@ class SubEnvs:
         self._keeps_processes = keeps_processes
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._is_closed = False
-        # How many episodes each begins by itself; below 0 without end.
+        # How many episodes each starts automatically; negative for no limit.
         self._to_begin = np.full(num_envs, -1)
-        # The place of each group's first sub-environment, and how many there are in all.
+        # The number of each group's first sub-environment, and at the end the number of all.
         self._bounds = _bounds(num_envs, max(1, num_workers))
         groups = [range(first, end) for first, end in pairwise(self._bounds)]
         self._groups: list[AnyGroup] = []
@@ -106,18 +106,18 @@ class SubEnvs:
             self._groups.append(LocalGroup(group, self.drawing))
         else:
             self._describe_one(sub_env)
-            # An interrupt while the thread talks to the fork server would break that, and with it
-            # the processes of all others.
+            # Interrupting this thread while it talks to the fork server would break the fork
+            # server, and with it all other processes.
             with interrupted_by(self.kill):
                 self._start(sub_env, groups)
 
     # Making ---------------------------------------------------------------------------------
 
     def _describe_one(self, sub_env: SubEnv) -> None:
-        """Learn what they are like from one in this process, which is closed again."""
+        """Make one in this process to learn its spaces, and close it."""
         one = sub_env()
         try:
-            # Refuses a space that is not supported before any process starts.
+            # Refuses unsupported spaces before any process starts.
             spaces.describe(one.observation_space)
             spaces.describe(one.action_space)
             self._describe(one, one.render_mode)
@@ -139,7 +139,7 @@ class SubEnvs:
         try:
             for _ in groups:
                 self._groups.append(pool.take(group_worker.__name__))
-                # After it is where kill() looks: one of the two finds it.
+                # It is now where kill() looks: either kill() or this check finds it.
                 if self._is_closed:
                     raise shutting_down()
             pickled = _pickled(sub_env)
@@ -151,11 +151,11 @@ class SubEnvs:
             self.kill()
             if refusal.code == "environment_died":
                 raise
-            # One was made in this process without an error.
+            # Making one in this process has succeeded.
             raise GymServerError(
                 "not_supported",
                 f"This environment cannot be made in another process: {refusal.message}",
-                "num_workers 0 runs the sub-environments in the server's process",
+                "use num_workers 0 to run the sub-environments in the server's process",
             ) from refusal
         except BaseException:
             self.kill()
@@ -171,18 +171,17 @@ class SubEnvs:
         mask: np.ndarray | None,
         with_infos: bool = True,
     ) -> tuple[Any, dict]:
-        """Begin an episode in each of them, or in those of a mask.
+        """Start an episode in every sub-environment, or in those of a mask.
 
         Args:
-            seed: one for all, each of which makes its own of it, or one for each; one for each may
-                also be several, the first for now and the others for the episodes that follow.
-            options: the environment's own.
-            mask: booleans; None for all. With a mask Gymnasium hands on ``{}`` for no options, and
-                so does this.
+            seed: one from which each derives its own, or one each. Each of these may also be
+                several: one for now, and others for the episodes that follow.
+            options: options for the environments.
+            mask: booleans; None for all. With a mask, no options become ``{}``, as in Gymnasium.
             with_infos: whether infos are wanted.
 
         Returns:
-            The observations of all of them, and an info.
+            The observations of all sub-environments, and an info.
         """
         seeds = _seeds_of(seed, self.num_envs)
         which = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
@@ -207,15 +206,15 @@ class SubEnvs:
         return observation, gather(infos, {}, self.num_envs)
 
     def step(self, which: np.ndarray | None, actions: Any, with_infos: bool = True) -> tuple:
-        """Step some of them.
+        """Step some sub-environments.
 
         Args:
             which: their numbers, in increasing order; None for all.
-            actions: a batch of one action for each of these.
+            actions: a batch with an action for each of them.
             with_infos: whether infos are wanted.
 
         Returns:
-            What Gymnasium's vector environments return, with a row for each that stepped.
+            The same as Gymnasium's vector environments, with a row for each that stepped.
         """
         if which is not None and len(which) == self.num_envs:
             which = None
@@ -246,7 +245,7 @@ class SubEnvs:
         )
 
     def _note_ends(self, which: np.ndarray | None, outcome: Outcome) -> None:
-        """Note which of them wait for a reset, and which begin an episode by themselves."""
+        """Note which sub-environments wait for a reset, and which start an episode themselves."""
         done = outcome.terminated | outcome.truncated
         if not done.any():
             return
@@ -267,13 +266,13 @@ class SubEnvs:
         arguments: Callable[[slice], tuple],
         everywhere: bool = False,
     ) -> list:
-        """Call a method of the groups that have some sub-environments, at the same time.
+        """Call a method of the groups of some sub-environments, at the same time.
 
         Args:
             method: its name.
             which: the numbers of the sub-environments; None for all.
-            arguments: returns the further arguments for the sub-environments in a range of these.
-            everywhere: whether groups that have none of them are called as well.
+            arguments: returns the other arguments for a range of these sub-environments.
+            everywhere: whether to call groups that have none of them, too.
         """
         bounds = self._bounds if which is None else np.searchsorted(which, self._bounds).tolist()
 
@@ -307,14 +306,14 @@ class SubEnvs:
     # The end --------------------------------------------------------------------------------
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """From now on report when one of its processes ends by itself, or at once if it has."""
+        """Report from now on if a process ends unexpectedly, or at once if one has."""
         self._on_end = on_end
         for group in self._groups:
             if isinstance(group, WorkerProcess):
                 group.report_end(self._end)
 
     def _end(self, why: GymServerError) -> None:
-        """Go with the process that has ended."""
+        """End when one of the processes has ended."""
         if not self._is_closed:
             self.kill(why)
             self._on_end(why)
@@ -325,7 +324,7 @@ class SubEnvs:
         return [group.pid for group in self._groups if isinstance(group, WorkerProcess)]
 
     def close(self) -> None:
-        """Close all sub-environments, and let their processes run others or end."""
+        """Close all sub-environments, and release or end their processes."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -351,7 +350,7 @@ class SubEnvs:
             self._kill_processes()
             if not is_overdue.is_set():
                 raise
-            # It was killed because it took too long, which is no error of the client's.
+            # It was killed because it took too long, which is not the client's error.
             return
         finally:
             timer.cancel()
@@ -362,7 +361,7 @@ class SubEnvs:
             self._kill_processes()
 
     def kill(self, why: GymServerError | None = None) -> None:
-        """Kill its processes, which ends what hangs in them."""
+        """Kill its processes, which ends calls that hang in them."""
         self._is_closed = True
         self._kill_processes(why)
 
@@ -380,7 +379,7 @@ def _pickled(sub_env: SubEnv) -> bytes:
 
 
 def _bounds(num_envs: int, groups: int) -> list[int]:
-    """Return where groups of nearly the same size begin, and the number of all."""
+    """Return where groups of nearly equal size start, and at the end the total."""
     return [num_envs * group // groups for group in range(groups + 1)]
 
 

@@ -1,1 +1,1 @@
-"""What people who watch an environment see of it."""
+"""What people who watch an environment see."""

@@ -1,7 +1,7 @@
-"""Capture what an environment shows between two resets or steps, without delaying it for long.
+"""Capture what an environment shows between two resets or steps, with little delay.
 
-A capture needs two things that others need, too: the environment's lock, which a step takes, and
-the render thread, where other environments are drawn, closed and, some of them, stepped.
+A capture needs two things that others need, too: the environment's lock, which a step holds, and
+the render thread, which draws, closes and sometimes steps other environments.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from gym_server.viewing.watchable import Watchable
 if TYPE_CHECKING:
     import numpy as np
 
-# How long a step may keep a watcher waiting before the watcher gets the answer "busy".
+# A watcher that waits longer than this for a step gets the answer "busy".
 _LOCK_TIMEOUT = 2.0
 
 
 class Busy(Exception):  # noqa: N818
-    """A step, or other drawing, takes so long that nothing can be captured."""
+    """A step, or other drawing, takes too long to capture anything."""
 
 
 class Capture(NamedTuple):
     """An environment at one moment.
 
     Attributes:
-        resets_and_steps: how many of it had begun.
+        resets_and_steps: how many of its resets and steps had started.
         facts: the JSON values of ``Watchable.look()``.
         frame: the picture, or None.
-        began: since when it could not be stepped, in the clock's seconds.
-        seconds: for how long it could not.
+        began: when the capture started to block steps, in the clock's seconds.
+        seconds: for how long it blocked them.
     """
 
     resets_and_steps: int
@@ -49,10 +49,10 @@ def capture(
     """Capture a sub-environment.
 
     Args:
-        watchable: what to look at.
-        sub_env: its number, from 0.
+        watchable: the environment.
+        sub_env: the sub-environment, from 0.
         deadline: until when to wait for the render thread, in the clock's seconds.
-        may_wait_until: tells, given a deadline, whether to wait on.
+        may_wait_until: returns, given a deadline, whether to keep waiting.
 
     Raises:
         Busy: the lock or the render thread did not become free in time.
@@ -62,8 +62,8 @@ def capture(
         with _locked(watchable, may_wait_until) as began:
             return _look(watchable, sub_env, began)
     while True:
-        # First the render thread, then the lock: a thread that had the lock and then waited for
-        # the render thread would keep the environment from its steps while others are drawn.
+        # Take the render thread first and then the lock. A thread that held the lock and waited for
+        # the render thread would block the environment's steps while others are drawn.
         try:
             captured = watchable.renderer.run_while(
                 lambda: may_wait_until(deadline), _look_if_free, watchable, sub_env
@@ -72,9 +72,9 @@ def capture(
             raise Busy from None
         if captured is not None:
             return captured
-        # It is being stepped, maybe all the time; then no moment is better than right after a
-        # step. Environments whose steps wait for the render thread with the lock lose nothing
-        # when a capture does so as well.
+        # A step holds the lock, and maybe steps follow without a pause. Then capture right after a
+        # step. If the environment's steps hold the lock and wait for the render thread, it costs
+        # nothing that a capture does so, too.
         may_wait: Callable[[], bool] = (
             (lambda: may_wait_until(deadline)) if watchable.draws_when_stepped else (lambda: False)
         )
@@ -83,7 +83,7 @@ def capture(
 
 
 def _look_if_free(watchable: Watchable, sub_env: int) -> Capture | None:
-    # Without waiting: the step that has the lock may itself wait for the render thread.
+    # Do not wait: the step that holds the lock may itself wait for the render thread.
     if not watchable.lock.acquire(0):
         return None
     try:
@@ -100,9 +100,9 @@ def _look(watchable: Watchable, sub_env: int, began: float) -> Capture:
 
 @contextlib.contextmanager
 def _locked(watchable: Watchable, may_wait_until: Callable[[float], bool]) -> Iterator[float]:
-    """Have the lock, unless a step has it for too long; yield the time when it was taken."""
+    """Hold the lock, unless a step holds it for too long; yield the time it was taken."""
     deadline = time.monotonic() + _LOCK_TIMEOUT
-    # In short waits: a step that hangs must not delay the end of the server.
+    # Wait briefly each time, so that a step that hangs does not delay the end of the server.
     while not watchable.lock.acquire(0.1):
         if not may_wait_until(deadline):
             raise Busy

@@ -1,4 +1,4 @@
-"""An observation as a list of numbers and texts with names, for watchers."""
+"""List the numbers and texts in an observation, with names, for watchers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-# More of them are not shown.
+# At most this many are shown.
 _MOST = 64
 _LONGEST_TEXT = 200
 
 
 def entries(observation: object) -> dict:
-    """Return the numbers and texts of an observation of any structure.
+    """Return the numbers and texts in an observation of any structure.
 
     Returns:
-        ``{"names", "values", "size"}``: at most 64 of each, and how many there are in all.  A
-        name is the place, such as ``camera[0]``, and "" for an observation of one value.
+        ``{"names", "values", "size"}``: at most 64 names and values, and how many there are. A
+        name is a path, such as ``camera[0]``, or "" if the observation is a single value.
     """
     names: list[str] = []
     values: list[float | int | str] = []
@@ -37,7 +37,7 @@ def _leaves(name: str, value: object) -> Iterator[tuple[str, object]]:
         for key, part in value.items():
             yield from _leaves(f"{name}.{key}" if name else str(key), part)
     elif isinstance(value, tuple) and hasattr(value, "_asdict"):
-        # A graph.
+        # A GraphInstance.
         yield from _leaves(name, value._asdict())
     elif isinstance(value, (tuple, list)):
         for index, part in enumerate(value):

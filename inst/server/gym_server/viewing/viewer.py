@@ -1,9 +1,9 @@
-"""Shows an environment to its watchers; it is drawn only while one of them waits for a frame.
+"""Show an environment to its watchers; it is drawn only while a watcher waits for a frame.
 
-A watcher asks for a newer frame than the one it has (a long poll), and the thread of that request
-draws the environment, for all watchers who wait. So the drawing stops when nobody asks any more,
-a watcher that reads slowly delays only itself, and the thread that steps the environment does no
-more than count its resets and steps.
+A watcher requests a newer frame than the one it has (a long poll), and the thread of that request
+draws the environment for all watchers that wait. So drawing stops when nobody asks any more, a slow
+watcher delays only itself, and the thread that steps the environment only counts its resets and
+steps.
 """
 
 from __future__ import annotations
@@ -19,43 +19,43 @@ from gym_server.rendering.png import png
 from gym_server.viewing.capture import Busy, capture
 from gym_server.viewing.watchable import Watchable
 
-# Between two frames of one environment, however many watch it.
+# The shortest time between two frames of an environment, however many watch it.
 _LEAST_SECONDS = 1 / 30
 
-# The share of the time in which drawing may keep an environment from its steps.
+# The largest share of the time in which drawing may block an environment's steps.
 _SHARE = 0.2
-# The same where the steps wait for real time anyway.
+# The same for steps that wait for real time anyway.
 _PACED_SHARE = 0.5
 
-# A watcher gets an answer after this long, also when nothing has happened; proxies wait longer.
+# A watcher gets a response after this long even if nothing has happened; proxies wait longer.
 _LONGEST_WAIT = 15.0
 
-# How long after its last request a watcher counts as still watching.
+# How long after its last request a watcher counts as watching.
 _STAYS_SECONDS = 2.0
 
-# Frames of sub-environments that nobody has asked for in this time are dropped.
+# Frames of sub-environments that nobody has requested for this long are dropped.
 _KEPT_SECONDS = 10.0
 
-# The pace of environments without a render_fps, and the longest that one step waits.
+# The pace of environments without a render_fps, and the longest wait of a step.
 _USUAL_FPS = 30.0
 _LONGEST_PACE = 1.0
 
 
 def usable_fps(fps: object) -> float:
-    """Return how many steps a second to show, given the environment's render_fps."""
+    """Return how many steps a second to show, given an environment's render_fps."""
     if isinstance(fps, (int, float)) and 1 / _LONGEST_PACE <= fps <= 10_000:
         return float(fps)
     return _USUAL_FPS
 
 
 class Frame(NamedTuple):
-    """What watchers get of a sub-environment at one moment.
+    """What watchers see of a sub-environment at one moment.
 
     Attributes:
-        number: no other frame of this environment has it.
-        resets_and_steps: how many of the environment had begun.
-        body: the answer for watchers, JSON.
-        used: when it was last asked for, in the clock's seconds.
+        number: unique among the frames of this environment.
+        resets_and_steps: how many of the environment's resets and steps had started.
+        body: the response for watchers, JSON.
+        used: when it was last requested, in the clock's seconds.
     """
 
     number: int
@@ -65,17 +65,18 @@ class Frame(NamedTuple):
 
 
 class Viewer:
-    """Shows one environment to its watchers, and keeps its pace where that is wanted.
+    """Shows one environment to its watchers, and limits its pace if that is wanted.
 
     Attributes:
         fps: how many steps a second to show; see ``usable_fps()``.
     """
 
     def __init__(self, watchable: Watchable) -> None:
-        """Show nothing yet of what is watched."""
+        """Start without frames."""
         self._watchable = watchable
         self.fps = _USUAL_FPS
-        # Guards what follows; never held while drawing, sending or waiting for the environment.
+        # Guards the attributes below; never held while drawing, sending, or waiting for the
+        # environment.
         self._changed = threading.Condition()
         self._frames: dict[int, Frame] = {}
         self._numbers = 0
@@ -93,16 +94,16 @@ class Viewer:
         """Wait for a frame that a watcher has not seen.
 
         Args:
-            sub_env: which sub-environment to look at.
-            after: the number of the frame that it saw last.
+            sub_env: the sub-environment to look at.
+            after: the number of the last frame that the watcher saw.
 
         Returns:
-            The frame as JSON: the values of ``Watchable.look()``, a "number" and a "frame", a PNG
-            in Base64. The frame that it has seen already when nothing happens for long; only the
-            "state" when the environment cannot be drawn for long.
+            The frame as JSON: the values of ``Watchable.look()``, a "number", and a "frame", a PNG
+            in Base64. If nothing happens for long, the frame that the watcher has seen. If the
+            environment cannot be drawn for long, only the "state".
 
         Raises:
-            GymServerError: ``unknown_instance`` when the environment is closed meanwhile,
+            GymServerError: ``unknown_instance`` if the environment is closed meanwhile,
                 ``shutting_down``.
         """
         deadline = time.monotonic() + _LONGEST_WAIT
@@ -130,7 +131,7 @@ class Viewer:
                 self._stay()
 
     def note_presence(self) -> None:
-        """Count a watcher as watching for a while, without a frame."""
+        """Count a watcher as watching for a while, without sending a frame."""
         with self._changed:
             if self._ended is not None:
                 raise self._ended
@@ -138,14 +139,14 @@ class Viewer:
 
     @property
     def is_watched(self) -> bool:
-        """Whether somebody watches."""
+        """Whether somebody is watching."""
         return self._waiting > 0 or time.monotonic() < self._stays_until
 
     def _stay(self) -> None:
         self._stays_until = time.monotonic() + _STAYS_SECONDS
 
     def _await(self, sub_env: int, after: int | None, deadline: float) -> Frame | None:
-        """Return the frame for a watcher, or None when the caller has to draw it."""
+        """Return the frame for a watcher, or None if the caller must draw it."""
         with self._changed:
             while True:
                 if self._ended is not None:
@@ -163,7 +164,7 @@ class Viewer:
                     self._drawing = True
                     return None
                 if now >= deadline:
-                    # No frame was ever drawn; the wait ends as it does with one that is old.
+                    # No frame was ever drawn.
                     raise Busy
                 if stale and not self._drawing:
                     self._changed.wait(min(self._due, deadline) - now)
@@ -171,19 +172,19 @@ class Viewer:
                     self._changed.wait(deadline - now)
 
     def _waits_for_step(self, frame: Frame | None) -> bool:
-        """Arrange to be called at the next reset or step; return False when it may have come.
+        """Ask to be woken at the next reset or step; return False if it may have happened.
 
         1. A watcher finds that its frame shows the last step.
-        2. The environment is stepped; nobody is to be called yet.
-        3. The watcher arranges to be called, and would wait for a step that has been taken.
+        2. The environment is stepped, which wakes nobody yet.
+        3. The watcher asks to be woken, and would miss the step of 2.
 
-        So the steps are compared once more after 3.
+        So this compares the number of steps again after 3.
         """
         self._watchable.on_next = self._on_step
         return frame is not None and frame.resets_and_steps == self._watchable.resets_and_steps
 
     def _on_step(self) -> None:
-        """Wake the threads that wait for a reset or a step."""
+        """Wake the threads that wait for a reset or step."""
         with self._changed:
             self._changed.notify_all()
 
@@ -192,12 +193,12 @@ class Viewer:
     def _draw(self, sub_env: int, deadline: float) -> None:
         captured = capture(self._watchable, sub_env, deadline, self._may_wait_until)
         facts, frame = captured.facts, captured.frame
-        # The environment goes on while this is encoded.
+        # Encode without the lock, so that the environment can continue.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
         body = dumps({"number": self._numbers + 1, **facts})
         with self._changed:
             share = _PACED_SHARE if self._next_tick > captured.began - 1 else _SHARE
-            # The first frame takes longer: the environment loads its fonts and colours.
+            # The first frame takes longer, because the environment loads fonts and colours.
             wait = captured.seconds / share if self._numbers else 0.0
             self._due = captured.began + max(_LEAST_SECONDS, wait)
             self._numbers += 1
@@ -213,7 +214,7 @@ class Viewer:
     # For the instance -----------------------------------------------------------------------
 
     def pace(self) -> None:
-        """Sleep until the environment's next step is due, when somebody watches."""
+        """Sleep until the environment's next step is due, if somebody watches."""
         if not self.is_watched:
             return
         with self._changed:

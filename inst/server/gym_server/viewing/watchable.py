@@ -16,12 +16,12 @@ class Watchable:
     """An environment that can be watched.
 
     Attributes:
-        lock: what a thread needs to play the environment, or to look at it.
+        lock: the lock for playing the environment or looking at it.
         renderer: the process's render thread.
         draws_when_stepped: whether its steps run on the render thread.
         draws_on_render_thread: whether its frames are drawn on the render thread.
-        resets_and_steps: how many resets and steps of it have begun.
-        on_next: called once when the next one begins; None for nothing.
+        resets_and_steps: how many resets and steps have started.
+        on_next: called once when the next one starts; may be None.
     """
 
     lock: InstanceLock
@@ -32,17 +32,17 @@ class Watchable:
     on_next: Callable[[], None] | None = None
 
     def begin_reset_or_step(self) -> None:
-        """Count a reset or a step that begins."""
+        """Count a reset or step that starts."""
         self.resets_and_steps += 1
         if self.on_next is not None:
             call, self.on_next = self.on_next, None
             call()
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a sub-environment; the caller has the lock.
+        """Return what a watcher sees of a sub-environment; the caller holds the lock.
 
         Returns:
-            JSON values, among them the observation where there is no frame and the reason why
-            there is none; the frame or None.
+            JSON values, and the frame or None. Without a frame the values include the observation
+            and the reason.
         """
         raise NotImplementedError

@@ -80,7 +80,7 @@ def test_before_the_first_reset_it_says_so(client, create):
     ("name", "kwargs", "why"),
     [
         ("Counting", {}, "draws no pictures"),
-        ("Drawing", {"frame": "nothing"}, "is no picture"),
+        ("Drawing", {"frame": "nothing"}, "does not return a picture"),
         ("Drawing", {"frame": "raises"}, "out of paint"),
     ],
 )
