@@ -340,7 +340,7 @@ def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
     browser.find_element(By.ID, "pause").click()
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
-    for query, words in (("?key=dead", "no longer good"), ("", "opens with a link")):
+    for query, words in (("?key=dead", "has expired"), ("", "needs a link")):
         browser.get(page + query)
         eventually(lambda words=words: words in text(browser, "words"))
         assert "env_watch()" in text(browser, "advice")

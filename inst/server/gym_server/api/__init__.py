@@ -1,1 +1,1 @@
-"""The protocol's routes: who may call them, what they take and answer, each call done once."""
+"""The protocol's routes: who may call them, their fields and responses, idempotency keys."""

@@ -1,4 +1,4 @@
-"""Who may use this server: every request is checked before anything else is done with it."""
+"""Who may use this server; every request is checked before anything else."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from gym_server.json_values import brief
 
 log = logging.getLogger(__name__)
 
-# A name or an address, and perhaps a port.
+# A name or an address, optionally with a port.
 _AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+?)\.?(?::([0-9]*))?")
 _ORIGIN = re.compile("(https?)://(.*)")
 _DEFAULT_PORTS = {"http": "80", "https": "443"}
 
-# How many values of Host are remembered as allowed, so that clients that send ever new ones take no
-# memory; others are checked each time.
+# How many allowed values of Host are remembered, so that a client that sends many different ones
+# takes no memory. Others are checked each time.
 _MOST_KNOWN = 100
 
 
 @dataclass(frozen=True)
 class Access:
-    """The requests that a server lets pass.
+    """Which requests a server accepts.
 
     Attributes:
-        token: what every request must carry; None if none is asked for.
+        token: the token that every request must have; None for none.
         host: the address or name that the server listens on.
-        allowed_hosts: further names that clients may know it by, NAME or NAME:PORT.
+        allowed_hosts: other names of the server, NAME or NAME:PORT.
     """
 
     token: str | None = None
@@ -45,14 +45,14 @@ class Access:
 
 
 class Guard:
-    """Lets requests pass, or refuses them."""
+    """Accepts or refuses requests."""
 
     def __init__(self, access: Access, watch_keys: WatchKeys) -> None:
-        """Take the rules.
+        """Set the rules.
 
         Args:
-            access: which requests to let pass.
-            watch_keys: the keys that open a watch page without a token.
+            access: which requests to accept.
+            watch_keys: the keys that open a watch page without the token.
         """
         self._expected = None if access.token is None else _header(access.token)
         self._watch_keys = watch_keys
@@ -64,14 +64,13 @@ class Guard:
         self._machine_names: set[str] | None = None
 
     def check(self, environ: dict, match: Match | None) -> None:
-        """Let a request pass.
+        """Check whether a request is allowed.
 
-        Most pass by one look into a set, and with a token one comparison: 0.4 us.
+        Most requests need one set lookup, and with a token one comparison: 0.4 us.
 
         Args:
-            environ: the request, in WSGI's words.
-            match: the route that it asks for, which says who may call it; None where there is
-                none.
+            environ: the request, as a WSGI environ.
+            match: its route, which says who may call it; None if it has none.
 
         Raises:
             GymServerError: ``malformed_json`` (no Host, or several), ``foreign_host``,
@@ -84,24 +83,24 @@ class Guard:
         if self._expected is not None and not self._has_token(environ):
             self._check_callers(environ, match)
 
-    # The owner of a page from elsewhere can make the page's name resolve to this machine (DNS
-    # rebinding). The browser then sends that name as the host. An address cannot be made to mean
-    # another machine, so addresses pass.
+    # The owner of a foreign page can make its name resolve to this machine (DNS rebinding). The
+    # browser then sends that name as the host. An address cannot be redirected, so addresses are
+    # accepted.
     def _check_host(self, environ: dict) -> None:
         host = environ.get("HTTP_HOST")
         if host is None:
             if environ.get("SERVER_PROTOCOL") == "HTTP/1.1":
-                raise malformed_request("it has no Host")
+                raise malformed_request("it has no Host header")
             return
         if "," in host:
-            raise malformed_request("it has two Hosts")
+            raise malformed_request("it has two Host headers")
         match = _AUTHORITY.fullmatch(host)
         name = match[1].lower() if match else None
         if name is None or not (_is_address(name) or self._is_ours(name)):
             raise GymServerError(
                 "foreign_host",
                 f"This server does not answer to the name {brief(host)}",
-                "ask it by its address, or start it with --allow-host NAME",
+                "use its address, or start it with --allow-host NAME",
             )
         if len(self._known_hosts) < _MOST_KNOWN:
             self._known_hosts.add(host)
@@ -110,21 +109,21 @@ class Guard:
         if name in self._names:
             return True
         if self._machine_names is None:
-            # Only here, because it may have to ask the network.
+            # Only now, because it may have to ask the network.
             self._machine_names = _machine_names(self._listens_on_loopback)
         return name in self._machine_names
 
     def _check_page(self, environ: dict) -> None:
         origin = environ.get("HTTP_ORIGIN")
         if origin is not None and not self._is_own_origin(origin, environ.get("HTTP_HOST", "")):
-            raise _foreign_origin(f"A page of {brief(origin)} may not ask this server")
-        # Browsers send this also where they send no Origin. A link may be followed from anywhere.
+            raise _foreign_origin(f"Pages of {brief(origin)} may not use this server")
+        # Browsers send this even without an Origin. A link may be followed from anywhere.
         site = environ.get("HTTP_SEC_FETCH_SITE", "none")
         navigates = (
             environ.get("HTTP_SEC_FETCH_MODE") == "navigate" and environ["REQUEST_METHOD"] == "GET"
         )
         if site not in ("same-origin", "none") and not navigates:
-            raise _foreign_origin("A page from elsewhere may not ask this server")
+            raise _foreign_origin("Pages of other sites may not use this server")
 
     def _is_own_origin(self, origin: str, host: str) -> bool:
         parts = _ORIGIN.fullmatch(origin)
@@ -133,7 +132,7 @@ class Guard:
         default = _DEFAULT_PORTS[parts[1]]
         try:
             name, port = split_host(parts[2], default)
-            # A page of another port of the same machine is foreign.
+            # A page on another port of the same machine is foreign.
             if (name, port) == split_host(host, default):
                 return True
         except ValueError:
@@ -144,14 +143,14 @@ class Guard:
         given = environ.get("HTTP_AUTHORIZATION", "").encode("latin-1", "replace")
         if hmac.compare_digest(given, self._expected):
             return True
-        # The scheme's name may be in upper or lower case.
+        # The name of the scheme is not case-sensitive.
         scheme, _, token = given.partition(b" ")
         return scheme.lower() == b"bearer" and hmac.compare_digest(
             b"Bearer " + token.strip(), self._expected
         )
 
     def recognizes(self, environ: dict, match: Match | None) -> bool:
-        """Tell whether a request has the token, if there is one, or a watch key.
+        """Return whether a request has the token, if there is one, or a watch key.
 
         Args:
             environ: as for ``check()``.
@@ -163,14 +162,14 @@ class Guard:
         return opens
 
     def _watch_key(self, environ: dict, match: Match | None) -> tuple[bool, str | None]:
-        """Return whether a request shows a key that opens what it asks for, and the key."""
+        """Return whether the request's key opens what it asks for, and the key."""
         if match is None or match.callers is not Callers.WATCHERS:
             return False, None
         key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
         return self._watch_keys.opens(key, match.variables["instance_id"]), key
 
     def _check_callers(self, environ: dict, match: Match | None) -> None:
-        """Let a request without the token pass where its route takes such requests."""
+        """Accept a request without the token if its route allows that."""
         if match is not None and match.callers is Callers.EVERYONE:
             return
         opens, key = self._watch_key(environ, match)
@@ -180,7 +179,7 @@ class Guard:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether an address or a name can be reached from this machine alone."""
+    """Return whether an address or a name can be reached only from this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -192,10 +191,10 @@ def _header(token: str) -> bytes:
 
 
 def split_host(authority: str, default_port: str = "") -> tuple[str, str]:
-    """Return the name in NAME or NAME:PORT, in lower case, and the port; else raise ValueError."""
+    """Split NAME or NAME:PORT into the name, in lower case, and the port; else raise ValueError."""
     match = _AUTHORITY.fullmatch(authority)
     if match is None:
-        raise ValueError(f"{authority!r} is no name of a host")
+        raise ValueError(f"{authority!r} is not a host name")
     return match[1].lower(), match[2] or default_port
 
 
@@ -219,7 +218,7 @@ def _foreign_origin(message: str) -> GymServerError:
     return GymServerError(
         "foreign_origin",
         message,
-        "web pages cannot drive it; behind a proxy, start it with --allow-host NAME",
+        "web pages cannot use it; behind a proxy, start it with --allow-host NAME",
     )
 
 
@@ -227,13 +226,13 @@ def _unauthorized(key: str | None, has_header: bool) -> GymServerError:
     if key:
         return GymServerError(
             "unauthorized",
-            "The key in this link is no longer good, or is that of another environment",
+            "The key in this link has expired, or belongs to another environment",
             "R's env_watch() makes a new link",
         )
     if key is not None and not has_header:
         return GymServerError(
             "unauthorized",
-            "This page opens with a link that holds a key",
+            "This page needs a link with a key",
             "R's env_watch() makes one",
         )
     message = (

@@ -1,7 +1,7 @@
-"""The Flask application: it has the services, checks requests, and hands them to their routes.
+"""The Flask application: creates the services, checks requests, and passes them to their routes.
 
-Flask has the map of the routes, answers requests that have none, and gives tests its client. Its
-own dispatch takes longer than many a step, so a request that has a route goes there directly.
+Flask maps URLs to routes, answers requests without a route, and provides the test client. Its own
+dispatch takes longer than many steps, so requests with a route bypass it.
 """
 
 from __future__ import annotations
@@ -42,22 +42,21 @@ from gym_server.response import Response
 
 @dataclass(frozen=True)
 class Config:
-    """How a server is set up.
+    """The configuration of a server.
 
     Attributes:
-        monitor_dir: monitors write below it; None for a fresh temporary directory.
+        monitor_dir: where monitors write; None for a new temporary directory.
         temporary_monitors: whether they may also write below the system's temporary directory.
-        allowed_modules: names of the modules that an env_id may import.
+        allowed_modules: the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
-        limits: of all clients together.
-        isolate: which environments get a process of their own: "none", "foreign" (those of
-            other modules than Gymnasium's and ale_py's, and those that may take much memory) or
-            "all".
-        max_worker_mb: how much memory such a process may have, in MiB; 0 for no limit.
-        stop: asks the server to stop once the requests under way are answered.
-        access: which requests the server lets pass.
+        limits: the limits for all clients together.
+        isolate: which environments get their own process: "none", "foreign" (those of modules other
+            than Gymnasium's and ale_py's, and those that may take much memory) or "all".
+        max_worker_mb: the memory limit of such a process in MiB; 0 for no limit.
+        stop: asks the server to stop after answering the requests in progress.
+        access: which requests the server accepts.
         client_stop: whether clients may stop it.
-        allowed_paths: directories that kwargs may name paths in; None for any path.
+        allowed_paths: directories with files that kwargs may name; None for any path.
     """
 
     monitor_dir: Path | None = None
@@ -84,7 +83,7 @@ class GymApp(Flask):
     answer_for: Callable[[int, Response], None]
 
     def __init__(self, config: Config) -> None:
-        """Set up the services and the routes."""
+        """Create the services and the routes."""
         super().__init__("gym_server", static_folder=None)
         self._renderer = RenderThread()
         self._monitor_root = MonitorRoot(
@@ -121,7 +120,7 @@ class GymApp(Flask):
         self._watchdog = Watchdog(self._instances, self._rollouts, config.limits, self._abandon)
 
     def respond(self, environ: dict) -> Response:
-        """Answer a request, which is given in WSGI's words."""
+        """Answer a request, given as a WSGI environ."""
         match = self._router.match(environ)
         try:
             self._guard.check(environ, match)
@@ -129,19 +128,19 @@ class GymApp(Flask):
             return _refused(refusal, environ, match)
         if match is not None:
             return self._endpoints[match.route].respond(environ, match)
-        # 404, 405, or a redirection where there are slashes too many.
+        # 404, 405, or a redirect if the path has too many slashes.
         with self.request_context(environ):
             found = self.full_dispatch_request()
         others = [(name, value) for name, value in found.headers if not name.startswith("Content-")]
         return Response(found.status_code, found.data, found.content_type or "", tuple(others))
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
-        """Answer a request by WSGI, as Flask's test client asks."""
+        """Answer a request by WSGI, for Flask's test client."""
         response = _for_flask(self.respond(environ))
         return response(environ, start_response)
 
     def admit(self, environ: dict) -> Response | None:
-        """Return the response that refuses a request before its body has come; None to admit it."""
+        """Return a response that refuses a request before its body is read; None to read it."""
         try:
             self._guard.check(environ, self._router.match(environ))
         except GymServerError as refusal:
@@ -149,11 +148,11 @@ class GymApp(Flask):
         return None
 
     def recognizes(self, environ: dict) -> bool:
-        """Tell whether a request comes from a client that may use this server at all."""
+        """Return whether a request comes from a client that may use this server."""
         return self._guard.recognizes(environ, self._router.match(environ))
 
     def refuse(self, status: int, reason: str) -> Response:
-        """Return the response to a request that does not get as far as the application.
+        """Return the response to a request that does not reach the application.
 
         Args:
             status: 400, 413 or 503.
@@ -163,12 +162,12 @@ class GymApp(Flask):
         return failure(refusals[status]() if status in refusals else malformed_request(reason))
 
     def _abandon(self, thread: int, why: GymServerError) -> None:
-        """Abandon the call of a thread that is stuck in an environment, and answer it."""
+        """Abandon and answer the call of a thread that is stuck in an environment."""
         response = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
         self.answer_for(thread, response or failure(why))
 
     def begin_stop(self) -> None:
-        """Answer those who would otherwise wait for longer than the stop may take."""
+        """Answer clients that would otherwise wait for longer than the stop may take."""
         self._instances.end_watching()
         self._rollouts.end()
 
@@ -182,12 +181,12 @@ class GymApp(Flask):
 
 
 def create_app(config: Config | None = None) -> GymApp:
-    """Return the application; call its ``close()`` at the end."""
+    """Create the application; call its ``close()`` at the end."""
     return GymApp(config or Config())
 
 
 def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Response:
-    """Answer a request that may not pass; people get the reason on the page that they asked for."""
+    """Refuse a request; people get a page with the reason, if they asked for a page."""
     if (
         match is not None
         and match.route.refusal_page is not None

@@ -1,4 +1,4 @@
-"""What a route's handler is given: the parsed request, and what the routes work on."""
+"""What a route's handler gets: the parsed request, and the services."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from gym_server.manager.rollouts import Rollouts
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
 
-# Where the server puts a function in WSGI's environment that tells whether a client still waits.
+# The key in the WSGI environ for a function that returns whether the client still waits.
 IS_CONNECTED = "gym_server.is_connected"
 
 
 @dataclass(frozen=True)
 class Services:
-    """What the routes work on.
+    """The services that the routes use.
 
     Attributes:
         instances: the environments.
         rollouts: plays whole episodes.
         monitor_root: where monitors may write.
-        stop: asks the server to stop once the requests under way are answered.
-        watchers: counts those who wait for a frame.
-        routes: all routes, which one of them describes.
-        watch_keys: the keys that open watch pages; None where no page asks for one.
+        stop: asks the server to stop after answering the requests in progress.
+        watchers: counts the watchers that wait for a frame.
+        routes: all routes, for the OpenAPI document.
+        watch_keys: the keys that open watch pages; None if pages need no key.
     """
 
     instances: InstanceManager
@@ -43,17 +43,17 @@ class Services:
 
 
 class Call(NamedTuple):
-    """A request, parsed.
+    """A parsed request.
 
     Attributes:
-        services: what to work on.
+        services: the services.
         path: the variable parts of the URL.
-        body: the request's JSON object, or the query of a GET.
-        fields: the values of the fields that the route declares; None for absent ones.
-        form: how the client wants tensors, where the route has them.
-        url: the path as it was asked for.
-        accept: what the client says it takes.
-        is_connected: whether the client still waits for its answer.
+        body: the JSON object of the request, or the query of a GET.
+        fields: the values of the route's fields; None for missing ones.
+        form: the format of tensors that the client wants, if the route supports them.
+        url: the requested path.
+        accept: the Accept header.
+        is_connected: returns whether the client still waits for a response.
     """
 
     services: Services
@@ -72,7 +72,7 @@ class Call(NamedTuple):
 
     @property
     def wanted_form(self) -> AnswerForm:
-        """What the client wants of the answer, on a route that has the field ``info``."""
+        """The response that the client wants, on a route with the field ``info``."""
         form = self.form
         infos = self.fields["info"] is not False
         finals = self.fields.get("final_obs") is not False

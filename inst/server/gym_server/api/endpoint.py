@@ -1,4 +1,4 @@
-"""From a request to a response: each route has an endpoint, which reads, calls and writes."""
+"""From request to response: each route has an endpoint that reads, calls and writes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _always() -> bool:
     return True
 
 
-# A longer body is kept as a digest, which takes 40 us for one of this size.
+# Longer bodies are stored as a digest, which takes 40 us for one of this size.
 _KEPT_BYTES = 2**16
 
 
@@ -39,7 +39,7 @@ class Endpoint:
 
         Args:
             route: the route.
-            services: what its handler works on.
+            services: the services for its handler.
             exactly_once: the responses to requests with an idempotency key.
             max_body_bytes: the size of the largest body.
         """
@@ -47,15 +47,15 @@ class Endpoint:
         self._services = services
         self._exactly_once = exactly_once
         self._max_body_bytes = max_body_bytes
-        # The idempotency key is read first, because errors of the others echo it.
+        # Read the idempotency key first, because errors in other fields echo it.
         self._fields = (REQUEST, *route.fields) if route.once else route.fields
 
     def respond(self, environ: dict, match: Match) -> Response:
-        """Answer a request, which is given in WSGI's words; so is whatever goes wrong.
+        """Answer a request; never raise.
 
         Args:
-            environ: the request.
-            match: what its path says.
+            environ: the request, as a WSGI environ.
+            match: its route and path.
         """
         route = self._route
         fields: dict = {}
@@ -80,8 +80,8 @@ class Endpoint:
         )
         if request_id is None:
             return self._perform(call, None).response
-        # A request that ends an instance is kept with those that create one, so that it is never
-        # refused because the instance has seen too many keys.
+        # Requests that end an instance are stored with those that create one, so that they are
+        # never refused because the instance has too many keys.
         used_id = None if route.ends_instance else match.variables.get("instance_id")
         asked = raw if len(raw) <= _KEPT_BYTES else blake2b(raw).digest()
         content = (match.path, asked, tensors is not None, call.form)
@@ -101,8 +101,8 @@ class Endpoint:
                 instance_id = result.get("instance_id")
             return Outcome(response_to(result, request_id), True, instance_id)
         except BaseException as error:
-            # Also SystemExit and the like, which environments may raise, become the response that
-            # is stored.
+            # Even SystemExit and the like, which environments may raise, become a response to
+            # store.
             did_nothing = isinstance(error, GymServerError) and error.did_nothing
             return Outcome(failure(error, request_id), not did_nothing, instance_id)
 
@@ -115,7 +115,7 @@ class Endpoint:
 
 
 def failure(error: BaseException, request_id: RequestId | None = None) -> Response:
-    """Return the response that tells of an error."""
+    """Return the response for an error."""
     status, body = answer_to(error)
     response = response_to(body, request_id, status)
     if isinstance(error, GymServerError):
@@ -127,7 +127,7 @@ def failure(error: BaseException, request_id: RequestId | None = None) -> Respon
 
 
 def _query(environ: dict) -> dict[str, str | list[str]]:
-    """Return a query's fields; one that was given several times is a list, which no field takes."""
+    """Return a query's fields; a repeated one becomes a list, which no field accepts."""
     lists = Request(environ).args.lists()
     return {name: values[0] if len(values) == 1 else values for name, values in lists}
 
@@ -135,8 +135,8 @@ def _query(environ: dict) -> dict[str, str | list[str]]:
 _ROWS = AnswerForm(tensors=True)
 _COLUMNS = AnswerForm(tensors=True, by_column=True)
 
-# Most clients send one of these, the R client the last one. To parse the header takes as long as
-# many a step.
+# Most clients send one of these; the R client sends the last one. Parsing the header takes as long
+# as many steps.
 _FORMS = {
     JSON: JSON_FORM,
     TENSORS: _ROWS,

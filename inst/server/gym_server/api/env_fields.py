@@ -1,4 +1,4 @@
-"""The kinds of fields that describe an environment, its sub-environments, or what to see of it."""
+"""Fields that describe an environment, its sub-environments, or what to show of it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from gym_server.protocol.fields import (
     text,
 )
 
-# Whatever can be seen on a line of its own, and does not turn the direction of the others.
+# Text that is visible on one line, and does not change the text direction of other lines.
 _NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
 _LONGEST_NAME = 100
 
 
 def _name(value: object) -> str:
     value = text(value)
-    # One half of a surrogate pair is no character, and many readers of patterns cannot exclude it.
+    # Refuse half a surrogate pair, which many regular expression engines cannot exclude.
     value.encode()
     if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
         raise ValueError
@@ -48,7 +48,7 @@ def _wrapper(item: dict) -> Wrapper:
 
 
 def _video_callable(value: object) -> int:
-    """Return 0 for no videos, n for every n-th episode."""
+    """Return 0 for no videos, or n for every n-th episode."""
     if isinstance(value, (bool, str)):
         return int(boolean(value))
     return integer(value)
@@ -100,7 +100,7 @@ def _later_seeds(values: list) -> tuple[int, ...]:
 
 
 def _one_seed(value: object) -> int:
-    # A classic client may count with what it calls true and false.
+    # A classic client may count with true and false.
     return int(value) if isinstance(value, bool) else integer(value)
 
 
@@ -112,7 +112,7 @@ def _mask(value: object) -> np.ndarray:
 
 
 def _query_integer(value: object) -> int:
-    """Return an integer out of a query, where everything is text."""
+    """Read an integer from a query, where everything is text."""
     if not (isinstance(value, str) and value.isascii() and value.isdecimal()):
         raise ValueError
     return int(value)
@@ -135,7 +135,7 @@ def _letters(name: str) -> str:
 
 
 def _named(names: Mapping[str, Any]) -> Kind:
-    """Declare a field that holds one of some names, whatever their case and underscores."""
+    """Create a field that accepts some names, ignoring case and underscores."""
     written = [f'"{name}"' for name in names]
     wanted = f"{', '.join(written[:-1])} or {written[-1]}"
     return Kind({"type": "string", "enum": list(names)}, wanted, _one_of(names))
@@ -196,9 +196,9 @@ AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
 FINAL_OBS = Field(
     "final_obs",
     BOOLEAN,
-    "Whether the last observations of episodes after which another one began are sent (the "
-    "default).",
+    "Whether to send the last observations of episodes that were followed by a reset in the same "
+    "step (default true).",
 )
 INFO = Field(
-    "info", BOOLEAN, "Whether infos are made and sent (the default); with false they are empty."
+    "info", BOOLEAN, "Whether to make and send infos (default true); with false they are empty."
 )

@@ -1,4 +1,4 @@
-"""The routes of environments: creating, resetting, stepping, drawing and closing them."""
+"""The routes of environments: create, reset, step, draw and close them."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ ROOM = Room("envs")
 @ROOM.declare(
     "POST",
     "/v1/envs/",
-    Field("env_id", env_fields.ANY_ID, "What to create, such as CartPole-v1.", required=True),
+    Field("env_id", env_fields.ANY_ID, "The id, such as CartPole-v1.", required=True),
     Field(
         "seed",
         env_fields.SEED,
         "Seeds the action space, and the first reset unless that has a seed; with num_envs also a "
-        "list of one for each sub-environment.",
+        "list with one for each sub-environment.",
     ),
     Field(
         "render_mode",
         TEXT,
-        "rgb_array (the default where it is supported), or human: the same, but while somebody "
-        "watches it moves in real time.",
+        "rgb_array (the default if supported), or human: the same, but slowed down to real time "
+        "while somebody watches.",
     ),
-    Field("kwargs", OBJECT, "Handed to the environment."),
-    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("kwargs", OBJECT, "Arguments of the environment."),
+    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's wrappers; the first one is innermost."),
     Field(
         "num_envs",
         env_fields.POSITIVE,
-        "How many sub-environments; absent for a single environment.",
+        "The number of sub-environments; absent for a single environment.",
     ),
     Field(
         "vectorization_mode",
         env_fields.VECTORIZATION_MODE,
-        "What runs the sub-environments; absent for the fastest that can do what is asked.",
+        "What runs the sub-environments; absent for the fastest that supports the request.",
     ),
     Field(
         "num_workers",
@@ -52,11 +52,11 @@ ROOM = Room("envs")
     Field(
         "autoreset_mode",
         env_fields.AUTORESET_MODE,
-        "What becomes of a sub-environment whose episode ended, in Gymnasium's words; absent for "
+        "When a sub-environment whose episode ended is reset, in Gymnasium's terms; absent for "
         "NextStep.",
     ),
-    Field("name", env_fields.NAME, "What its owner calls it; shown wherever it is listed."),
-    answer="instance_id, and all about the environment",
+    Field("name", env_fields.NAME, "Its owner's name for it; shown in lists."),
+    answer="instance_id, and everything about the environment",
     once=True,
     grows=True,
     schema=schemas.json_object(
@@ -86,24 +86,24 @@ def env_list_all(call: Call) -> dict:
     "GET",
     "/v1/instances/",
     answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
-    "watched of each, the oldest first",
+    "watched of each, oldest first",
     schema=schemas.json_object(
         {"instances": {"type": "array", "items": schemas.json_object(schemas.LISTED_INSTANCE)}}
     ),
 )
 def instance_list(call: Call) -> dict:
-    """List the environments, with who uses them how much."""
+    """List the environments, with how much they are used."""
     return {"instances": call.services.instances.list()}
 
 
 @ROOM.declare(
     "GET",
     INSTANCE,
-    answer="all about the environment; needs_reset also after done",
+    answer="everything about the environment; needs_reset is true after done, too",
     schema=schemas.json_object(schemas.ABOUT_INSTANCE),
 )
 def env_about(call: Call) -> dict:
-    """Tell all about an environment."""
+    """Describe an environment."""
     return call.instance.about()
 
 
@@ -113,14 +113,14 @@ def env_about(call: Call) -> dict:
     Field(
         "seed",
         env_fields.RESET_SEED,
-        "Seeds the environment and its action space; with sub-environments also a list of one for "
-        "each. One of these may be a list: the first for now, the others for the episodes that the "
-        "sub-environment begins by itself. After the last one it rests: in a step it returns its "
-        "last observation and the reward 0.",
+        "Seeds the environment and its action space; with sub-environments also a list with one "
+        "for each. One of these may be a list: the first for now, the others for the episodes that "
+        "the sub-environment starts automatically. After the last one it rests: a step returns its "
+        "last observation and a reward of 0.",
     ),
-    Field("options", OBJECT, "The environment's own."),
+    Field("options", OBJECT, "Options for the environment."),
     Field(
-        "reset_mask", env_fields.MASK, "Which sub-environments are reset; absent for all of them."
+        "reset_mask", env_fields.MASK, "Which sub-environments to reset; absent for all of them."
     ),
     env_fields.INFO,
     answer="observation, info; with sub-environments one row for each",
@@ -146,22 +146,21 @@ def env_reset(call: Call) -> dict | Ready:
     Field(
         "action",
         ANYTHING,
-        "A member of the action space, a Box's bounds aside; with sub-environments one for each "
-        "that steps.",
+        "A member of the action space, except that the bounds of a Box are not checked; with "
+        "sub-environments one for each that steps.",
         required=True,
     ),
     Field(
         "render",
         BOOLEAN,
-        "Whether people want to see it: while somebody watches, the step waits until real time "
-        "has come so far.",
+        "Whether to slow the step down to real time while somebody watches.",
     ),
     Field("step_mask", env_fields.MASK, "Which sub-environments step; absent for all of them."),
     env_fields.INFO,
     env_fields.FINAL_OBS,
     answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
-    "for each that stepped, and final_obs and final_sub_envs where sub-environments ended and were "
-    "reset at once",
+    "for each that stepped, and final_obs and final_sub_envs if sub-environments ended and were "
+    "reset in the same step",
     once=True,
     tensors=True,
     tensor_body=loads_tensors,
@@ -207,15 +206,15 @@ def env_render(call: Call) -> Response:
 @ROOM.declare(
     "GET",
     INSTANCE + "model/",
-    answer="model: num_states and num_actions, both numbered from 0; start, the probability of "
-    "each state to be the first of an episode; state, action, next_state, probability, reward and "
-    "terminated, each with one element for each transition of a probability above 0, by state and "
-    "action. A limit of time is no part of it",
+    answer="model: num_states and num_actions, both numbered from 0; start, the probability that "
+    "an episode starts in each state; state, action, next_state, probability, reward and "
+    "terminated, each with one element per transition with a probability above 0, sorted by state "
+    "and action. Time limits are not included",
     grows=True,
     schema=schemas.json_object({"model": schemas.TRANSITION_MODEL}),
 )
 def env_model(call: Call) -> dict | Ready:
-    """Tell the transition model of an environment that has a table of it."""
+    """Return the transition model of an environment that has one."""
     return call.instance.transition_model()
 
 
@@ -227,5 +226,5 @@ def env_close(call: Call) -> None:
 
 @ROOM.declare("DELETE", INSTANCE, once=True, ends_instance=True)
 def env_delete(call: Call) -> None:
-    """Close an environment, as its route close/ does."""
+    """Close an environment, like the route close/."""
     env_close(call)

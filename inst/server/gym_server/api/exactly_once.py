@@ -1,19 +1,20 @@
 """Requests with an idempotency key are done once, however often they arrive.
 
-libcurl silently sends a POST again when a kept-alive connection broke before an answer came.
-A step must not be taken twice for that, so a client may put an idempotency key into its requests:
-a key of its own, and a number that grows. A repetition gets the stored response.
+libcurl silently repeats a POST when a kept-alive connection breaks before a response arrives. That
+must not take a step twice, so a client may put an idempotency key into its requests: its own key,
+and a growing number. A repeated request gets the stored response.
 
-What is known is a table with a row for the last request of each key to each instance. A key belongs
-to the instance that it is used on, and numbers grow for each instance by itself: nobody uses up
-somebody else's key. Creations have no order at all: each key with its number has a row.
+A table has a row for the last request of each key to each instance. Each instance has its own keys
+and numbers, so nobody uses up somebody else's. Creations have no order: each key with its number
+has a row.
 
 - A call that was refused before anything was done leaves no row.
-- All stored responses have a limit in bytes. Beyond it the largest ones are dropped, but not their
-  rows: the repetition of such a request is refused, and does nothing.
-- Rows of an instance that is gone are dropped at some time: a repetition could do nothing any more.
-- An instance has a limit of rows. Those that are older than a quarter of an hour make room for new
-  ones, that of the last call never does.
+- All stored responses together have a limit in bytes. Beyond it the largest are dropped, but not
+  their rows: repeating such a request does nothing and is an error.
+- The rows of a closed instance are dropped eventually, because repeating a request to it does
+  nothing.
+- An instance has a limit of rows. Rows older than a quarter of an hour make room for new ones; the
+  row of the last call never does.
 """
 
 from __future__ import annotations
@@ -28,24 +29,24 @@ from gym_server.protocol.fields import RequestId
 from gym_server.response import Response
 from gym_server.threads.in_progress import InProgress
 
-# When there are too many bytes, so much is dropped that there is room for a while.
+# Above the limit of bytes, responses are dropped down to this share of it.
 _SHARE_LEFT = 7 / 8
 
 
 class _Doing(NamedTuple):
-    """A request that a thread is doing."""
+    """A request in progress."""
 
     thread: int
     request_id: RequestId
 
 
 class Outcome(NamedTuple):
-    """What came of a request.
+    """The outcome of a request.
 
     Attributes:
-        response: what the client gets.
-        did_something: whether to do it again could make a difference.
-        instance_id: the instance that it used or created; None where there is none.
+        response: the client's response.
+        did_something: whether doing it again could make a difference.
+        instance_id: the instance that it used or created; None if none.
     """
 
     response: Response
@@ -57,14 +58,14 @@ class _Row:
     """The last request of one key to one instance, or a creation.
 
     Attributes:
-        lock: held while the request is done: a repetition that arrives meanwhile waits for it.
-        place: where it stands in the table.
-        is_dropped: whether it stands there no more.
+        lock: held while the request is in progress; a repetition waits for it.
+        place: its place in the table.
+        is_dropped: whether it was removed from the table.
         instance_id: the instance that it used or created.
-        number: of the request; -1 before the first.
-        kept: what was asked, and the response; None where that took too much memory.
-        size: bytes of both.
-        stored: when that was, in the clock's seconds.
+        number: the request's number; -1 before the first.
+        kept: the request and the response; None if that took too much memory.
+        size: the bytes of both.
+        stored: when it was stored, in the clock's seconds.
     """
 
     __slots__ = (
@@ -100,28 +101,28 @@ class ExactlyOnce:
         kept_seconds: float = 15 * 60,
         most_gone: int = 10_000,
     ) -> None:
-        """Start with no keys.
+        """Start without keys.
 
         Args:
-            lives: tells whether there is an instance of this id.
-            most_bytes: of all stored responses.
-            most_keys: how many keys an instance takes.
-            kept_seconds: after how many seconds one of them makes room for another.
-            most_gone: how many rows come before those of instances that are gone are dropped.
+            lives: returns whether an instance exists.
+            most_bytes: the limit of all stored responses.
+            most_keys: the limit of keys per instance.
+            kept_seconds: the age at which a key may make room for another.
+            most_gone: after how many new rows those of closed instances are dropped.
         """
         self._lives = lives
         self._most_bytes = most_bytes
         self._most_keys = most_keys
         self._kept_seconds = kept_seconds
         self._most_gone = most_gone
-        # Guards the table; never held while a row's lock is waited for.
+        # Guards the table; never held while waiting for a row's lock.
         self._lock = threading.Lock()
-        # By the instance that is used, and there by the key. Requests that create or end an
-        # instance stand under None, by key and number.
+        # By instance, and there by key. Requests that create or end an instance are under None, by
+        # key and number.
         self._table: dict[str | None, dict[Hashable, _Row]] = {}
         self._bytes = 0
         self._rows_since_sweep = 0
-        # The requests that are being done, each with its row and what it asks.
+        # The requests in progress, each with its row and contents.
         self._doing: InProgress[_Doing, tuple[_Row, Hashable, int]] = InProgress()
 
     def respond(
@@ -132,19 +133,19 @@ class ExactlyOnce:
         size: int,
         act: Callable[[], Outcome],
     ) -> Response:
-        """Do what a request asks, or return the response that it got before.
+        """Do a request, or return the stored response.
 
         Args:
             request_id: its idempotency key.
-            instance_id: the instance that it uses; None for what creates or ends one.
-            content: what the request asks; a repetition has the same.
-            size: bytes of that.
-            act: does it, and must not raise; called at most once per number, unless it did
+            instance_id: the instance that it uses; None if it creates or ends one.
+            content: its contents, which are the same in a repetition.
+            size: the bytes of the contents.
+            act: does the request, and must not raise; called at most once per number, unless it did
                 nothing.
 
         Raises:
-            GymServerError: ``request_conflict`` when the number was used for something else,
-                lies before the newest, or its response is not kept any more; ``too_many_keys``.
+            GymServerError: ``request_conflict`` if the number was used for another request, is
+                smaller than the newest, or its response was dropped; ``too_many_keys``.
         """
         row = self._acquire(request_id, instance_id)
         doing = _Doing(threading.get_ident(), request_id)
@@ -165,17 +166,17 @@ class ExactlyOnce:
                 row.lock.release()
 
     def abandon(self, thread: int, refuse: Callable[[RequestId], Response]) -> Response | None:
-        """Answer what a thread is doing that is stuck; its own response, if it comes, is dropped.
+        """Answer for a thread that is stuck; if it returns, its own response is dropped.
 
-        The thread may come back at this very moment; ``InProgress`` says who stores the response
-        and releases the lock then.
+        The thread may return at this very moment. ``InProgress`` decides which thread stores the
+        response and releases the lock.
 
         Args:
             thread: the thread.
-            refuse: makes the response, for repetitions as well.
+            refuse: makes the response, also for repetitions.
 
         Returns:
-            The response; None when the thread does nothing that has an idempotency key.
+            The response; None if the thread is not doing a request with an idempotency key.
         """
         for doing, (row, content, size) in self._doing.items():
             if doing.thread == thread and self._doing.abandon(doing):
@@ -198,7 +199,7 @@ class ExactlyOnce:
             row.lock.acquire()
             if not row.is_dropped:
                 return row
-            # Meanwhile another thread found that the request had done nothing.
+            # Another thread dropped the row, because its request did nothing.
             row.lock.release()
 
     def _store(
@@ -244,7 +245,7 @@ class ExactlyOnce:
             raise _too_many_keys(instance_id, self._most_keys, self._kept_seconds)
 
     def _drop_gone(self) -> None:
-        """Drop the rows of instances that are gone."""
+        """Drop the rows of closed instances."""
         for row in [row for rows in self._table.values() for row in rows.values()]:
             if row.stored and (row.instance_id is None or not self._lives(row.instance_id)):
                 self._drop_unless_used(row)
@@ -255,7 +256,7 @@ class ExactlyOnce:
             row.lock.release()
 
     def _drop(self, row: _Row) -> None:
-        """Drop a row whose lock the caller has."""
+        """Drop a row; the caller holds its lock."""
         row.is_dropped = True
         self._bytes -= row.size
         instance_id, name = row.place
@@ -273,8 +274,8 @@ def _repeat(row: _Row, request_id: RequestId, content: Hashable) -> Response:
         raise GymServerError(
             "request_conflict",
             f"Request number {request_id.number} of key '{request_id.key}' was done before, but "
-            "its answer was too large to be kept; nothing was done again",
-            "reset the environment, or ask for less at once",
+            "its response was too large to keep; nothing was done again",
+            "reset the environment, or request less at once",
         )
     asked, response = row.kept
     if content != asked:
@@ -293,8 +294,8 @@ def _conflict(request_id: RequestId, reason: str) -> GymServerError:
 def _too_many_keys(instance_id: str, most: int, seconds: float) -> GymServerError:
     return GymServerError(
         "too_many_keys",
-        f"{most} keys have moved instance {instance_id} in the last {seconds / 60:g} minutes, and "
-        "it takes no more; nothing was done",
+        f"Instance {instance_id} got requests with {most} keys in the last {seconds / 60:g} "
+        "minutes, the most it allows; nothing was done",
         "use one key for all requests of a process, and number them upwards; in R each session and "
         "each forked process has one",
     )

@@ -14,8 +14,8 @@ ROOM = Room("monitors")
     "POST",
     INSTANCE + "monitor/start/",
     Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", BOOLEAN, "Delete what monitors left there that are gone."),
-    Field("resume", BOOLEAN, "Go on counting where an earlier monitor ended."),
+    Field("force", BOOLEAN, "Delete the files of monitors that have ended."),
+    Field("resume", BOOLEAN, "Continue the numbering of an earlier monitor."),
     Field("video_callable", env_fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
     grows=True,
 )
@@ -33,5 +33,5 @@ def env_monitor_start(call: Call) -> None:
 
 @ROOM.declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
-    """Finish the monitor's files; without a monitor there is nothing to do."""
+    """Finish the monitor's files; without a monitor, do nothing."""
     call.instance.close_monitor()

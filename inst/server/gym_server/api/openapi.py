@@ -1,4 +1,4 @@
-"""The protocol described for machines: an OpenAPI document made of the routes' declarations."""
+"""The protocol described for machines: an OpenAPI document, made from the routes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ERROR = {
 }
 
 
-# Classic clients send one of these for a parameter that they do not set.
+# Classic clients send one of these for a parameter that is not set.
 _ABSENT: dict[str, Any] = {"enum": [None, "", []], "description": "As if it were not there."}
 _ABSENT_REFERENCE = {"$ref": "#/components/schemas/Absent"}
 
@@ -52,7 +52,7 @@ def document(routes: Iterable[Route]) -> dict:
 
 
 def _link_created(paths: dict[str, dict]) -> None:
-    """Link the instance_id in the answer of a creation to the operations that take one."""
+    """Link the instance_id in the response of a creation to the operations that use one."""
     created = paths.get("/v1/envs/", {}).get("post")
     if created is None:
         return
@@ -117,9 +117,9 @@ def _answer(route: Route) -> dict:
 
 
 _LAYOUTS = (
-    "As tensors: one safetensors file, the other values as JSON in its metadata. By column "
-    "(order=column), tensors with two or more dimensions are transposed, with their shape "
-    "reversed: the bytes are in the order of R and Fortran."
+    "As tensors: a safetensors file, with the other values as JSON in its metadata. By column "
+    "(order=column), tensors with two or more dimensions are transposed and their shape reversed: "
+    "the bytes are in the order of R and Fortran."
 )
 
 
@@ -152,11 +152,11 @@ def _request_body(route: Route, fields: Iterable[Field]) -> dict:
 
 
 _TENSOR_BODIES: dict[Callable, str] = {
-    loads_tensors: "As tensors: one safetensors file of the tensors 'action' (parts of nested ones "
-    "by JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so are "
-    "'texts', an object of those by name.",
-    loads_file: "As tensors: one safetensors file. The tensor 'seed' (integers) has the seed of "
-    "each episode, 'candidate' (integers from 0) which candidate plays it; where an environment is "
+    loads_tensors: "As tensors: a safetensors file with the tensors 'action' (parts of nested ones "
+    "by JSON pointer, 'action/camera/0'); the other fields are JSON in its metadata, and so is "
+    "'texts', an object of texts by name.",
+    loads_file: "As tensors: a safetensors file. The tensor 'seed' (integers) has the seed of each "
+    "episode, 'candidate' (integers from 0) the candidate that plays it. If an environment is "
     "played in groups, 'row' is the episode's place in its group (the description's 'group'). "
     "'policy/weights' is float64 with a row for each candidate, 'policy/mean' and 'policy/scale' "
     "normalize observations, 'policy/q' is a table of states by actions, 'policy/deviation' has "
@@ -176,7 +176,7 @@ def _body(fields: Iterable[Field]) -> dict:
 
 
 def _property(field: Field) -> dict:
-    """Return the schema of all that is taken for a field, also of what stands for an absent one."""
+    """Return the schema of everything a field accepts, including values that mean it is absent."""
     schema = field.kind.schema
     if field.required:
         if field.kind.empty_is_absent and schema.get("type") == "string":

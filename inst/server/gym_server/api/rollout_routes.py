@@ -1,4 +1,4 @@
-"""The route that plays whole episodes beside the environment."""
+"""The route that plays whole episodes in the server's processes."""
 
 from __future__ import annotations
 
@@ -44,32 +44,30 @@ _KEEP = Kind(
     "POST",
     "/v1/rollouts/",
     Field("env_id", env_fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
-    Field("kwargs", OBJECT, "Handed to the environment."),
-    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's, by name; the first one is innermost."),
+    Field("kwargs", OBJECT, "Arguments of the environment."),
+    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's wrappers; the first one is innermost."),
     Field(
         "policy",
         OBJECT,
         'What plays, such as {"kind": "random"} or {"kind": "network", "sizes": [4, 2, 1], '
-        '"activation": ["tanh", "logistic"]}; its numbers are the tensors policy/weights and so '
-        "on.",
+        '"activation": ["tanh", "logistic"]}. Its numbers are tensors, such as policy/weights.',
     ),
     Field(
         "max_steps",
         env_fields.POSITIVE,
-        "After how many steps an episode is cut short; required where the environment has no time "
-        "limit.",
+        "The number of steps after which an episode is truncated; required if the environment has "
+        "no time limit.",
     ),
-    Field("keep", _KEEP, "What is kept beside returns, lengths and flags; absent for nothing."),
+    Field("keep", _KEEP, "What to keep besides returns, lengths and flags; absent for nothing."),
     answer="without the tensor 'seed' the environment's description, else the first episodes, in "
-    "their order: return, length, terminated, truncated, moments/..., observation, action, "
-    "step/...",
+    "order: return, length, terminated, truncated, moments/..., observation, action, step/...",
     grows=True,
     tensors=True,
     tensor_body=loads_file,
     schema=schemas.json_object({"env_id": schemas.TEXT, "processes": schemas.COUNT}),
 )
 def rollouts(call: Call) -> dict | Response:
-    """Play whole episodes with a policy that is data."""
+    """Play whole episodes with a policy that is sent as data."""
     given = call.fields
     config = EnvConfig(
         env_id=given["env_id"], kwargs=given["kwargs"], wrappers=given["wrappers"] or ()
@@ -105,7 +103,7 @@ def _policy_tensors(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:
 
 
 def _units(tensors: Mapping[str, Tensor]) -> list[Unit]:
-    """Return what is played together: single episodes, or groups."""
+    """Return the units to play: single episodes, or groups."""
     seeds = _integers(tensors, "seed", 2**53)
     count = len(seeds)
     if count == 0:
@@ -127,7 +125,7 @@ def _units(tensors: Mapping[str, Tensor]) -> list[Unit]:
 def _integers(
     tensors: Mapping[str, Tensor], name: str, most: int, count: int | None = None
 ) -> list[int]:
-    """Return a tensor of one dimension; without it zeros, where it is known how many."""
+    """Return a tensor with one dimension; if it is missing and the length is known, zeros."""
     if name not in tensors and count is not None:
         return [0] * count
     array: Any = tensors[name].array()

@@ -1,4 +1,4 @@
-"""The protocol's routes, by noun: each takes a parsed request, calls one method, and answers."""
+"""The protocol's routes, by noun."""
 
 from gym_server.api import (
     env_routes,

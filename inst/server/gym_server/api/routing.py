@@ -1,4 +1,4 @@
-"""Routes as they are declared: each is a rule of Flask's, and what this server adds to it."""
+"""Routes as they are declared: a Flask rule with this server's additions."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from gym_server.response import JSON, Response
 
 INSTANCE = "/v1/envs/<instance_id>/"
 
-# What an instance_id is made of.
+# The characters of an instance_id.
 _HEX_DIGITS = frozenset("0123456789abcdef")
 
 Handler = Callable[..., dict | Response | Ready | None]
 
-# How many of the last requests' routes are remembered, and of how long paths.
+# How many routes of recent requests are remembered, and the longest path.
 _MOST_KNOWN = 4096
 _LONGEST_KNOWN = 100
 
@@ -30,10 +30,10 @@ _VARIABLE = re.compile("<([a-z_]+)>")
 
 
 class Callers(Enum):
-    """Who may call a route of a server that has a token."""
+    """Who may call a route on a server with a token."""
 
-    TOKEN = "who shows the token"
-    WATCHERS = "who shows the token, or a key to the watch page of the instance in the path"
+    TOKEN = "requests with the token"
+    WATCHERS = "requests with the token, or with a key to the instance's watch page"
     EVERYONE = "everyone"
 
 
@@ -43,23 +43,23 @@ class Route:
 
     Attributes:
         method: "GET", which also answers HEAD, "POST" or "DELETE".
-        path: also matches without its last slash; ``<name>`` stands for any text, which the handler
+        path: also matches without its last slash; ``<name>`` matches any text, which the handler
             gets under that name.
-        fields: what the body may hold, or the query of a GET.
-        handler: is given a ``Call``; returns a JSON object, a content of its own, or None for 204.
-        answer: what the answer holds, in words.
-        schema: the JSON schema of an answer in JSON; None for any object.
+        fields: the fields of the body, or of a GET's query.
+        handler: gets a ``Call``; returns a JSON object, another response, or None for 204.
+        answer: a description of the response.
+        schema: the JSON schema of a JSON response; None for any object.
         callers: who may call it.
-        once: whether the body may also hold an idempotency key, by which the request is done once
-            however often it arrives.
-        grows: whether it makes the server or its processes hold more memory.
-        ends_instance: whether the instance in the path is gone afterwards.
-        content_type: what an ordinary answer is.
-        tensors: whether the answer may also be tensors, when the client accepts them.
-        html: whether the answer may also be HTML, when the client asks for that.
-        tensor_body: reads the body where that is tensors; None where it may not be.
-        refusal_page: makes the page, of a path and a status, that people get in place of an error
-            in JSON when they may not call the route; None where there is no such page.
+        once: whether the body may have an idempotency key, with which the request is done only
+            once.
+        grows: whether it may increase the memory of the server or its processes.
+        ends_instance: whether it closes the instance in the path.
+        content_type: the content type of an ordinary response.
+        tensors: whether the response may be tensors, if the client accepts them.
+        html: whether the response may be HTML, if the client asks for it.
+        tensor_body: reads a body of tensors; None if it may not be tensors.
+        refusal_page: makes a page, from a path and a status, that people who may not call the route
+            get instead of an error in JSON; None for no page.
     """
 
     method: str
@@ -80,7 +80,7 @@ class Route:
 
     @property
     def status(self) -> int:
-        """The status of an ordinary answer."""
+        """The status of a successful response."""
         return 200 if self.answer else 204
 
     @property
@@ -93,18 +93,18 @@ class Room(Blueprint):
     """The routes of one noun.
 
     Attributes:
-        routes: in the order of their declaration, by the name that Flask knows each by.
+        routes: in the order of declaration, by Flask's endpoint name.
     """
 
     def __init__(self, name: str) -> None:
-        """Start with none."""
+        """Start without routes."""
         super().__init__(name, __name__)
         self.routes: dict[str, Route] = {}
 
     def declare(
         self, method: str, path: str, *fields: Field, **how: Any
     ) -> Callable[[Handler], Handler]:
-        """Declare a handler as a route; ``how`` are the later attributes of ``Route``."""
+        """Declare a handler as a route; ``how`` are the other attributes of ``Route``."""
 
         def as_route(handler: Handler) -> Handler:
             name = handler.__name__
@@ -118,7 +118,7 @@ class Room(Blueprint):
 
 
 class Match(NamedTuple):
-    """The route that a request asks for.
+    """The route of a request.
 
     Attributes:
         route: the route.
@@ -132,13 +132,13 @@ class Match(NamedTuple):
 
     @property
     def callers(self) -> Callers:
-        """Who may make this request; what has no instance's id where one belongs needs a token."""
+        """Who may make this request; the token is required if the instance_id is invalid."""
         has_id = _HEX_DIGITS.issuperset(self.variables.get("instance_id", ""))
         return self.route.callers if has_id else Callers.TOKEN
 
 
 class Router:
-    """Finds the route of each request in Flask's map, and remembers it: that takes 10 us."""
+    """Finds the route of each request in Flask's map, which takes 10 us, and remembers it."""
 
     def __init__(self, app: Flask, rooms: Iterable[Room]) -> None:
         """Register the rooms with the application."""
@@ -147,11 +147,11 @@ class Router:
             app.register_blueprint(room)
             self._routes |= room.routes
         self._urls = app.url_map.bind("")
-        # By the method and the path of a request.
+        # By method and path.
         self._known: dict[tuple[str, str], Match] = {}
 
     def match(self, environ: dict) -> Match | None:
-        """Return the route of a request in WSGI's words; None where there is none."""
+        """Return the route of a request, given as a WSGI environ; None if there is none."""
         key = environ["REQUEST_METHOD"], environ["PATH_INFO"]
         match = self._known.get(key)
         if match is None:
@@ -165,7 +165,7 @@ class Router:
     def _find(self, method: str, path: str) -> Match | None:
         if not path.isascii():
             path = path.encode("latin-1").decode("utf-8", "replace")
-        # A client may put the path behind an address that ends with a slash.
+        # A client may append the path to an address that ends with a slash.
         path = "/" + path.lstrip("/")
         try:
             name, variables = self._urls.match(path, method)

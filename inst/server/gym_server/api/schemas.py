@@ -1,4 +1,4 @@
-"""JSON schemas that the routes' answers are made of."""
+"""JSON schemas for the routes' responses."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ COUNT = {"type": "integer", "minimum": 0}
 SECONDS = {"type": "number", "minimum": 0}
 ANYTHING: dict = {}
 SPACE = {"type": "object", "required": ["name"], "properties": {"name": TEXT}}
-# One value, or with sub-environments one for each; what is not finite is a word.
+# One value, or with sub-environments one for each. Non-finite numbers are strings.
 NUMBER = {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 NUMBERS = {"anyOf": [*NUMBER["anyOf"], {"type": "array", "items": NUMBER}]}
 FLAGS = {"anyOf": [FLAG, {"type": "array", "items": FLAG}]}
 
 
 def or_null(schema: dict) -> dict:
-    """Return the schema of what may also be null."""
+    """Return a schema that also accepts null."""
     return {"anyOf": [schema, {"type": "null"}]}
 
 
@@ -25,7 +25,7 @@ def array_of(items: dict) -> dict:
 
 
 def json_object(required: dict[str, dict], **others: dict) -> dict:
-    """Return the schema of an object that has some properties, and may have others."""
+    """Return the schema of an object with required properties, and others."""
     return {
         "type": "object",
         "required": list(required),

@@ -1,4 +1,4 @@
-"""The routes of the server itself: what it can create, how it is, its end."""
+"""The routes of the server itself: what it can create, its health, its shutdown."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROOM = Room("server")
     answer="nothing: 410 always",
 )
 def upload(call: Call) -> None:
-    """Refuse an upload: the service that took them closed in 2017."""
+    """Refuse an upload: the service for it closed in 2017."""
     raise GymServerError(
         "upload_closed",
         "Nothing was uploaded: OpenAI closed its scoreboard in 2017",
@@ -47,11 +47,11 @@ def upload(call: Call) -> None:
     schema=schemas.json_object({"message": schemas.TEXT}),
 )
 def shutdown(call: Call) -> dict | Response:
-    """Answer the requests under way and stop the server."""
+    """Answer the requests in progress, and stop the server."""
     call.services.stop()
     message = "Server shutting down"
     if HTML in call.accept:
-        # As the classic server answered.
+        # As on the classic server.
         return Response(200, message.encode(), f"{HTML}; charset=utf-8")
     return {"message": message}
 
@@ -62,7 +62,7 @@ _SEARCH = replace(TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
 @ROOM.declare(
     "GET",
     "/v1/registry/",
-    Field("search", _SEARCH, "A part of the id; when it is part of none, the nearest ids."),
+    Field("search", _SEARCH, "A part of the id; if no id contains it, the most similar ids."),
     answer="environments: id, max_episode_steps, reward_threshold, vectorised, extra, available, "
     "reason (why one is not available)",
     schema=schemas.json_object(
@@ -70,7 +70,7 @@ _SEARCH = replace(TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
     ),
 )
 def env_registry(call: Call) -> dict:
-    """List what can be created."""
+    """List the environments that can be created."""
     return {"environments": call.services.instances.registered(call.fields["search"])}
 
 
@@ -89,7 +89,7 @@ def env_registry(call: Call) -> dict:
     ),
 )
 def health(call: Call) -> dict:
-    """Tell that the server is well, and its versions."""
+    """Report that the server is well, and its versions."""
     return {
         "status": "ok",
         "instances": len(call.services.instances.env_ids()),

@@ -1,4 +1,4 @@
-"""The routes of the spaces of actions and of observations."""
+"""The routes of the action and observation spaces."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def env_observation_space_info(call: Call) -> dict:
     schema=schemas.json_object({"action": schemas.ANYTHING}),
 )
 def env_action_space_sample(call: Call) -> dict:
-    """Draw an action."""
+    """Sample an action."""
     return {"action": call.instance.sample_action()}
 
 
@@ -51,12 +51,12 @@ def env_action_space_sample(call: Call) -> dict:
     schema=schemas.MEMBER,
 )
 def env_action_space_contains(call: Call) -> dict:
-    """Tell whether a value is an action."""
+    """Check whether a value is an action."""
     value = parse_path_value(call.path["x"])
     return {"member": call.instance.contains("action_space", {"value": value})}
 
 
-_VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the description right?")
+_VALUE = Field("value", ANYTHING, "The value to check; without it, the body is a description.")
 
 
 @ROOM.declare(
@@ -67,7 +67,7 @@ _VALUE = Field("value", ANYTHING, "Is it a member? Without it: is the descriptio
     schema=schemas.MEMBER,
 )
 def env_action_space_contains_posted(call: Call) -> dict:
-    """Tell whether a value is an action, or a description the action space's."""
+    """Check whether a value is an action, or a description matches the action space."""
     return {"member": call.instance.contains("action_space", call.body)}
 
 
@@ -79,5 +79,5 @@ def env_action_space_contains_posted(call: Call) -> dict:
     schema=schemas.MEMBER,
 )
 def env_observation_space_contains(call: Call) -> dict:
-    """Tell whether a value is an observation, or a description the observation space's."""
+    """Check whether a value is an observation, or a description matches the observation space."""
     return {"member": call.instance.contains("observation_space", call.body)}

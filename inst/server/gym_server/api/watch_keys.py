@@ -1,4 +1,4 @@
-"""Keys to watch pages: what a link holds in place of the server's token."""
+"""Keys to watch pages: a link has one instead of the server's token."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ _MOST_KEYS = 10_000
 
 
 class WatchKeys:
-    """The keys that are valid at present, each for one environment's page."""
+    """The valid keys, each for one environment's page."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Start with none."""
+        """Start without keys."""
         self._clock = clock
         self._lock = threading.Lock()
-        # By their digests, so that no key can be read here, or guessed from the time that a
-        # comparison takes. The key that expires next is first.
+        # By digest, so that keys can neither be read here nor guessed from the time of a
+        # comparison. The key that expires next is first.
         self._keys: dict[bytes, tuple[str, float]] = {}
 
     def make(self, instance_id: str) -> str:
-        """Return a new key to an instance's page."""
+        """Make a new key to an instance's page."""
         key = secrets.token_urlsafe(24)
         with self._lock:
             self._drop_old()
@@ -37,13 +37,13 @@ class WatchKeys:
         return key
 
     def _drop_one(self) -> None:
-        """Drop a key of the environment that has the most, so that nobody pushes out others'."""
+        """Drop a key of the environment with the most, so that nobody pushes out other keys."""
         owners = Counter(owner for owner, _ in self._keys.values())
         ((owner, _),) = owners.most_common(1)
         del self._keys[next(key for key, value in self._keys.items() if value[0] == owner)]
 
     def opens(self, key: str, instance_id: str) -> bool:
-        """Tell whether a key is valid for an instance's page, which renews it."""
+        """Return whether a key is valid for an instance's page, and renew it."""
         digest = _digest(key)
         with self._lock:
             self._drop_old()

@@ -1,4 +1,4 @@
-"""The watch page's routes: the page itself, and what it shows."""
+"""The routes of the watch page: the page itself, and what it shows."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _HTML = "text/html; charset=utf-8"
 _CSS = "text/css; charset=utf-8"
 _JAVASCRIPT = "text/javascript; charset=utf-8"
 
-# The page shows this moment, and its files may be others with the next server.
+# The page shows the current state, and its files may change with the next server.
 _NO_STORE = ("Cache-Control", "no-store")
 _PAGE_HEADERS = (
     _NO_STORE,
-    # Nothing from other servers, and no scripts or styles but those in the package's files.
+    # Nothing from other servers, and only the scripts and styles in the package's files.
     (
         "Content-Security-Policy",
         "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
@@ -39,14 +39,14 @@ ROOM = Room("watch")
 
 
 def page(url: str, status: int) -> Response:
-    """Return the watch page; its script then asks for the state, and shows errors in words.
+    """Return the watch page; its script requests the state, and shows errors.
 
     Args:
-        url: the path that it was asked for by.
+        url: the requested path.
         status: the HTTP status.
     """
-    # The page names its files relative to its own address, so that it works below any proxy's
-    # folder, and that address may lack the last slash.
+    # The page refers to its files relative to its own address, so that it works below any proxy's
+    # path. That address may lack the last slash.
     here = "" if url.endswith("/") else "watch/"
     html = _read("watch.html").replace(b"{here}", here.encode())
     return Response(status, html, _HTML, _PAGE_HEADERS)
@@ -66,7 +66,7 @@ def env_watch(call: Call) -> Response:
         _ = call.instance
         status = 200
     except GymServerError as refusal:
-        # A browser gets the page all the same, which shows the error and the other environments.
+        # A browser gets the page anyway, which shows the error and the other environments.
         if "text/html" not in call.accept:
             raise
         status = refusal.status
@@ -76,14 +76,14 @@ def env_watch(call: Call) -> Response:
 @ROOM.declare(
     "POST",
     _WATCH + "key/",
-    answer="key: opens the page as watch/?key=KEY, without a token, and seconds: how long after "
-    "its last use it does; both null where no page needs one",
+    answer="key: opens the page as watch/?key=KEY, without a token; seconds: how long it is valid "
+    "after its last use; both null if pages need no key",
     schema=schemas.json_object(
         {"key": schemas.or_null(schemas.TEXT), "seconds": schemas.or_null(schemas.COUNT)}
     ),
 )
 def env_watch_key(call: Call) -> dict:
-    """Make a key to an environment's page, for a browser that has no token."""
+    """Make a key to an environment's page, for a browser without the token."""
     _ = call.instance
     keys = call.services.watch_keys
     if keys is None:
@@ -94,7 +94,7 @@ def env_watch_key(call: Call) -> dict:
 @ROOM.declare(
     "GET",
     _WATCH + "watch.css/",
-    answer="how the page looks",
+    answer="the page's style sheet",
     callers=Callers.EVERYONE,
     content_type=_CSS,
 )
@@ -106,7 +106,7 @@ def env_watch_style(call: Call) -> Response:
 @ROOM.declare(
     "GET",
     _WATCH + "<script>.js/",
-    answer="what the page does",
+    answer="one of the page's scripts",
     callers=Callers.EVERYONE,
     content_type=_JAVASCRIPT,
 )
@@ -127,18 +127,18 @@ def env_watch_script(call: Call) -> Response:
     Field(
         "after",
         env_fields.QUERY_INTEGER,
-        "The number of what was seen last; absent for the present.",
+        "The number of the last frame that was seen; absent for the current one.",
     ),
     answer="number, state (running, ended, not_reset, busy), env_id, sub_env, num_envs, episode, "
     "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "
-    "reward_threshold, fps (null unless it is shown in real time), frame (a PNG in Base64, or "
-    "null), and without a frame why_no_picture, hint and observation (names, values, size)",
+    "reward_threshold, fps (null unless shown in real time), frame (a PNG in Base64, or null), and "
+    "without a frame why_no_picture, hint and observation (names, values, size)",
     callers=Callers.WATCHERS,
     grows=True,
     schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
 def env_watch_state(call: Call) -> Response:
-    """Wait for a new frame; frames are drawn only for those who wait here."""
+    """Wait for a new frame; frames are drawn only while somebody waits."""
     sub_env = call.fields["sub_env"] or 0
     call.instance.check_sub_env(sub_env)
     with call.services.watchers.one_more():
@@ -154,7 +154,7 @@ def env_watch_state(call: Call) -> Response:
     schema=schemas.json_object({"watched": schemas.FLAG}),
 )
 def env_watch_presence(call: Call) -> dict:
-    """Note that somebody goes on watching, without a frame for now."""
+    """Note that somebody still watches, without sending a frame."""
     call.instance.viewer.note_presence()
     return {"watched": True}
 

@@ -1,1 +1,1 @@
-"""The command line: its options, and what the process does before and after it serves."""
+"""The command line: options, and what the process does before and after serving."""

@@ -29,14 +29,14 @@ from gym_server.processes import memory, start
 
 log = logging.getLogger("gym_server")
 
-# The second is what Windows reports for a port that another process has bound exclusively.
+# The second is Windows' error for a port that another process has bound exclusively.
 _TAKEN = (errno.EADDRINUSE, 10013)
 
-# How many of the largest bodies may be on their way at a time; of parts of bodies, and of small
-# ones, which do not count, there may be many more.
+# How many of the largest bodies may arrive at a time. Of smaller bodies there may be more, and
+# small ones do not count.
 _LARGEST_BODIES = 16
 
-# A step that never returns must not keep the server alive.
+# How long requests in progress may take after a stop. A step may never return.
 _GRACE_SECONDS = 10.0
 
 # How long closing the environments may take if requests have not ended by then.
@@ -47,10 +47,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Serve until asked to stop.
 
     Args:
-        argv: the arguments; None for the process's own.
+        argv: the arguments; None for those of the process.
 
     Returns:
-        The exit status: 0 after a stop, 1 when the server cannot start.
+        The exit status: 0 after a stop, 1 if the server cannot start.
     """
     options = parser().parse_args(argv)
     logs.set_up(options.log_level.upper())
@@ -65,8 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not is_loopback(options.host) and of_one_user and not options.no_auth:
         return _fail(
             f"--host {options.host} lets anybody on the network run environments on this machine "
-            f"and write files; give --token-file FILE or the variable {VARIABLE}, or --no-auth if "
-            "that is meant"
+            f"and write files; use --token-file FILE or the variable {VARIABLE}, or --no-auth to "
+            "allow this"
         )
     allow_many_open_files()
     stop = _Stop()
@@ -103,8 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.own_token:
         print(f"Token: {token}", flush=True)
     print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
-    # From here on standard output goes where standard error goes: what environments print must not
-    # fill a pipe that is not read.
+    # Redirect standard output to standard error: output of environments must not fill a pipe that
+    # nobody reads.
     os.dup2(2, 1)
     _serve(app, server)
     return 0
@@ -136,7 +136,8 @@ def _why_not(error: OSError, options: argparse.Namespace) -> str:
     holder = port_holder(options.host, options.port) if error.errno in _TAKEN else None
     reason = holder or error.strerror or error
     return (
-        f"port {options.port} on {options.host} cannot be used: {reason}; --port 0 takes a free one"
+        f"port {options.port} on {options.host} cannot be used: {reason}; "
+        "--port 0 picks a free port"
     )
 
 
@@ -146,7 +147,7 @@ def _fail(reason: str) -> int:
 
 
 class _Stop:
-    """Stops the server, which is created later than the application that may ask for it."""
+    """Stops the server, which is created after the application that may ask for it."""
 
     server: Server | None = None
 
@@ -162,13 +163,13 @@ def _stop_on_signals(stop: Callable[[], None]) -> None:
 
 
 def _wait_for_eof(stop: Callable[[], None], own_log: Path | None) -> None:
-    # Not by sys.stdin: this thread would hold its lock when the interpreter ends.
+    # Do not use sys.stdin: this thread would hold its lock when the interpreter ends.
     heard_a_line = False
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             heard_a_line = True
     if own_log is not None and not heard_a_line:
-        # Nobody is left who reads the log, or removes it. Windows keeps a file that is open.
+        # Nobody is left to read or remove the log. Windows cannot delete open files.
         with contextlib.suppress(OSError):
             own_log.unlink()
     stop()
@@ -180,8 +181,8 @@ def _serve(app: GymApp, server: Server) -> None:
     closer.start()
     closer.join(_GRACE_SECONDS if answered else _LAST_SECONDS)
     if closer.is_alive() or not answered:
-        log.warning("an environment did not finish within %g seconds; leaving it", _GRACE_SECONDS)
+        log.warning("An environment did not finish within %g seconds", _GRACE_SECONDS)
         logging.shutdown()
         start.remove_temporary_folder()
-        # An ordinary exit would wait for the thread that is in the environment.
+        # An ordinary exit would wait for the thread in the environment.
         os._exit(0)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import contextlib
 
-# More than the connections that the server takes, with their environments' pipes and files. It is
-# not more still, because some programs close every possible file when they start.
+# More than the server's connections, and its environments' pipes and files. No higher, because some
+# programs close every possible file when they start.
 _ENOUGH = 65536
 
-# What macOS lets a process have, whatever limit it reports.
+# The limit that macOS enforces, whatever it reports.
 _LEAST = 10240
 
 
 def allow_many_open_files() -> None:
-    """Raise the limit of open files, which is 1,024 on many systems, as far as is allowed.
+    """Raise the limit of open files, which is 1,024 on many systems, as far as allowed.
 
     Windows has no such limit.
     """

@@ -21,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(
         prog="gym-http-server",
         description="Gymnasium environments over HTTP.",
-        # --token would be taken for --token-file, and an error would show it.
+        # Otherwise --token would be taken for --token-file, and an error would print the token.
         allow_abbrev=False,
     )
     options.add_argument("--host", default="127.0.0.1", help="address to listen on (%(default)s)")
@@ -29,13 +29,13 @@ def parser() -> argparse.ArgumentParser:
         "--port",
         type=_number(0, 65535),
         default=5000,
-        help="port; 0 takes a free one (%(default)s)",
+        help="port; 0 picks a free one (%(default)s)",
     )
     options.add_argument(
         "--log-level",
         default="warning",
         choices=("debug", "info", "warning", "error"),
-        help="what goes to standard error (%(default)s)",
+        help="lowest level to log to standard error (%(default)s)",
     )
     options.add_argument(
         "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
@@ -44,19 +44,19 @@ def parser() -> argparse.ArgumentParser:
         "--own-log",
         type=Path,
         metavar="FILE",
-        help="the file that standard error goes to; beyond 8 MiB it is cut to its last MiB, and "
-        "with --stop-on-stdin-eof it is removed when standard input closes without a line, as it "
-        "does when the program that started the server was killed",
+        help="the file that standard error is redirected to; beyond 8 MiB it is cut to its last "
+        "MiB. With --stop-on-stdin-eof, it is removed if standard input closes without a line, "
+        "which means that the program that started the server was killed",
     )
     options.add_argument(
-        "--monitor-dir", type=Path, help="monitors write below it (a fresh temporary directory)"
+        "--monitor-dir", type=Path, help="where monitors write (a new temporary directory)"
     )
     options.add_argument(
         "--allow-module",
         action="append",
         default=[],
         metavar="NAME",
-        help="a module that an env_id such as NAME:Id-v0 may import; repeatable",
+        help="a module that an env_id such as NAME:Id-v0 may import; may be repeated",
     )
     _add_limits(options)
     _add_isolation(options)
@@ -75,7 +75,7 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
     )
 
     def add(name: str, kind: Callable[[str], float], text: str, metavar: str | None = None) -> None:
-        """Add the option of a field of ``Limits``."""
+        """Add the option for a field of ``Limits``."""
         option = f"--{name.replace('_', '-')}"
         default = getattr(Limits, name)
         limits.add_argument(option, type=kind, default=default, help=text, metavar=metavar)
@@ -94,36 +94,36 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
     add(
         "max_processes",
         _number(1, 100_000),
-        "processes of all environments together: those that run sub-environments, and of "
-        "environments that have one of their own (%(default)s)",
+        "processes of all environments: those that run sub-environments, and those of isolated "
+        "environments (%(default)s)",
     )
     add(
         "max_rollout_processes",
         _number(1, 1_000),
-        "processes that play whole episodes, beside these (one for each core)",
+        "processes that play whole episodes, besides these (one per core)",
     )
     add(
         "max_memory_mb",
         _number(1, 2**24),
-        "memory that all environments together may take, estimated before they are created "
-        "and measured afterwards (%(default)s)",
+        "memory of all environments, estimated before they are created and measured afterwards "
+        "(%(default)s)",
     )
     add(
         "max_monitor_mb",
         _number(1, 2**30),
-        "what all monitors together may write on the disk until the server ends (%(default)s)",
+        "what all monitors may write to the disk until the server ends (%(default)s)",
     )
     add("max_watchers", _number(1, 1_000_000), "watch pages at a time (%(default)s)")
     add(
         "max_call_seconds",
         _duration,
-        "that a call may take before its environment is evicted; 0 for ever (%(default)g)",
+        "how long a call may take before its environment is evicted; 0 for no limit (%(default)g)",
         "SECONDS",
     )
     add(
         "idle_minutes",
         _duration,
-        "after which an environment that nobody uses or watches is closed; 0 for never "
+        "how long an environment may be unused and unwatched before it is closed; 0 for no limit "
         "(%(default)g, a day)",
         "MINUTES",
     )
@@ -133,7 +133,7 @@ def _duration(text: str) -> float:
     with contextlib.suppress(ValueError):
         if 0 <= float(text) < math.inf:
             return float(text)
-    raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 0")
+    raise argparse.ArgumentTypeError(f"{text!r} is not a number of at least 0")
 
 
 def _add_isolation(options: argparse.ArgumentParser) -> None:
@@ -141,23 +141,23 @@ def _add_isolation(options: argparse.ArgumentParser) -> None:
         "--isolate",
         default="foreign",
         choices=MODES,
-        help="which environments get a process of their own, so that one that crashes takes no "
-        "other along: those of other modules than Gymnasium's, and on Linux those that may take "
-        "much memory at once (foreign), none or all (%(default)s)",
+        help="which environments get their own process, so that a crash affects no other: those "
+        "of modules other than Gymnasium's, and on Linux those that may suddenly take much memory "
+        "(foreign), none or all (%(default)s)",
     )
     options.add_argument(
         "--max-worker-mb",
         type=_worker_mb,
         default=0,
-        help="memory that such a process may have, on Linux; 0 for what is left of "
-        "--max-memory-mb (%(default)s)",
+        help="memory limit of such a process, on Linux; 0 for what is left of --max-memory-mb "
+        "(%(default)s)",
     )
 
 
 def _worker_mb(text: str) -> int:
     size = _number(0, 2**24)(text)
     if size and sys.platform != "linux":
-        raise argparse.ArgumentTypeError("only Linux keeps such a limit")
+        raise argparse.ArgumentTypeError("only Linux supports such a limit")
     return size
 
 
@@ -170,12 +170,12 @@ def _host_name(text: str) -> str:
 
 
 class _RefuseToken(argparse.Action):
-    """Refuses a token where everybody on the machine can read it, without repeating it."""
+    """Refuses a token that everybody on the machine can read, without repeating it."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         parser.error(
-            "a token on the command line is seen by everybody on this machine; --token-file FILE "
-            f"or the variable {VARIABLE} hold it"
+            "everybody on this machine can see a token on the command line; use --token-file FILE "
+            f"or the variable {VARIABLE}"
         )
 
 
@@ -185,19 +185,19 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         "--token-file",
         type=Path,
         metavar="FILE",
-        help="holds a token of 16 characters or more, which every request must carry; without "
-        f"this option the variable {VARIABLE} may hold it",
+        help="contains a token of 16 characters or more that every request must have; without "
+        f"this option, the variable {VARIABLE} may contain it",
     )
     options.add_argument(
         "--own-token",
         action="store_true",
-        help="make a token, and print it before the address: for one user, to whom nothing of "
-        "what this server can do is forbidden",
+        help="generate a token, and print it before the address: for a single user, who may do "
+        "anything that this server can do",
     )
     options.add_argument(
         "--no-auth",
         action="store_true",
-        help="serve everybody without a token, also on a --host that others can reach",
+        help="serve everybody without a token, even on a --host that others can reach",
     )
     options.add_argument(
         "--allow-host",
@@ -205,11 +205,10 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         default=[],
         type=_host_name,
         metavar="NAME",
-        help="a further name (or NAME:PORT) that the server is known by, such as a proxy's; "
-        "repeatable",
+        help="another name (or NAME:PORT) of the server, such as a proxy's; may be repeated",
     )
     options.add_argument(
-        "--no-shutdown", action="store_true", help="clients cannot stop the server"
+        "--no-shutdown", action="store_true", help="do not let clients stop the server"
     )
     options.add_argument(
         "--allow-path",
@@ -217,8 +216,8 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="DIR",
-        help="a directory in which kwargs may name files, on a server with a token or a --host "
-        "that others can reach; repeatable",
+        help="a directory with files that kwargs may name, on a server with a token or a --host "
+        "that others can reach; may be repeated",
     )
 
 

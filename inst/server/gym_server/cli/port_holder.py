@@ -1,4 +1,4 @@
-"""Which program has the port that a server was to take."""
+"""Find out which program has a server's port."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _LARGEST_ANSWER = 2**16
 
 
 def port_holder(host: str, port: int) -> str | None:
-    """Ask the program that listens on a port what it is; no token is sent to it.
+    """Ask the program that listens on a port what it is, without sending a token.
 
     Returns:
-        Words that end in "has it"; None when no program listens.
+        Words that end in "has it"; None if no program listens.
     """
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     answer = None

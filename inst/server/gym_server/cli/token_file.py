@@ -1,4 +1,4 @@
-"""The token that requests must carry, new or as it is given, never on the command line."""
+"""The token that requests must have: generated or given, but never on the command line."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ log = logging.getLogger(__name__)
 
 VARIABLE = "GYM_SERVER_TOKEN"
 
-# What a token may consist of, so that it fits into a header and is not guessed.
+# The format of a token, so that it fits into a header and cannot be guessed.
 _TOKEN = re.compile("[!-~]{16,1024}")
 
 
 class BadTokenError(Exception):
-    """What was given cannot be a token; the message does not show it."""
+    """The given token is not valid; the message does not contain it."""
 
 
 def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | None:
-    """Return the server's token, None where there is none.
+    """Return the server's token, or None.
 
     Args:
-        file: holds it; None to look at the variable GYM_SERVER_TOKEN.
-        environ: the process's variables; the token's is taken out, so that no process that an
-            environment starts inherits it.
+        file: the file with the token; None to use the variable GYM_SERVER_TOKEN.
+        environ: the environment variables. The token is removed, so that processes that an
+            environment starts do not inherit it.
 
     Raises:
-        BadTokenError: what was given cannot be a token.
+        BadTokenError: the token is not valid.
         OSError: the file cannot be read.
     """
     of_variable = environ.pop(VARIABLE, "")
@@ -42,7 +42,7 @@ def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | No
 
 
 def new_token() -> str:
-    """Return a token that nobody can guess."""
+    """Return a token that cannot be guessed."""
     return secrets.token_urlsafe(32)
 
 
@@ -50,19 +50,19 @@ def _checked(text: str, place: str) -> str:
     token = text.strip()
     if _TOKEN.fullmatch(token) is None:
         raise BadTokenError(
-            f"{place} must hold one token of 16 to 1,024 visible ASCII characters, and "
-            f"what it holds {_fault(token)}"
+            f"{place} must contain a token of 16 to 1,024 visible ASCII characters, but it has "
+            f"{_fault(token)}"
         )
     return token
 
 
 def _fault(token: str) -> str:
     if len(token) < 16:
-        return f"has {len(token)}"
-    return "has more" if len(token) > 1024 else "has others"
+        return f"{len(token)}"
+    return "more" if len(token) > 1024 else "other characters"
 
 
 def _warn_of_readers(file: Path) -> None:
-    # On Windows these bits do not say who may read a file.
+    # On Windows these bits do not show who may read a file.
     if os.name == "posix" and file.stat().st_mode & stat.S_IROTH:
         log.warning("Everybody on this machine can read the token in %s (chmod 600 fixes it)", file)

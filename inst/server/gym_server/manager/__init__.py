@@ -1,1 +1,1 @@
-"""All environments of a server: their list, their limits, and their ends."""
+"""All environments of a server: their list, limits and ends."""

@@ -1,4 +1,4 @@
-"""What the server and its processes really hold of memory, on Linux."""
+"""Measure the memory of the server and its processes, on Linux."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from gym_server.processes import memory
 
 _MB = 2**20
 
-# What is not the clients': modules that are imported when the first environment of a kind is made
-# (150 MiB when one of each of Gymnasium's kinds was made and drawn), answers kept for repetitions.
+# Memory that is not charged to clients: modules that are imported for the first environment of a
+# kind (150 MiB after making and drawing one of each of Gymnasium's kinds), and stored responses.
 _OWN_BYTES = 512 * _MB
 
 
 class Account:
-    """Measures what the server and its processes hold, and refuses what would make it more.
+    """Measures the memory of the server and its processes, and refuses to exceed the limit.
 
-    An environment that is created is charged by an estimate beforehand, see ``memory_estimate``.
-    This account holds for everything that grows afterwards. Elsewhere than on Linux nothing is
-    measured, and the estimates alone hold.
+    Creating an environment is charged an estimate in advance, see ``memory_estimate``. This class
+    covers all later growth. On systems other than Linux nothing is measured, and only the estimates
+    apply.
     """
 
     def __init__(self, limit: float) -> None:
-        """Begin with what the server holds now, which does not count.
+        """Measure what the server uses now, which does not count.
 
         Args:
-            limit: how many bytes there may be.
+            limit: the limit in bytes.
         """
         self._limit = limit
         self._at_start = memory.own_bytes() + _OWN_BYTES
@@ -35,9 +35,10 @@ class Account:
         self._of_processes: dict[int, int] = {}
 
     def measure(self) -> None:
-        """Look at the processes, which takes some milliseconds."""
+        """Measure the processes, which takes some milliseconds."""
         self._descendants = memory.descendants(os.getpid())
-        # Forked pages count several times; only if all are too much are they left out.
+        # The quick measurement counts shared pages several times; be exact only if it exceeds the
+        # limit.
         for exactly in (False, True):
             self._of_processes = {pid: memory.bytes_of(pid, exactly) for pid in self._descendants}
             if not self.is_exceeded:
@@ -45,25 +46,25 @@ class Account:
 
     @property
     def held(self) -> float:
-        """How many bytes are held, by the server now and by the processes when last measured."""
+        """The bytes in use: the server's now, and the processes' when last measured."""
         return memory.own_bytes() - self._at_start + sum(self._of_processes.values())
 
     @property
     def is_exceeded(self) -> bool:
-        """Whether that is more than there may be."""
+        """Whether the limit is exceeded."""
         return self.held > self._limit
 
     def of(self, pids: Iterable[int]) -> int:
-        """Return what processes and those that they have started held when last measured."""
+        """Return the memory of processes and their descendants when last measured."""
         family = set(pids)
-        # A process comes after the one that has started it.
+        # A process comes after its parent.
         for pid, parent in self._descendants.items():
             if parent in family:
                 family.add(pid)
         return sum(self._of_processes.get(pid, 0) for pid in family)
 
     def check(self) -> None:
-        """Refuse what takes more memory.
+        """Refuse calls that take more memory.
 
         Raises:
             GymServerError: ``too_much_memory``.
@@ -71,8 +72,8 @@ class Account:
         if self.is_exceeded:
             raise GymServerError(
                 "too_much_memory",
-                f"All environments together hold {self.held / _MB:,.0f} MiB, and "
-                f"{self._limit / _MB:,.0f} MiB are what they may hold",
+                f"All environments together use {self.held / _MB:,.0f} MiB, and may use "
+                f"{self._limit / _MB:,.0f} MiB",
                 "close what is not needed, GET /v1/instances/ lists it; the server's option "
                 "--max-memory-mb sets the limit",
             )

@@ -1,4 +1,4 @@
-"""Creates, lists, closes and evicts the environments of all clients."""
+"""Create, list, close and evict the environments of all clients."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _MB = 2**20
 
 @dataclass
 class _Taken:
-    """What an environment takes of the server's limits, until it is gone."""
+    """An environment's share of the server's limits, until it is closed."""
 
     room: Room
     reservation: MemoryReservation
@@ -59,11 +59,11 @@ class _Creation:
     """An environment that is being created.
 
     Attributes:
-        config: what its client wants.
-        taken: what it takes of the server's limits.
-        kill: kills the process that the creating thread waits for, so that the thread answers for
-            itself; None where there is no such process.
-        began: in the clock's seconds.
+        config: what its client chose.
+        taken: its share of the server's limits.
+        kill: kills the process that the creating thread waits for, so that this thread can answer;
+            None if there is no such process.
+        began: when it started, in the clock's seconds.
     """
 
     config: EnvConfig
@@ -73,7 +73,7 @@ class _Creation:
 
     def too_long(self, seconds: float) -> GymServerError:
         return call_too_long(
-            f"Making {self.config.env_id}", seconds, "the server does not wait for it any more"
+            f"Making {self.config.env_id}", seconds, "the server stopped waiting for it"
         )
 
 
@@ -88,14 +88,14 @@ class InstanceManager:
         isolation: Isolation | None = None,
         allowed_paths: AllowedPaths | None = None,
     ) -> None:
-        """Start with none.
+        """Start with no instances.
 
         Args:
-            allowed_modules: names of the modules that an env_id may import.
+            allowed_modules: the modules that an env_id may import.
             renderer: the process's render thread.
-            limits: how many of them there may be, and how large.
-            isolation: which of them get a process of their own; None for none.
-            allowed_paths: what clients may name of this machine's files; None for anything.
+            limits: how many instances there may be, and how large.
+            isolation: which of them get their own process; None for none.
+            allowed_paths: the files that clients may name; None for any.
         """
         self._limits = limits or Limits()
         self._isolation = isolation or Isolation()
@@ -104,30 +104,30 @@ class InstanceManager:
         self._renderer = renderer
         self._lock = threading.Lock()
         self._instances: dict[str, Instance] = {}
-        # Whether an environment has gone since garbage was last collected; the watchdog, which
-        # collects it, sets this back.
+        # Whether an environment was closed since the last garbage collection. The watchdog collects
+        # garbage and resets this.
         self.left_garbage = False
         self._budget = Budget(self._limits.max_memory_mb * _MB)
         self.account = Account(self._budget.limit)
-        # While an instance that took too much is being closed.
+        # Set while an instance that took too much memory is being closed.
         self._evicting = threading.Event()
         # By creation until it ends, then by instance_id until the instance is closed.
         self._taken: dict[_Creation | str, _Taken] = {}
-        # The creations, each with the thread that does it; the instances that are being closed.
+        # The creations with their threads; the instances that are being closed.
         self._creating: InProgress[_Creation, int] = InProgress()
         self._closing: dict[str, Instance] = {}
         self._tombstones = Tombstones()
         self._stopping = False
 
     def create(self, config: EnvConfig) -> Instance:
-        """Create an environment, whose instance_id has 8 hex digits.
+        """Create an environment. Its instance_id has 8 hex digits.
 
         Raises:
             GymServerError: see ``factory.make_instance()``; ``invalid_kwargs``, ``shutting_down``,
                 ``environment_died``, ``too_many_instances``, ``too_many_sub_envs``,
                 ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
-        # Before an environment is created for nothing.
+        # Check these first, before creating anything.
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
         if config.num_envs is None:
@@ -155,7 +155,7 @@ class InstanceManager:
         return instance
 
     def _enlist(self, instance: Instance, creation: _Creation) -> bool:
-        """Put an instance on the list, unless its creation was abandoned meanwhile."""
+        """Add an instance to the list; return False if its creation was abandoned meanwhile."""
         with self._lock:
             if self._stopping:
                 raise shutting_down()
@@ -168,7 +168,7 @@ class InstanceManager:
 
     @contextlib.contextmanager
     def _room_for(self, config: EnvConfig, isolated: bool) -> Iterator[_Creation]:
-        """Keep room for an environment while it is created."""
+        """Reserve room for an environment while it is created."""
         # An isolated environment has a process already.
         workers = most_workers(config) if config.wants_workers or not isolated else 0
         most_here = self._isolation.most_bytes_here
@@ -177,7 +177,7 @@ class InstanceManager:
             taken = sum((one.room for one in list(self._taken.values())), Room(0))
             if not config.wants_workers:
                 workers = min(workers, max(0, self._limits.max_processes - taken.processes))
-            # An isolated environment starts its workers by a fork server of its own.
+            # An isolated environment starts its workers with its own fork server.
             fork_server = bool(isolated and workers)
             room = Room(config.num_envs or 1, isolated + fork_server + workers)
             creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
@@ -196,16 +196,16 @@ class InstanceManager:
             self._release(creation)
 
     def _note_processes(self, instance: Instance, taken: _Taken) -> None:
-        """Give back the room for processes that were not needed.
+        """Release the room for processes that were not needed.
 
-        Not for an isolated environment: its process, which nobody trusts, would tell how many.
+        Not for an isolated environment: its untrusted process would report the number.
         """
         processes = instance.about()["num_workers"] or 0
         with self._lock:
             taken.room = replace(taken.room, processes=processes)
 
     def _release(self, whose: _Creation | str) -> None:
-        """Free what an environment took that is gone, or was not created after all."""
+        """Release the share of an environment that was closed, or not created after all."""
         taken = self._taken.pop(whose, None)
         if taken is not None:
             taken.reservation.give_back()
@@ -227,7 +227,7 @@ class InstanceManager:
         settings = self._isolation.settings(
             config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
         )
-        # An interrupt must wait until the process has started; see ``SubEnvs``.
+        # Do not interrupt before the process has started; see ``SubEnvs``.
         with interrupted_by(lambda: None):
             instance = IsolatedInstance(config, settings, self._renderer)
             undo.callback(instance.kill, shutting_down())
@@ -236,7 +236,7 @@ class InstanceManager:
         return instance
 
     def registered(self, search: str | None) -> list[dict]:
-        """Return what can be created; see ``registry.search()``."""
+        """Return the environments that can be created; see ``registry.search()``."""
         if self._isolation.mode != "none" and self._allowed_modules:
             return self._isolation.search(
                 search, self._allowed_modules, self._limits.max_call_seconds
@@ -244,14 +244,14 @@ class InstanceManager:
         return registry.search(search, self._allowed_modules)
 
     def rollout_task(self, config: EnvConfig, **what: Any) -> tuple[Task, bool]:
-        """Return what processes are told of a rollout, and whether its environment is trusted.
+        """Return the task of a rollout, and whether its environment is trusted.
 
         Args:
             config: the environment.
-            **what: the further arguments of ``Task``.
+            **what: the other arguments of ``Task``.
 
         Raises:
-            GymServerError: for what a client may not name.
+            GymServerError: the client may not use this environment, wrapper or path.
         """
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
@@ -271,7 +271,7 @@ class InstanceManager:
             raise self._tombstones.why(instance_id) from None
 
     def lives(self, instance_id: str) -> bool:
-        """Tell whether there is an instance of this id."""
+        """Return whether an instance exists."""
         return instance_id in self._instances
 
     def env_ids(self) -> dict[str, str]:
@@ -280,7 +280,7 @@ class InstanceManager:
             return {key: instance.env_id for key, instance in self._instances.items()}
 
     def close(self, instance_id: str) -> None:
-        """Close an instance for its owner; from now on it is unknown."""
+        """Close an instance for its owner; it becomes unknown."""
         instance = self._unlist(instance_id)
         if instance is None:
             raise self._tombstones.why(instance_id)
@@ -288,7 +288,7 @@ class InstanceManager:
         log.info("Closed instance %s", instance_id)
 
     def _unlist(self, instance_id: str, why: GymServerError | None = None) -> Instance | None:
-        """Take an instance off the list; the reason is for later calls on it."""
+        """Remove an instance from the list; later calls on it raise the reason."""
         with self._lock:
             instance = self._instances.pop(instance_id, None)
             if instance is None:
@@ -296,7 +296,7 @@ class InstanceManager:
             if why is not None:
                 instance.lock.why = why
                 self._tombstones.add(instance_id, why)
-            # The watchdog looks here for a call that takes too long: closing it may.
+            # Closing may take too long, too; the watchdog looks here for that.
             self._closing[instance_id] = instance
             return instance
 
@@ -327,23 +327,23 @@ class InstanceManager:
             return tuple(self._instances.values())
 
     def list(self) -> list[dict]:
-        """Return the list entries of all instances, the oldest first, without waiting for any."""
+        """Return the list entries of all instances, oldest first, without waiting for any."""
         return [instance.list_entry() for instance in self._all()]
 
     def evict_overdue(
         self, seconds: float, answer_for: Callable[[int, GymServerError], None]
     ) -> None:
-        """Evict the instances on which a call takes too long; the others go on.
+        """Evict instances on which a call takes too long; the others continue.
 
         Args:
             seconds: how long a call may take.
-            answer_for: answers for a thread that is stuck and cannot.
+            answer_for: answers for a thread that is stuck.
         """
         before = time.monotonic() - seconds
 
         def answer(stuck: int, why: GymServerError) -> None:
             answer_for(stuck, why)
-            # The thread has not gone on to other work: it waits until it was answered for.
+            # The thread waits for this answer, so it has not moved on to other work.
             interrupt(stuck)
 
         for creation, thread in self._creating.items():
@@ -369,25 +369,25 @@ class InstanceManager:
                 if stuck is not None:
                     answer(stuck, why)
                 instance.lock.answered()
-        # An instance that was evicted may hang once more while it is closed, on the render thread
-        # and without being listed any more.
-        why = call_too_long("Closing an environment", seconds, "the server leaves it alone")
+        # An evicted instance, which is no longer listed, may hang again on the render thread while
+        # it is closed.
+        why = call_too_long("Closing an environment", seconds, "the server stopped waiting for it")
         if self._renderer.abandon_if_began_before(before - seconds, why):
             log.warning("%s", why.message)
 
     def _remove(self, instance_id: str, why: GymServerError) -> None:
-        """Remove an instance that is not to be closed any more; keep the reason."""
+        """Remove an instance without closing it; keep the reason."""
         self._unlist(instance_id, why)
-        # Also when it was being closed, and was not listed any more.
+        # Even if it was being closed, and is no longer listed.
         self._tombstones.add(instance_id, why)
         self._closing.pop(instance_id, None)
         self._release(instance_id)
 
     def evict_largest(self, rollouts: Rollouts) -> None:
-        """Close the instance that has grown most, if all together hold too much.
+        """Close the instance that has grown most, if the memory limit is exceeded.
 
-        What nobody uses at the moment goes first. Where a process of rollouts has grown more, that
-        one is killed.
+        Unused memory is released first. If a rollout process has grown more, that is killed
+        instead.
         """
         self.account.measure()
         if not self.account.is_exceeded or self._evicting.is_set():
@@ -418,7 +418,7 @@ class InstanceManager:
         self._evicting.clear()
 
     def evict_idle(self, minutes: float) -> None:
-        """Evict the instances that nobody has used or watched for so long, and close them."""
+        """Close the instances that nobody has used or watched for this long."""
         now = time.monotonic()
         for instance in self._all():
             lock = instance.lock
@@ -433,20 +433,20 @@ class InstanceManager:
                 self._close_in_background(instance)
 
     def end_watching(self) -> None:
-        """Answer all watchers with an error: the server is about to stop."""
+        """Answer all watchers with an error, because the server is about to stop."""
         for instance in self._all():
             instance.viewer.end(shutting_down())
 
     def close_all(self) -> None:
-        """Close every instance and take no more; end the processes that wait for another one."""
+        """Close every instance and create no more; end the idle processes."""
         with self._lock:
             self._stopping = True
             instances = list(self._instances.values())
             self._instances.clear()
-        # At the same time: one that hangs must not keep the others from finishing their monitors.
+        # In parallel, so that one that hangs does not keep the others from finishing monitors.
         for closer in [self._close_in_background(instance) for instance in instances]:
             closer.join()
-        # After them: closing them leaves processes there.
+        # Last, because closing puts processes there.
         pool.end()
 
     def _new_id(self) -> str:

@@ -13,47 +13,47 @@ from gym_server.processes.cores import usable_cores
 
 @dataclass(frozen=True)
 class Room:
-    """What an environment takes of the limits on all environments together.
+    """The share of one environment in the limits for all environments.
 
     Attributes:
-        sub_envs: how many it has; one without sub-environments counts as one.
-        processes: how many of its own run it.
+        sub_envs: its sub-environments; a single environment counts as one.
+        processes: its own processes.
     """
 
     sub_envs: int = 1
     processes: int = 0
 
     def __add__(self, other: Room) -> Room:
-        """Return both together."""
+        """Return the sum of both."""
         return Room(self.sub_envs + other.sub_envs, self.processes + other.processes)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a server allows; the defaults leave a lab's server on one machine standing.
+    """The server's limits. The defaults protect a lab's server on one machine.
 
     Attributes:
-        max_instances: how many environments there may be.
-        max_num_envs: how many sub-environments one of them may have.
-        max_total_sub_envs: how many all of them may have together, where one without
-            sub-environments counts as one; None for four times as many as one may have.
-        max_processes: how many processes all of them may have together. However many processors
-            there are, each takes 7 MB of its own when it is created and 20 MB in use, two threads
-            and 15 files, whether it is used or not; this is a class in which everybody has some
-            isolated ones, or sub-environments in processes.
-        max_rollout_processes: how many processes play whole episodes, beside these; None for one a
-            core. None do where there may be no processes at all.
-        max_memory_mb: how much memory all of them may take together, in MiB, as it is estimated
-            beforehand (``memory_estimate``) and measured afterwards (``Account``). Half of what a
-            small machine has.
-        max_monitor_mb: how much all monitors together may write on the disk until the server ends,
-            in MiB; some hundred thousand short videos.
-        max_watchers: how many pages may be shown something at a time.
-        max_call_seconds: how long one call may take before its instance is evicted; 0 for no limit.
-            Longer than an ordinary call takes, and short enough that somebody who comes back from
-            a coffee finds the error.
-        idle_minutes: how long nobody may have used or watched an instance before it is evicted;
-            0 for no limit. A day: what is left in the evening is still there in the morning.
+        max_instances: the number of environments.
+        max_num_envs: the number of sub-environments of one environment.
+        max_total_sub_envs: the number of sub-environments of all environments, where a single
+            environment counts as one; None for four times max_num_envs.
+        max_processes: the number of processes of all environments. Regardless of the number of
+            cores, each takes 7 MB when it is created and 20 MB in use, two threads and 15 files,
+            even when idle. The default suits a class in which everybody has some isolated
+            environments, or sub-environments in processes.
+        max_rollout_processes: the number of processes that play whole episodes, besides these; None
+            for one per core, but none if max_processes is 0.
+        max_memory_mb: the memory of all environments in MiB, estimated in advance
+            (``memory_estimate``) and measured afterwards (``Account``). The default is half the
+            memory of a small machine.
+        max_monitor_mb: how much all monitors may write to the disk until the server ends, in MiB.
+            The default fits some hundred thousand short videos.
+        max_watchers: how many pages may wait for frames at a time.
+        max_call_seconds: how long a call may take before its instance is evicted; 0 for no limit.
+            The default is longer than ordinary calls, and short enough that the error is there
+            after a coffee break.
+        idle_minutes: how long an instance may be unused and unwatched before it is evicted; 0 for
+            no limit. The default is a day: work left in the evening is there in the morning.
     """
 
     max_instances: int = 1000
@@ -77,9 +77,9 @@ class Limits:
         """Refuse an environment for which there is no room.
 
         Args:
-            instances: how many there are.
-            taken: what they have.
-            more: what the new one is to have.
+            instances: the number of environments.
+            taken: their shares.
+            more: the share of the new one.
 
         Raises:
             GymServerError: ``too_many_instances``, ``too_many_sub_envs``, ``too_many_processes``.
@@ -87,12 +87,12 @@ class Limits:
         if instances >= self.max_instances:
             raise GymServerError(
                 "too_many_instances",
-                f"This server has {self.max_instances} environments, and takes no more",
+                f"This server has {self.max_instances} environments, the most it allows",
                 "close some, GET /v1/instances/ lists them; the server's option --max-instances "
                 "sets the limit",
             )
         most = self.max_total_sub_envs or 4 * self.max_num_envs
-        # An environment that is larger than any may be is refused for that when it is created.
+        # An environment larger than max_num_envs gets its own error when it is created.
         if taken.sub_envs + more.sub_envs > most and more.sub_envs <= self.max_num_envs:
             raise GymServerError(
                 "too_many_sub_envs",
@@ -107,7 +107,7 @@ class Limits:
                 "too_many_processes",
                 f"All environments together may have {self.max_processes} processes, and "
                 f"{max(0, left)} are left, not {more.processes}",
-                "close some, GET /v1/instances/ lists them, or let fewer processes run sub-"
+                "close some, GET /v1/instances/ lists them, or use fewer processes for sub-"
                 "environments (num_workers); the server's option --max-processes sets the limit",
             )
 
@@ -116,7 +116,7 @@ class Watchers:
     """Counts the watchers that wait for a frame, of all environments."""
 
     def __init__(self, most: int) -> None:
-        """Allow so many at a time."""
+        """Set how many may wait at a time."""
         self._most = most
         self._lock = threading.Lock()
         self._count = 0
@@ -132,7 +132,7 @@ class Watchers:
             if self._count >= self._most:
                 raise GymServerError(
                     "too_many_watchers",
-                    f"This server shows environments to {self._most} watchers, and takes no more",
+                    f"This server shows environments to {self._most} watchers, the most it allows",
                     "close a page; the server's option --max-watchers sets the limit",
                 )
             self._count += 1

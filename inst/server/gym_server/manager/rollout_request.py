@@ -1,4 +1,4 @@
-"""A request for rollouts: which of its units are played, and what came of the others."""
+"""A request for rollouts: the units to play, and their results."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 from gym_server.errors import GymServerError
 from gym_server.rollouts.task import MOST_BYTES, Task, Unit
 
-# So many seconds of units a player takes at once, when it is known how long they take. Its process
-# stops earlier, and gives the rest back.
+# A player takes units for this many seconds at once, when their duration is known. Its process
+# stops earlier and returns the rest.
 _SECONDS_TAKEN = 0.03
 _FIRST_TAKEN = 4
 _MOST_TAKEN = 2000
@@ -23,19 +23,19 @@ class Request:
     """Units that a client waits for.
 
     Attributes:
-        number: by which processes know its task.
-        task: what all have in common.
-        function: what is called in the process: "play", or "describe".
-        key: what a process may have played before that plays it; see ``_Player``.
-        units: all of them.
-        waiting: the ranges of units that nobody plays at the moment, the first one first.
+        number: identifies its task to processes.
+        task: what all units have in common.
+        function: the function to call in the process: "play" or "describe".
+        key: which processes may play it; see ``_Player``.
+        units: all units.
+        waiting: the ranges of units that are not being played, in order.
         playing: how many ranges are being played.
-        results: what came of ranges of units, by their first: how many units, and their tensors.
-        size: bytes of all results.
-        seconds: how long a unit has taken, or None.
-        deaths: how often a process has died with a unit.
-        failed: the first unit that has failed, and the error.
-        turn_ends: when it is another request's turn, in the clock's seconds; None before its own.
+        results: for each played range, by its first unit: how many units, and their tensors.
+        size: the bytes of all results.
+        seconds: the duration of a unit, or None if unknown.
+        deaths: how often a process has died while playing a unit.
+        failed: the first unit that failed, and the error.
+        turn_ends: when its turn ends, in the clock's seconds; None between turns.
         unwanted_since: since when nobody waits for it, in the clock's seconds.
         over: set when it is done.
     """
@@ -57,7 +57,7 @@ class Request:
     over: threading.Event = field(default_factory=threading.Event)
 
     def take(self, players: int) -> range | None:
-        """Take some units to play; None where there are none."""
+        """Take some units to play; None if there are none."""
         if not self.has_work:
             return None
         first = self.waiting[0]
@@ -73,7 +73,7 @@ class Request:
         return taken
 
     def give_back(self, units: range) -> None:
-        """Let somebody else play some units."""
+        """Return units for another player."""
         if units:
             self.waiting.appendleft(units)
             self.waiting = deque(sorted(self.waiting, key=lambda one: one.start))
@@ -85,19 +85,19 @@ class Request:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is played, and nothing will be."""
+        """Whether nothing is being played or will be."""
         return self.playing == 0 and not self.has_work
 
     @property
     def has_work(self) -> bool:
-        """Whether there are units that somebody should play."""
+        """Whether there are units to play."""
         is_full = self.size > MOST_BYTES and 0 in self.results
         if not self.waiting or self.unwanted_since is not None or is_full:
             return False
         return self.failed is None or self.waiting[0].start < self.failed[0]
 
     def beginning(self) -> tuple[list[Any], int]:
-        """Return the results of the first units, without a gap, and how many units these are."""
+        """Return the results of the units before the first gap, and the number of these units."""
         results = []
         end = 0
         while end in self.results:

@@ -1,9 +1,9 @@
-"""Plays the episodes of all clients in processes of the pool.
+"""Play the episodes of all clients in processes of the pool.
 
-Each process is a player's, a thread that waits for it. A player takes some of a request's episodes,
-lets its process play them for some milliseconds, and hands back what was not reached. The requests
-of all clients take turns. When there has been nothing to play for a second, a player puts its
-process back.
+Each process belongs to a player, a thread that waits for it. A player takes some episodes of a
+request, lets its process play them for some milliseconds, and returns those that were not reached.
+The requests of all clients take turns. After a second without work, a player returns its process to
+the pool.
 """
 
 from __future__ import annotations
@@ -29,42 +29,42 @@ from gym_server.rollouts.tensors import concatenated
 
 log = logging.getLogger(__name__)
 
-# Requests that wait or are played; each has a thread, and a body of up to 16 MiB.
+# Requests that wait or are being played. Each has a thread, and a body of up to 16 MiB.
 _MOST_REQUESTS = 64
 
-# A request is played for so many seconds before it is another one's turn. R's requests take less:
-# while one is played the answer to the one before is on its way, and the next one.
+# A request's turn lasts this many seconds. R's requests take less: while one is played, the
+# response to the previous one and the next request are on their way.
 _TURN_SECONDS = 0.3
 
-# A process that has nothing to play is put back after so many seconds.
+# After this many seconds without work, a process is returned to the pool.
 _IDLE_SECONDS = 1.0
 
-# How often a client that waits is looked for, and how long an episode that nobody waits for goes on
-# before its process is killed.
+# How often to check that a client still waits, and how long an unwanted episode may go on before
+# its process is killed.
 _LOOK_SECONDS = 0.25
 _UNWANTED_SECONDS = 2.0
 
-# An episode with which a process has died so often is not played again.
+# An episode is not played again after this many deaths of its process.
 _MOST_DEATHS = 3
 
-# What a process knows of is forgotten there in the same order; see ``rollouts.worker``.
+# How many tasks a process remembers. It forgets them in the same order; see ``rollouts.worker``.
 _MOST_KNOWN = 8
 
 _PARTS_OF_ERRORS = ("code", "message", "hint", "extra")
 
 _WORKER = "gym_server.rollouts.worker"
 
-# Processes know tasks by number, and are used by one server of this process after the other.
+# Identifies tasks to processes, which several servers in this process may use in turn.
 _numbers = itertools.count(1)
 
 
 @dataclass
 class Played:
-    """What came of a request.
+    """The result of a request.
 
     Attributes:
-        tensors: of its first episodes, by name.
-        error: why there are no more; None if there are all, or if there was no room for more.
+        tensors: the tensors of its first episodes, by name.
+        error: why there are no more episodes; None if there are all, or no room for more.
     """
 
     tensors: dict[str, Tensor]
@@ -76,13 +76,13 @@ class _Player:
     """A thread with a process.
 
     Attributes:
-        key: None for a process that plays whatever is trusted; else the one environment that its
-            process may play.
-        process: the process; None while it is started.
-        request: what it plays, or None.
-        units: the units of it.
-        steps, steps_since: how many steps the process had taken when it was last looked at, and
-            since when it has not taken another one.
+        key: None for a process that plays all trusted environments; else the only environment that
+            its process may play.
+        process: the process; None until it is started.
+        request: what it is playing, or None.
+        units: the units that it is playing.
+        steps, steps_since: the number of steps of the process when it was last checked, and since
+            when it has that number.
         known: the numbers of the requests whose task the process has, the latest last.
     """
 
@@ -99,20 +99,20 @@ class Rollouts:
     """Plays episodes for all clients.
 
     Attributes:
-        most_processes: how many processes play at the same time.
+        most_processes: how many processes may play at the same time.
     """
 
     def __init__(self, most_processes: int) -> None:
-        """Start without any process.
+        """Start without processes.
 
         Args:
-            most_processes: as above.
+            most_processes: see above.
         """
         self.most_processes = most_processes
         self._changed = threading.Condition()
         self._requests: deque[Request] = deque()
         self._players: list[_Player] = []
-        # The environment that was played last, and how long a unit of it has taken.
+        # The environment that was played last, and the duration of one of its units.
         self._last_played: tuple[str, float] | None = None
         self._stopping = False
 
@@ -138,11 +138,11 @@ class Rollouts:
             task: what they have in common.
             units: the episodes.
             trusted: whether the environment's code is Gymnasium's own, or ale_py's.
-            is_wanted: whether the client still waits for them.
+            is_wanted: returns whether the client still waits for them.
 
         Raises:
             GymServerError: ``too_many_rollouts``, ``too_many_processes``, ``shutting_down``; and
-                what the first episode failed with.
+                the error of the first episode.
         """
         request = self._request(task, "play", trusted, units)
         self._wait(request, is_wanted)
@@ -168,14 +168,14 @@ class Rollouts:
             if self.most_processes < 1:
                 raise GymServerError(
                     "too_many_processes",
-                    "Episodes are played in processes, and this server may have none",
+                    "Episodes are played in processes, and this server allows none",
                     "the server's option --max-processes sets the limit",
                 )
             if len(self._requests) >= _MOST_REQUESTS:
                 raise GymServerError(
                     "too_many_rollouts",
-                    f"This server has {_MOST_REQUESTS} requests for rollouts to answer, and takes "
-                    "no more at the moment",
+                    f"This server is working on {_MOST_REQUESTS} requests for rollouts, the most "
+                    "it allows",
                     "send it again in a second",
                 )
             self._requests.append(request)
@@ -189,7 +189,7 @@ class Rollouts:
                 with self._changed:
                     request.unwanted_since = time.monotonic()
                     self._end_if_over(request)
-                raise GymServerError("call_too_long", "The client does not wait any more")
+                raise GymServerError("call_too_long", "The client stopped waiting")
 
     def _end_if_over(self, request: Request) -> None:
         if request.is_over:
@@ -200,8 +200,8 @@ class Rollouts:
     # Players --------------------------------------------------------------------------------
 
     def _start_players(self) -> None:
-        """Start as many as there is work for, and as there may be."""
-        # Those that no process may play yet come first.
+        """Start as many players as there is work for, within the limit."""
+        # Requests that no process may play yet come first.
         keys = [player.key for player in self._players]
         for request in sorted(self._requests, key=lambda one: one.key in keys):
             own = [player for player in self._players if player.key == request.key]
@@ -224,7 +224,7 @@ class Rollouts:
         try:
             self._let_process_go(player)
         finally:
-            # Only now, so that a player that takes its place finds the process in the pool.
+            # Only now, so that a player that replaces this one finds the process in the pool.
             with self._changed:
                 self._players.remove(player)
                 self._start_players()
@@ -238,7 +238,7 @@ class Rollouts:
             process.kill()
 
     def _take_turn(self, player: _Player) -> bool:
-        """Find the player something to play; return whether there is any."""
+        """Find something for a player to play; return whether there is anything."""
         due = time.monotonic() + _IDLE_SECONDS
         with self._changed:
             while not self._stopping:
@@ -259,7 +259,7 @@ class Rollouts:
         return False
 
     def _end_turn(self, request: Request) -> None:
-        """Let the others come first when a request has been played for some time."""
+        """Move a request to the end of the queue when its turn is over."""
         now = time.monotonic()
         if request.turn_ends is None:
             request.turn_ends = now + _TURN_SECONDS
@@ -269,7 +269,7 @@ class Rollouts:
             self._requests.append(request)
 
     def _needs_room(self, request: Request) -> bool:
-        """Whether a request waits for a process that may play it, and there may be no more."""
+        """Whether a request needs a process of its own, and there may be no more."""
         return (
             len(self._players) >= self.most_processes
             and request.has_work
@@ -277,7 +277,7 @@ class Rollouts:
         )
 
     def _play(self, player: _Player) -> None:
-        """Let the process play some units, and enter what came of them."""
+        """Let the process play some units, and store the results."""
         request, units = player.request, player.units
         assert request is not None
         began = time.monotonic()
@@ -308,7 +308,7 @@ class Rollouts:
     def _call(
         self, player: _Player, request: Request, units: range
     ) -> tuple[int, Any, GymServerError | None]:
-        """Return how many units were played, what came of them, and why no more."""
+        """Return how many units were played, their results, and the error that ended them."""
         process = player.process
         if process is None:
             process = pool.take(_WORKER, polite=True, trusted=player.key is None)
@@ -332,10 +332,10 @@ class Rollouts:
     ) -> None:
         process = player.process
         if process is None or process.is_alive:
-            # The process says so itself, of the first of the units.
+            # The process itself reports an error of the first unit.
             request.fail(units.start, error)
             return
-        # The process is gone, and with it what came of the units before the one at fault.
+        # The process has ended, and the results of the units before the failed one are lost.
         player.process = None
         at_fault = units[min(process.progress[1], len(units) - 1)]
         request.deaths[at_fault] = request.deaths.get(at_fault, 0) + 1
@@ -349,10 +349,10 @@ class Rollouts:
     # Limits ---------------------------------------------------------------------------------
 
     def kill_overdue(self, seconds: float) -> None:
-        """Kill the processes that have taken no step for too long, or play what nobody wants.
+        """Kill processes that have taken no step for too long, or play unwanted episodes.
 
         Args:
-            seconds: how long a step may take; 0 for as long as it takes.
+            seconds: how long a step may take; 0 for no limit.
         """
         now = time.monotonic()
         with self._changed:
@@ -405,7 +405,7 @@ class Rollouts:
 
 
 def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:
-    """Return what a process has sent, which a foreign environment may have made up."""
+    """Read what a process sent, which an untrusted environment may have forged."""
     try:
         tensors, metadata = safetensors.read(body)
         error = None
@@ -415,5 +415,5 @@ def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:
             error.is_logged = True
         return int(metadata["done"]), tensors, error
     except (AttributeError, KeyError, TypeError, ValueError, GymServerError) as fault:
-        who = "What the environment's process has sent cannot be read: it"
+        who = "The message from the environment's process cannot be read: it"
         raise environment_error(fault, who) from fault

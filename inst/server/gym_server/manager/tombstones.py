@@ -1,4 +1,4 @@
-"""Why the server removed instances, for clients that still ask for them."""
+"""Remember why the server removed instances, for clients that still use them."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from gym_server.errors import GymServerError, unknown_instance
 
 
 class Tombstones:
-    """The reasons by instance_id; only the latest ones are kept."""
+    """The reasons by instance_id; only the latest are kept."""
 
     def __init__(self, most: int = 10_000) -> None:
-        """Keep so many."""
+        """Set how many to keep."""
         self._most = most
         self._lock = threading.Lock()
         self._reasons: dict[str, GymServerError] = {}
 
     def add(self, instance_id: str, why: GymServerError) -> None:
-        """Keep the reason why an instance is gone."""
+        """Remember why an instance was removed."""
         with self._lock:
-            # A copy: an exception that was raised refers to the stack that it came through, and
-            # that to the environment.
+            # Store a copy: an exception that was raised refers to its stack, and so to the
+            # environment.
             self._reasons[instance_id] = why.again()
             while len(self._reasons) > self._most:
                 del self._reasons[next(iter(self._reasons))]
 
     def why(self, instance_id: str) -> GymServerError:
-        """Return the error for a client that asks for an instance, else ``unknown_instance``."""
+        """Return the error for an instance that was removed, or is unknown."""
         reason = self._reasons.get(instance_id)
         return unknown_instance(instance_id) if reason is None else reason.again()
 

@@ -1,7 +1,7 @@
-"""Looks for calls that take too long and instances that nobody uses, and returns free memory.
+"""Find calls that take too long and unused instances, and return free memory.
 
-The watchdog is a thread of its own, because a thread that is stuck in an environment can do nothing
-about it, and so that no call pays for the looking.
+The watchdog has its own thread, because a thread that is stuck in an environment cannot help
+itself, and so that checking slows no call.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from gym_server.processes import memory
 
 log = logging.getLogger(__name__)
 
-# The longest time between two checks; where limits are short they are checked more often.
+# The longest time between two checks; with short limits it is shorter.
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
 
 # How often the memory of processes is measured, which takes some milliseconds.
 _MEASURE_SECONDS = 1.0
 
-# How often memory is given back to the system, which costs some milliseconds, and where there are
-# many thousands of sub-environments some tenths of a second.
+# How often memory is returned to the system, which takes some milliseconds, and with many thousands
+# of sub-environments some tenths of a second.
 _GIVE_BACK_SECONDS = 30.0
 
 
 class Watchdog:
-    """Enforces the limits of time."""
+    """Enforces the limits of time and memory."""
 
     def __init__(
         self,
@@ -44,10 +44,10 @@ class Watchdog:
         """Start to watch.
 
         Args:
-            instances: those to watch.
-            rollouts: the episodes to watch.
-            limits: how long things may take.
-            answer_for: answers for a thread that cannot any more.
+            instances: the instances to watch.
+            rollouts: the rollouts to watch.
+            limits: the limits.
+            answer_for: answers for a thread that is stuck.
         """
         self._instances = instances
         self._rollouts = rollouts
@@ -59,7 +59,7 @@ class Watchdog:
         thread.start()
 
     def stop(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._stopped.set()
 
     def _run(self) -> None:

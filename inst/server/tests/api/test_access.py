@@ -305,7 +305,7 @@ def test_a_page_with_a_dead_key_is_a_page_that_says_so(locked, watched):
     assert (page.status_code, page.mimetype) == (401, "text/html")
     assert "Content-Security-Policy" in page.headers and "WWW-Authenticate" in page.headers
     said = locked.get(f"{url}/watch/state/?key=dead").json
-    assert "no longer good" in said["message"]
+    assert "has expired" in said["message"]
     assert "env_watch()" in said["hint"]
 
 

@@ -20,7 +20,7 @@ def test_limits_of_time_may_be_parts_and_0():
 def test_limits_of_time_are_numbers(name, value, capsys):
     with pytest.raises(SystemExit):
         parser().parse_args([f"{name}={value}"])
-    assert f"'{value}' is no number of at least 0" in capsys.readouterr().err
+    assert f"'{value}' is not a number of at least 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
