@@ -1,7 +1,7 @@
-"""Policies that are data: read one, and act by it, without asking a client for each action.
+"""Policies that are sent as data: read one, and act by it without asking a client.
 
-They act as the policies of the R package do (``R/policy-*.R``): the same actions but for the last
-bits of sums, which NumPy adds in another order.
+They act like the policies of the R package (``R/policy-*.R``): the actions are the same except for
+the last bits of sums, which NumPy adds in another order.
 """
 
 from gym_server.policies.acting import Actor, Policy

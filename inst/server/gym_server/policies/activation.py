@@ -1,8 +1,8 @@
 """The activations of a network's layers, computed in place.
 
-The formulas are those of R: ``tanh()`` and ``plogis()``; ``Gompertz``, ``ReLU`` and ``leakyReLU``
-are those of its package sigmoid. Exact ties matter, because the first of several largest outputs
-wins: no formula that is equal only on paper takes their place.
+The formulas are R's ``tanh()`` and ``plogis()``, and ``Gompertz``, ``ReLU`` and ``leakyReLU`` of
+its package sigmoid. Do not replace them by formulas that are only mathematically equal: exact ties
+matter, because the first of several largest outputs wins.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 
 Steps = list[Callable[[], object]]
 
-# Those whose outputs have a range, from which they can be stretched to an action's bounds.
+# Activations with a bounded range, which can be stretched to an action's bounds.
 HAVE_RANGE = frozenset({"tanh", "logistic", "Gompertz"})
 
-# The largest number of which exp() is finite. Beyond it NumPy warns.
+# The largest number whose exp() is finite. NumPy warns beyond it.
 _LARGEST_EXPONENT = np.array(np.log(np.finfo(np.float64).max))
 _ONE = np.array(1.0)
 _ZERO = np.array(0.0)
@@ -71,25 +71,26 @@ NAMES = tuple(_STEPS)
 
 
 def in_place(name: str, x: np.ndarray) -> Steps:
-    """Return the calls that turn the sums of a layer into its outputs, in the same array."""
+    """Return the calls that turn a layer's sums into its outputs, in place."""
     return _STEPS[name](x)
 
 
 def of_number(name: str, x: float) -> float:
-    """Return the output for the sum of a single neuron, or a number as far from the middle.
+    """Return the output of a single neuron, or a number as far from the middle.
 
-    Of one number Python's floats take a tenth of the time of NumPy's arrays.
+    For one number, Python's floats take a tenth of the time of NumPy's arrays.
     """
     if name == "logistic":
         return 1.0 / (1.0 + math.exp(min(-x, 700.0)))
-    # Below 0.066 for a number below -1, far below the middle, and no exp() overflows.
+    # For numbers below -1 the result is below 0.066, far below the middle, and exp() cannot
+    # overflow.
     return math.exp(-math.exp(min(-x, 1.0))) if name == "Gompertz" else x
 
 
 def middle(name: str) -> float:
-    """Return what a single output must exceed to stand for the second of two actions.
+    """Return the threshold above which a single output stands for the second of two actions.
 
-    It is the middle of the output's range, 0 where it has no range. Exactly the middle is the first
-    action, also where rounding makes it the middle.
+    It is the middle of the output's range, or 0 without a range. An output exactly in the middle,
+    even by rounding, stands for the first action.
     """
     return 0.5 if name in ("logistic", "Gompertz") else 0.0

@@ -1,6 +1,6 @@
-"""Make an action of a Box of the numbers of an action, or of shares of the way between its bounds.
+"""Turn a policy's outputs into an action of a Box: its values, or positions between its bounds.
 
-``R/policy-network-action.R`` says how.
+See ``R/policy-network-action.R``.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from gymnasium.spaces import Box
 
 from gym_server.policies.discrete import not_a_number
 
-# So few numbers Python's own floats reckon with faster than NumPy's arrays.
+# Up to this many numbers, Python's floats are faster than NumPy's arrays.
 _FEW = 8
 
 
 def box_actions(space: Box, stretched_from: str | None, rows: int | None) -> Callable[..., Any]:
-    """Return a function from float64[numbers], or float64[rows, numbers], to an action of each.
+    """Return a function from float64[numbers], or float64[rows, numbers], to actions.
 
     Args:
-        space: the actions.
-        stretched_from: the activation from whose range the outputs are stretched to the bounds;
-            None where they are the numbers of the action themselves.
-        rows: how many there are; None for a single action.
+        space: the action space.
+        stretched_from: the activation whose range is stretched to the bounds; None if the outputs
+            are the values of the action.
+        rows: the number of rows; None for a single action.
     """
     low, high = _bounds(space)
     if rows is None and low.size <= _FEW:
@@ -38,7 +38,7 @@ def drawn_actions(space: Box, rows: int | None) -> Callable[[np.ndarray], Any]:
 
     def choose(values: np.ndarray) -> Any:
         flat = values.ravel()
-        # A sum of squares is not a number if one of them is none, and is found in one call.
+        # A NaN makes the sum of squares NaN, which one call finds.
         squares = flat.dot(flat)
         if squares != squares:
             raise not_a_number()
@@ -48,16 +48,16 @@ def drawn_actions(space: Box, rows: int | None) -> Callable[[np.ndarray], Any]:
 
 
 def clip_to_bounds(space: Box) -> Callable[[Any], Any]:
-    """Return a function that cuts an action, or a batch of them, at the space's bounds."""
+    """Return a function that clips an action, or a batch, to the space's bounds."""
     low, high = space.low, space.high
     return lambda action: np.minimum(np.maximum(action, low), high)
 
 
 def _bounds(space: Box) -> tuple[np.ndarray, np.ndarray]:
-    """Return the flat bounds of a Box as float64, none beyond the space's own."""
+    """Return the flat bounds of a Box as float64, never beyond the space's own."""
     low, high = (bound.ravel().astype(np.float64) for bound in (space.low, space.high))
     if space.dtype.kind in "iu" and space.dtype.itemsize == 8:
-        # 2^63 - 1 has no float64, and 2^63 is no int64.
+        # 2^63 - 1 has no float64, and 2^63 is not an int64.
         for index, bound in enumerate(space.high.ravel().tolist()):
             if int(high[index]) > bound:
                 high[index] = np.nextafter(high[index], 0)
@@ -81,7 +81,7 @@ def _of_few(
                 raise not_a_number()
             if is_stretched:
                 share = (value + 1) / 2 if is_tanh else value
-                # The sum of two products, because high - low may be beyond the largest number.
+                # A sum of two products, because high - low may overflow.
                 value = low * (1 - share) + high * share
             append(low if value < low else high if value > high else value)
         action = array(list(map(round, values)) if is_whole else values, dtype)
@@ -102,7 +102,7 @@ def _of_many(
             values = low * (1 - share) + high * share
         values = np.minimum(np.maximum(values, low), high)
         flat = values.ravel()
-        # A sum of squares is not a number if one of them is none, and is found in one call.
+        # A NaN makes the sum of squares NaN, which one call finds.
         squares = flat.dot(flat)
         if squares != squares:
             raise not_a_number()

@@ -1,4 +1,4 @@
-"""Choose one of the actions of a Discrete space by the value of each, as R's policies do."""
+"""Choose a Discrete action by the values of all actions, like R's policies."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from gym_server.policies.draws import uniforms
 
 @dataclass(frozen=True)
 class DiscreteChoice:
-    """The first of the actions with the largest value, or one that is drawn.
+    """Chooses the first action with the largest value, or draws one.
 
-    For one episode this is Python's floats, with which so few numbers are faster than with NumPy,
-    for many rows it is NumPy's arrays.
+    Single episodes use Python's floats, which are faster than NumPy for so few numbers. Groups use
+    NumPy's arrays.
 
     Attributes:
-        space: the actions.
-        epsilon: how often any action is drawn.
-        temperature: of the softmax that actions are drawn by, in place of epsilon; None for none.
-        masks: whether actions of the value -Inf are never drawn.
+        space: the action space.
+        epsilon: the probability of drawing any action.
+        temperature: the temperature of the softmax for drawing actions, instead of epsilon; None
+            for no softmax.
+        masks: whether actions with the value -Inf are never drawn.
     """
 
     space: Discrete
@@ -41,8 +42,7 @@ class DiscreteChoice:
 
         Args:
             values_of: returns the values of the actions, given an observation.
-            remembers: whether to look up what was found for the same observation before, where
-                there are few observations.
+            remembers: whether to remember results by observation, if there are few observations.
         """
         start, kind = int(self.space.start), self.space.dtype.type
         members = [kind(start + index) for index in range(int(self.space.n))]
@@ -83,7 +83,7 @@ class DiscreteChoice:
 
         Args:
             values_of: returns the values, float64[actions, rows], given a batch of observations.
-            rows: how many there are.
+            rows: the number of rows.
         """
         start, dtype = int(self.space.start), self.space.dtype
         explores = self.temperature is None and self.epsilon > 0
@@ -110,15 +110,15 @@ class DiscreteChoice:
         return np.where(explores < self.epsilon, drawn, self._best_rows(values, take))
 
     def _best_rows(self, values: np.ndarray, take: object) -> np.ndarray:
-        # Of two this is faster than argmax(), which goes across the rows.
+        # For two actions this is faster than argmax(), which works across the rows.
         best: np.ndarray = values[1] > values[0] if len(values) == 2 else values.argmax(axis=0)
         return best
 
 
 def _remembered(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function that finds the same, and looks up what it has found before.
+    """Return a function with the same results that remembers them by observation.
 
-    It forgets nothing. For observations that are arrays it looks nothing up.
+    It forgets nothing. Results for observations that are arrays are not remembered.
     """
     known: dict[Any, Any] = {}
 
@@ -141,13 +141,12 @@ def softmax_weights(values: Sequence[float], temperature: float = 1.0) -> list[f
 
 
 def chances(weights: Sequence[float]) -> list[float]:
-    """Return the sums of the probabilities of the first action, of the first two, and so on.
+    """Return the cumulative probabilities of the actions.
 
-    Where a uniform number belongs among them, by ``bisect_right()``, is the index of the action
-    that it stands for. The sum of all may be a little below 1, so the sums end before the last
-    action that can be drawn.
+    ``bisect_right()`` of a uniform number in them is the index of an action. Rounding may make the
+    sum of all a little less than 1, so the result ends before the last possible action.
     """
-    # fsum(), because what sum() gives differs between versions of Python.
+    # fsum(), because the result of sum() differs between versions of Python.
     total = math.fsum(weights)
     if not 0 < total < math.inf:
         raise not_a_number()
@@ -160,7 +159,7 @@ def chances(weights: Sequence[float]) -> list[float]:
 
 
 def draw_columns(p: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Draw an index for each column of probabilities, by a uniform number for each."""
+    """Draw an index for each column of probabilities, given a uniform number for each."""
     below = np.cumsum(p, axis=0)[:-1]
     last = len(p) - 1 - np.argmax(p[::-1] > 0, axis=0)
     chosen: np.ndarray = np.minimum((u >= below).sum(axis=0), last)
@@ -168,7 +167,7 @@ def draw_columns(p: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 
 def not_a_number() -> GymServerError:
-    """The weights are so large that an output is Inf - Inf."""
+    """Report weights so large that an output is Inf - Inf."""
     return invalid_policy(
         "An output of the policy's network is not a number",
         "its weights, or the environment's observations, are too large or not finite",

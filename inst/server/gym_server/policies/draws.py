@@ -1,7 +1,7 @@
-"""Random numbers of an episode, from a generator of its own.
+"""Random numbers of an episode, from its own generator.
 
-``SeedSequence([seed, 1])`` and not ``seed``: the environment's own generator is made of that, and
-a policy must not repeat its numbers.
+Its seed is ``SeedSequence([seed, 1])`` and not ``seed``, which seeds the environment's generator: a
+policy must not repeat the environment's numbers.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
-# To draw one number takes as long as to draw thirty; many episodes end before they need more.
+# Drawing one number takes as long as drawing thirty, but many episodes end before they need more.
 _FIRST = 16
 _MOST = 512
 
 
 class Draws:
-    """Values that are drawn one after the other, some of them ahead.
+    """Values that are drawn one after another, some of them in advance.
 
     Attributes:
-        take: returns the next value. It may be given an argument, which it ignores: so it can
-            itself be the function that acts.
+        take: returns the next value. It ignores an optional argument, so it can be used as the
+            function that acts.
     """
 
     take: Callable[..., Any]
@@ -32,21 +32,21 @@ class Draws:
         """Prepare to draw.
 
         Args:
-            block: returns so many values, the same as from as many calls for one.
-            most: how many are drawn ahead at most.
+            block: returns a number of values, the same as from as many calls for one.
+            most: the most values to draw in advance.
         """
         self._block = block
         self._most = most
         self._seed = 0
-        # Made when it is first needed: to make one takes 15 us.
+        # Created when it is first needed, which takes 15 us.
         self._generator: Generator | None = None
         self._size = 0
-        # Those drawn ahead, the next one last.
+        # The values drawn in advance, in reverse order.
         self._rest: list[Any] = []
         self.take = self._taker()
 
     def begin(self, seed: int) -> None:
-        """Forget what was drawn ahead, and draw from this seed."""
+        """Discard the values drawn in advance, and draw from this seed."""
         self._seed = seed
         self._generator = None
         self._rest.clear()
@@ -72,12 +72,12 @@ class Draws:
 
 
 def _seed_sequence(seed: int) -> SeedSequence:
-    # Of a list NumPy makes such an array, which takes twice as long.
+    # NumPy converts a list to such an array, which takes twice as long.
     return SeedSequence(np.array([seed, 1], np.uint32) if seed < 2**32 else [seed, 1])
 
 
 def uniforms(*shape: int) -> Draws:
-    """Return draws of numbers from 0 to 1, or of arrays of them."""
+    """Return draws of numbers between 0 and 1, or of arrays of them."""
     if not shape:
         return Draws(lambda generator, n: generator.random(n).tolist())
     return Draws(lambda generator, n: list(generator.random((n, *shape))), _most_of(shape))

@@ -1,8 +1,8 @@
-"""Compute the outputs of networks, for one observation or for a batch, in arrays laid out once.
+"""Compute the outputs of networks for one observation or a batch, in preallocated arrays.
 
-A row's outputs must not depend, to the last bit, on who plays the other rows. So only the sizes
-decide how they are computed: a matrix product of many rows adds in another order than one of few
-rows, and both in another order than a sum of products.
+A row's outputs must not depend on the other rows, to the last bit. So only the sizes decide how
+they are computed: a matrix product of many rows adds in another order than one of few rows, and
+both in another order than a sum of products.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from gym_server.policies.activation import Steps, in_place, middle
 from gym_server.policies.network_plan import NetworkPlan
 from gym_server.policies.states import NOT_A_STATE, states_of
 
-# With so many weights a row's own matrices are multiplied number by number; with more, the rows of
-# a block are multiplied together by the matrices of each candidate that plays one of them. Blocks
-# are always cut at the same rows, and a block that nobody plays is left out.
+# Up to this many weights, the matrices of each row are multiplied number by number. With more
+# weights, the rows of a block are multiplied together, by the matrices of each candidate that plays
+# one of them. Blocks always start at the same rows, and blocks that nobody plays are left out.
 _FEW_WEIGHTS = 512
 _BLOCK = 32
 
@@ -30,15 +30,15 @@ Forward = Callable[[Any], np.ndarray]
 
 
 def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray) -> Forward:
-    """Return what computes outputs, float64[outputs] or float64[outputs, rows].
+    """Return a function that computes outputs, float64[outputs] or float64[outputs, rows].
 
-    Before a single output that chooses between two actions, the middle of its range stands as the
-    value of the first one. For one observation that output is a sum; see ``of_number()``.
+    If a single output chooses between two actions, a row with the middle of its range comes first,
+    as the value of the first action. For one observation that output is a sum; see ``of_number()``.
 
     Args:
         plan: what the networks have in common.
         weights: float64[candidates, weights].
-        candidate: whose network it is; for a group int[rows], see ``Policy.actor()``.
+        candidate: the candidate; for a group int[rows], see ``Policy.actor()``.
     """
     if isinstance(candidate, int):
         return _layers(plan, _matrices(plan, weights[candidate]), ())
@@ -48,7 +48,7 @@ def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray)
 
 
 def _by_candidate(plan: NetworkPlan, weights: np.ndarray, candidates: np.ndarray) -> Forward:
-    """Return what computes the blocks of each candidate, and takes its own rows of them."""
+    """Return a function that computes the blocks of each candidate, and selects its rows."""
     rows = len(candidates)
     parts = []
     for candidate in np.unique(candidates[candidates >= 0]):
@@ -124,8 +124,8 @@ def _product(matrix: np.ndarray, source: np.ndarray, sums: np.ndarray) -> Steps:
 
 
 def _reader(space: Box, inputs: np.ndarray) -> Callable[[Any], None]:
-    """Return a function that copies an observation, or a batch of them, into an array."""
-    # In the shape of the observation: a copy that also changes the shape takes longer.
+    """Return a function that copies an observation, or a batch, into an array."""
+    # The target has the observation's shape: a copy that changes the shape takes longer.
     target = inputs.T.reshape(*inputs.shape[1:], *space.shape)
     copyto = np.copyto
 
@@ -143,7 +143,7 @@ def _column_reader(
 ) -> Callable[[Any], None]:
     """Return a function that copies the sums of the first layer for discrete observations.
 
-    Of inputs that are 0 but for one that is 1, they are a column of the weights.
+    A discrete observation is one input of 1 among zeros, so the sums are a column of the weights.
     """
     columns = matrix[:-1] + matrix[-1] if bias else matrix
     states = states_of(space)
@@ -165,7 +165,7 @@ def _column_reader(
 
 
 def _normalizing(plan: NetworkPlan, inputs: np.ndarray) -> Steps:
-    """Return the calls that normalise inputs where they are."""
+    """Return the calls that normalize inputs in place."""
     if plan.mean is None or plan.scale is None:
         return []
     across = (-1,) + (1,) * (inputs.ndim - 1)
@@ -177,7 +177,7 @@ def _normalizing(plan: NetworkPlan, inputs: np.ndarray) -> Steps:
 
 
 def _misfit(observation: Any) -> GymServerError:
-    """An observation is not in the space that the environment says it is in."""
+    """Report an observation that is not in the environment's observation space."""
     return GymServerError(
         "environment_error",
         f"The environment's observation {brief(observation)} is not in its observation space",

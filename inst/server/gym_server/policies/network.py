@@ -25,7 +25,7 @@ class NetworkPolicy(Policy):
     Attributes:
         plan: what they have in common.
         weights: float64[candidates, weights], in the order of R's ``coef()``: layer after layer,
-            each matrix column after column.
+            each matrix column by column.
         deviation: float64[candidates, outputs], the standard deviations of the output "gaussian";
             otherwise None.
     """
@@ -36,7 +36,7 @@ class NetworkPolicy(Policy):
 
     @property
     def candidates(self) -> int:
-        """How many there are."""
+        """The number of candidates."""
         return len(self.weights)
 
     def actor(self, candidate: int | np.ndarray) -> Actor:
@@ -62,7 +62,7 @@ class NetworkPolicy(Policy):
         def values_of(observation: Any) -> list[float]:
             values: list[float] = outputs(observation).tolist()
             total = sum(values)
-            # The sum tells in one call whether to look closer: Inf - Inf is not a number, either.
+            # The sum shows in one call whether to look closer: Inf - Inf is NaN, too.
             if total != total and any(value != value for value in values):
                 raise not_a_number()
             if chooses_by_one:

@@ -15,18 +15,18 @@ from gym_server.policies.activation import HAVE_RANGE
 
 @dataclass(frozen=True)
 class NetworkPlan:
-    """All of a network but its weights.
+    """Everything about a network except its weights.
 
     Attributes:
-        observation_space: what comes in.
-        action_space: what goes out.
-        sizes: how many inputs, neurons of each hidden layer, and outputs there are.
+        observation_space: the space of the inputs.
+        action_space: the space of the outputs.
+        sizes: the numbers of inputs, neurons of each hidden layer, and outputs.
         activation: the activation of each layer after the inputs.
         bias: whether each neuron has a bias, the last column of its layer's matrix.
         output: "greedy", "softmax", "gaussian" or "epsilon-greedy".
-        epsilon: how often "epsilon-greedy" explores; None where it was not given.
-        mean, scale: float64[inputs], by which inputs are normalised: ``(x - mean) * scale``; None
-            where they come in as they are.
+        epsilon: how often "epsilon-greedy" explores; None if not given.
+        mean, scale: float64[inputs], which normalize inputs by ``(x - mean) * scale``; None for no
+            normalization.
     """
 
     observation_space: Box | Discrete
@@ -41,7 +41,7 @@ class NetworkPlan:
 
     @cached_property
     def shapes(self) -> list[tuple[int, int]]:
-        """The shape of each layer's matrix: a row a neuron, a column what it takes."""
+        """The shape of each layer's matrix: a row per neuron, a column per input."""
         return [
             (neurons, taken + self.bias)
             for taken, neurons in zip(self.sizes[:-1], self.sizes[1:], strict=True)
@@ -49,20 +49,20 @@ class NetworkPlan:
 
     @cached_property
     def ends(self) -> list[int]:
-        """Where each layer's weights end; the last one is how many there are."""
+        """Where each layer's weights end; the last one is the number of weights."""
         return list(accumulate(prod(shape) for shape in self.shapes))
 
     @property
     def num_values(self) -> int:
-        """How many values an action is chosen by: also a single output chooses between two."""
+        """The number of values to choose an action by: two even for a single output."""
         space = self.action_space
         return int(space.n) if isinstance(space, Discrete) else self.sizes[-1]
 
     @property
     def stretched_from(self) -> str | None:
-        """The activation whose range is stretched to the bounds of a Box; None where it has none.
+        """The activation whose range is stretched to the bounds of a Box; None for no stretching.
 
-        With noise the outputs are the numbers of the action themselves.
+        With noise, the outputs are the values of the action.
         """
         last = self.activation[-1]
         return last if last in HAVE_RANGE and self.output == "greedy" else None

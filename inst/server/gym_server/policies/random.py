@@ -1,4 +1,4 @@
-"""Act at random, with the draws of Gymnasium's ``sample()``."""
+"""Act at random, with the same draws as Gymnasium's ``sample()``."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class RandomPolicy(Policy):
 
     @property
     def candidates(self) -> None:
-        """Any number of them acts alike."""
+        """None, because all candidates act alike."""
 
     def actor(self, candidate: int | np.ndarray) -> Actor:
-        """Return an actor that draws for itself, for a group all rows at once."""
+        """Return an actor with its own draws; for a group it draws all rows at once."""
         space = copy.deepcopy(self.space)
         if isinstance(candidate, int):
             draws = _draws(space)
@@ -46,7 +46,7 @@ def read_random(
     observation_space: Space,
     action_space: Space,
 ) -> RandomPolicy:
-    """Read a random policy, which may have an action space of its own."""
+    """Read a random policy, which may have its own action space."""
     check_fields(document, tensors, "action_space")
     own = document.get("action_space")
     return RandomPolicy(action_space if own is None else _narrower(own, action_space))
@@ -70,7 +70,7 @@ def _narrower(own: object, action_space: Space) -> Discrete:
             f'The policy\'s action_space must be {{"n", "start"}}, within the environment\'s '
             f"{brief_space(action_space)}, not {brief(own)}"
         )
-    # A copy and not a new one: only newer versions of Gymnasium have a dtype.
+    # Copy it, because only newer versions of Gymnasium have a dtype argument.
     narrower = copy.deepcopy(action_space)
     narrower.n = action_space.dtype.type(n)
     narrower.start = action_space.dtype.type(start)
@@ -78,11 +78,11 @@ def _narrower(own: object, action_space: Space) -> Discrete:
 
 
 def _draws(space: Space) -> Draws:
-    # Only these kinds: of numbers below 32 bits Gymnasium draws several at once from one of 32.
+    # Only these kinds: below 32 bits, Gymnasium draws several numbers at once from 32 bits.
     if type(space) is Discrete and space.dtype.itemsize >= 4:
         n, start, kind = space.n, space.start, space.dtype.type
         return Draws(lambda rng, size: list(start + rng.integers(n, size=size, dtype=kind)))
-    # A block of single numbers falls apart into scalars, and not into arrays without axes.
+    # A block of single numbers would become scalars, instead of arrays without axes.
     if type(space) is Box and space.shape and space.dtype.kind == "f" and _has_finite_range(space):
         low, high, shape, dtype = space.low, space.high, space.shape, space.dtype
         return Draws(
@@ -109,7 +109,7 @@ def _one_by_one(space: Space) -> Draws:
 
 
 def _with_parts(space: Space) -> list[Space]:
-    """Return a space and all spaces in it: they share one generator."""
+    """Return a space and all spaces in it, which share one generator."""
     match space:
         case Dict():
             parts = list(space.spaces.values())

@@ -1,4 +1,4 @@
-"""Read a policy of any kind, or a list of them, each of which is a candidate."""
+"""Read a policy of any kind, or a list of policies, each of which is a candidate."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def read_policy(
     """Read a policy, and bind it to an environment's spaces.
 
     Args:
-        document: what the policy is, ``{"kind": ...}``.
-        tensors: its numbers by name: "weights", "mean", "q"; of a list "0/weights" and so on.
-        observation_space: what it observes.
-        action_space: what it chooses from.
+        document: the policy, ``{"kind": ...}``.
+        tensors: its numbers by name: "weights", "mean", "q"; in a list "0/weights" and so on.
+        observation_space: the observation space.
+        action_space: the action space.
 
     Raises:
-        GymServerError: ``invalid_policy`` for one that is malformed or does not fit the spaces,
-            ``not_supported`` where no policy of its kind can play.
+        GymServerError: ``invalid_policy`` if it is malformed or does not fit the spaces,
+            ``not_supported`` if no policy of its kind can play.
     """
     total = sum(tensor.size for tensor in tensors.values())
     if total > _MOST_NUMBERS:
@@ -114,20 +114,20 @@ def _by_policy(tensors: Mapping[str, np.ndarray], n: int) -> list[dict[str, np.n
 
 @dataclass(frozen=True)
 class PolicyList(Policy):
-    """Candidates that are policies of their own."""
+    """Candidates that are separate policies."""
 
     policies: list[Policy]
 
     @property
     def candidates(self) -> int:
-        """How many there are."""
+        """The number of candidates."""
         return len(self.policies)
 
     def actor(self, candidate: int | np.ndarray) -> Actor:
-        """Return an actor of a policy; for a group one in which each row takes its own policy's.
+        """Return an actor of a policy; for a group, one in which each row has its own policy.
 
-        Each policy of a group draws for all rows and from a generator of its own, so that one that
-        draws does not move the draws of another.
+        In a group, each policy draws for all rows and from its own generator, so that one that
+        draws does not affect the draws of another.
         """
         if isinstance(candidate, int):
             return self.policies[candidate].actor(0)

@@ -78,7 +78,7 @@ def _is_flag(value: object) -> bool:
 
 
 def _check_ends(sizes: list[int], observed: Box | Discrete, acted: Box | Discrete) -> None:
-    """Refuse a network with other inputs or outputs than the environment's numbers."""
+    """Refuse a network whose inputs or outputs do not fit the environment."""
     inputs, outputs = _width(observed), _width(acted)
     if sizes[0] != inputs:
         raise invalid_policy(

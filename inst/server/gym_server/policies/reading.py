@@ -1,4 +1,4 @@
-"""Read the fields and tensors of a policy; all of them must be known."""
+"""Read the fields and tensors of a policy; unknown ones are errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gym_server.json_values import brief
 
 
 def check_fields(document: Mapping, tensors: Mapping[str, np.ndarray], *known: str) -> None:
-    """Refuse a field or a tensor that a policy of this kind does not have."""
+    """Refuse fields and tensors that a policy of this kind does not have."""
     for what, given in (("field", document), ("tensor", tensors)):
         for name in given:
             if name not in known and name != "kind":
@@ -24,7 +24,7 @@ def check_fields(document: Mapping, tensors: Mapping[str, np.ndarray], *known: s
 
 
 def field(document: Mapping, name: str, fits: Callable[[Any], bool], wanted: str) -> Any:
-    """Return a field, None where it is absent and that fits."""
+    """Return a field; None if it is missing and may be."""
     value = document.get(name)
     if not fits(value):
         raise invalid_policy(f"The policy's {name} must be {wanted}, not {brief(value)}")
@@ -32,7 +32,7 @@ def field(document: Mapping, name: str, fits: Callable[[Any], bool], wanted: str
 
 
 def number(document: Mapping, name: str, low: float, high: float, wanted: str) -> float | None:
-    """Return a field that is a number from ``low`` to ``high``, None where it is absent."""
+    """Return a field that is a number from ``low`` to ``high``; None if it is missing."""
 
     def fits(value: object) -> bool:
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -54,7 +54,7 @@ def temperature_of(document: Mapping) -> float | None:
 
 
 def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return a tensor that the policy must have, as float64."""
+    """Return a required tensor as float64."""
     if name not in tensors:
         raise invalid_policy(f"The policy has no tensor {name}", f"send policy/{name}")
     tensor = np.asarray(tensors[name])
@@ -66,12 +66,12 @@ def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:
 def finite_numbers(
     tensors: Mapping[str, np.ndarray], name: str, shapes: list[tuple[int | None, ...]], wanted: str
 ) -> np.ndarray:
-    """Return a tensor that the policy must have, of one of some shapes, without Inf and NaN.
+    """Return a required tensor with one of some shapes, without Inf and NaN.
 
     Args:
-        tensors: all of them.
+        tensors: all tensors.
         name: its name.
-        shapes: a length of None stands for any from 1.
+        shapes: the allowed shapes; a length of None means any from 1.
         wanted: the shapes in words.
     """
     tensor = numbers(tensors, name)
@@ -93,7 +93,7 @@ def _matches(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
 
 
 def shape_text(shape: tuple[int, ...]) -> str:
-    """Return a shape as a person writes it: 2 x 3."""
+    """Return a shape as text: 2 x 3."""
     return " x ".join(map(str, shape)) or "a single number"
 
 

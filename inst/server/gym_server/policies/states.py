@@ -1,7 +1,7 @@
-"""The number of an observation among all there can be, for tables with a row for each.
+"""Number the values of a countable space, for tables with a row per observation.
 
-They are counted as R's ``space_index()`` counts them, but from 0: of several numbers the last one
-changes first.
+The order is that of R's ``space_index()``, but from 0: of several numbers, the last one changes
+first.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Dict, Discrete, MultiBinary, MultiDiscrete, Space, Tuple
 
-# What ``States.index`` raises for what is no value of the space.
+# The errors of ``States.index`` for anything that is not in the space.
 NOT_A_STATE = (ValueError, TypeError, KeyError, IndexError)
 
 
@@ -24,8 +24,8 @@ class States:
     """The values of a space, numbered from 0.
 
     Attributes:
-        count: how many there are.
-        index: returns the number of one, or raises one of ``NOT_A_STATE``.
+        count: the number of values.
+        index: returns the number of a value, or raises one of ``NOT_A_STATE``.
     """
 
     count: int
@@ -34,7 +34,7 @@ class States:
 
 @singledispatch
 def states_of(space: Space) -> States | None:
-    """Return how the values of a space are numbered; None where they cannot be counted."""
+    """Return the numbering of a space's values; None if they cannot be counted."""
     return None
 
 

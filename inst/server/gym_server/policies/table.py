@@ -1,4 +1,4 @@
-"""Act by a table with a row for each state and a column for each action."""
+"""Act by a table with a row per state and a column per action."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class TablePolicy(Policy):
 
     Attributes:
         q: float64[candidates, states, actions].
-        states: what its rows are for.
-        observation_space: where they come from.
-        choice: how an action is chosen by its values.
+        states: the numbering of the rows.
+        observation_space: the observation space.
+        choice: chooses an action by its values.
     """
 
     q: np.ndarray
@@ -44,11 +44,11 @@ class TablePolicy(Policy):
 
     @property
     def candidates(self) -> int:
-        """How many tables there are."""
+        """The number of tables."""
         return len(self.q)
 
     def actor(self, candidate: int | np.ndarray) -> Actor:
-        """Return an actor that looks its states up; see ``Policy.actor()``."""
+        """Return an actor that looks up the values of a state; see ``Policy.actor()``."""
         q = self.q
 
         def values_of(observation: Any) -> list[float]:
@@ -94,7 +94,7 @@ def read_table(
     observation_space: Space,
     action_space: Space,
 ) -> TablePolicy:
-    """Read a table, which must have a row for each state and a column for each action."""
+    """Read a table, which must have a row per state and a column per action."""
     check_fields(document, tensors, "q", "epsilon", "temperature")
     if not isinstance(action_space, Discrete):
         raise GymServerError(

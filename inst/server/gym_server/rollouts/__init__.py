@@ -1,1 +1,1 @@
-"""Whole episodes, played by policies that are data, in processes of the pool."""
+"""Whole episodes, played by policies that are sent as data, in processes of the pool."""

@@ -1,4 +1,4 @@
-"""An environment in which episodes are played one after the other, in a process of the pool."""
+"""An environment for playing episodes one after another, in a process of the pool."""
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ from gym_server.rollouts.task import Task
 from gym_server.vector_envs.make_vec import make_own_implementation
 from gym_server.vector_envs.sub_env import ThisThread
 
-# How many episodes an environment's own vector implementation plays in lockstep: always as many,
-# because all of them have one generator. R knows the number from the description.
+# How many episodes an environment's own vector implementation plays in lockstep. The number is
+# fixed, because all of them share one generator. R gets it from the description.
 GROUP = 256
 
-# An episode that is not the first of an environment is another one there than in a new one: the
-# world of Box2D remembers. Found by playing every registered environment both ways.
+# Environments in which a later episode differs from the first one of a new environment, because the
+# world of Box2D keeps a state. Found by playing every registered environment both ways.
 _MADE_ANEW = ("gymnasium.envs.box2d.bipedal_walker",)
 
-# Without a time limit of Gymnasium's, and yet each episode ends, whatever is done: a game of Atari
-# after half an hour, unless this argument says otherwise.
+# Environments without a time limit whose episodes always end: an Atari game ends after half an
+# hour, unless this argument changes that.
 _ENDING = ("gymnasium.envs.toy_text.blackjack", "ale_py")
 _ATARI_LIMIT = "max_num_frames_per_episode"
 
-# Wrappers that carry something from one episode into the next.
+# Wrappers that carry a state from one episode to the next.
 _REMEMBERING = ("NormalizeObservation", "NormalizeReward")
 
 
 class RolloutEnv:
-    """Makes the environment of a task when it is needed, and keeps it where that changes nothing.
+    """Makes the environment of a task, and keeps it for further episodes if that is safe.
 
     Attributes:
-        group: how many episodes are played in lockstep; None where each is played by itself.
-        observation_space, action_space: of one episode.
+        group: how many episodes are played in lockstep; None if episodes are played separately.
+        observation_space, action_space: the spaces of one episode.
     """
 
     def __init__(self, task: Task) -> None:
-        """Make it.
+        """Make the environment.
 
         Raises:
             GymServerError: see ``make.make_env()`` and ``make_vector_env()``.
@@ -69,7 +69,7 @@ class RolloutEnv:
         reservation = MemoryReservation(Budget(self._task.memory), GROUP)
         own = make_own_implementation(config, self._task.allowed_modules, ThisThread(), reservation)
         if own is not None:
-            # A policy that was read acts within the space. To look takes a sixth of a step.
+            # Policies act within the space. This check takes a sixth of a step.
             own.unwrapped.action_space.contains = lambda action: True  # type: ignore
         return own
 
@@ -78,19 +78,19 @@ class RolloutEnv:
         reservation = MemoryReservation(Budget(task.memory))
         env = make.make_env(config, task.allowed_modules, reservation)
         env = make.call_env(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
-        # Some work for drawing in each step.
+        # Some environments do work for drawing in each step.
         save_drawing(env)
         choose_quickly(env)
         return env
 
     @cached_property
     def is_made_anew(self) -> bool:
-        """Whether each episode needs a new one."""
+        """Whether each episode needs a new environment."""
         module = registry.module_of(self._spec)
         return not registry.is_known(module) or module.startswith(_MADE_ANEW)
 
     def for_an_episode(self) -> Any:
-        """Return an environment that plays as a new one does."""
+        """Return an environment that plays like a new one."""
         if self._used and self.is_made_anew:
             self._env.close()
             self._env = self._make()
@@ -99,11 +99,11 @@ class RolloutEnv:
 
     @property
     def for_a_group(self) -> Any:
-        """The environment's own vector implementation, where there is a group."""
+        """The environment's own vector implementation, for groups."""
         return self._env
 
     def close(self) -> None:
-        """Close it."""
+        """Close the environment."""
         self._env.close()
 
     # What is known of it --------------------------------------------------------------------
@@ -114,7 +114,7 @@ class RolloutEnv:
 
     @property
     def time_limit(self) -> int | None:
-        """After how many steps it ends an episode itself."""
+        """After how many steps the environment itself ends an episode, or None."""
         if self.group is not None:
             limit: int | None = self._spec.max_episode_steps
             return limit
@@ -122,18 +122,18 @@ class RolloutEnv:
 
     @property
     def needs_max_steps(self) -> bool:
-        """Whether an episode may go on forever."""
+        """Whether an episode may never end."""
         ends = registry.module_of(self._spec).startswith(_ENDING)
         chosen = self._task.config.kwargs or {}
         return self.time_limit is None and (not ends or _ATARI_LIMIT in chosen)
 
     @property
     def remembers(self) -> list[str]:
-        """The names of the client's wrappers that remember something over episodes."""
+        """The client's wrappers that carry a state from one episode to the next."""
         return [one.name for one in self._task.config.wrappers if one.name in _REMEMBERING]
 
     def describe(self) -> dict:
-        """Return what a client must know to fit a policy to it."""
+        """Return what a client must know to make a policy for the environment."""
         config, spec = self._task.config, self._spec
         metadata = self._env.metadata or {}
         env_id = env_id_of(config, self._env)

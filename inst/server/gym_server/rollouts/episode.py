@@ -10,12 +10,12 @@ from gym_server.rollouts.recording import Recorder
 
 
 class Played(NamedTuple):
-    """What came of an episode.
+    """The outcome of an episode.
 
     Attributes:
         earned: its return, the sum of its rewards.
-        length: how many steps it has.
-        terminated: whether the environment ended it by its own rules.
+        length: its number of steps.
+        terminated: whether the environment's own rules ended it.
         truncated: whether a limit of steps ended it, the environment's or ``max_steps``.
     """
 
@@ -28,14 +28,14 @@ class Played(NamedTuple):
 def play_episode(
     env: Any, actor: Any, seed: int, max_steps: int | None, recorder: Recorder | None
 ) -> Played:
-    """Play one episode from its beginning to its end.
+    """Play one episode from start to end.
 
     Args:
-        env: as new.
+        env: the environment, which must play like a new one.
         actor: the policy; see ``policies``.
-        seed: of the environment, and of what the policy draws.
-        max_steps: after how many steps it is cut short.
-        recorder: is told of each step; None where nothing is kept of them.
+        seed: the seed of the environment and of the policy's draws.
+        max_steps: after how many steps the episode is truncated.
+        recorder: records each step; None to keep no steps.
     """
     progress = serve.progress
     actor.begin(seed)

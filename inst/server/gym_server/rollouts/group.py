@@ -1,8 +1,8 @@
-"""Play a group of episodes in lockstep, where an environment has a vector implementation.
+"""Play a group of episodes in lockstep, with an environment's own vector implementation.
 
-All sub-environments have one generator, so what the first episode of each is depends on the seed
-and on how many there are: always as many. Episodes that follow, which the implementation begins by
-itself, are not looked at.
+All sub-environments share one generator, so their first episodes depend on the seed and on the
+number of sub-environments, which is always the same. Later episodes, which the implementation
+starts automatically, are ignored.
 """
 
 from __future__ import annotations
@@ -26,13 +26,12 @@ def play_group(
     Args:
         env: the implementation, with as many sub-environments as a group has.
         actor: the policy of all rows; see ``policies``.
-        unit: the seed, and which rows are wanted.
-        max_steps: after how many steps an episode is cut short.
-        keep: what is kept of the steps.
+        unit: the seed, and the rows to play.
+        max_steps: after how many steps an episode is truncated.
+        keep: what to keep of the steps.
 
     Returns:
-        What came of the rows that are wanted, and what was kept of their steps, one row's after the
-        other's.
+        The results of these rows, and what was kept of their steps, row by row.
     """
     progress = serve.progress
     rows = np.array(unit.rows)
@@ -77,7 +76,7 @@ def play_group(
 def _kept(
     env: Any, steps: list[tuple], rows: np.ndarray, lengths: np.ndarray, keep: Keep
 ) -> dict[str, Tensor]:
-    """Return the steps of each row, one row's after the other's."""
+    """Return the steps of all rows, row by row."""
     row = np.repeat(rows, lengths)
     time = np.concatenate([np.arange(length) for length in lengths])
     before = [step[:5] for step in steps]

@@ -1,4 +1,4 @@
-"""What is kept of the steps of episodes: all of them, or the moments of what was observed."""
+"""What to keep of the steps of episodes: all of them, or the moments of the observations."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from gym_server.rollouts.task import MOST_BYTES, Keep
 from gym_server.spaces import stack, tensor_writer
 from gym_server.spaces.stacking import ARRAYS
 
-# Of observations with so many numbers together the moments are computed at once, and then merged:
-# a rule of the observation's size alone, so that moments do not depend on anything else.
+# The moments of observations with this many numbers together are computed at once, and then merged.
+# Only the observation's size determines this, so that moments depend on nothing else.
 _NUMBERS_AT_ONCE = 2**20
 
 _NUMBERS = (int, float, np.number, np.bool_)
 
 
 def check_keep(keep: Keep, observation_space: Space, action_space: Space) -> None:
-    """Refuse to keep what has no arrays.
+    """Refuse to keep observations or actions that are not arrays.
 
     Raises:
         GymServerError: ``not_supported``.
@@ -50,10 +50,10 @@ def _has_arrays(space: Space) -> bool:
 
 
 class Moments:
-    """The number, the mean and the sums of squared deviations of an episode's observations."""
+    """The count, the mean and the sums of squared deviations of an episode's observations."""
 
     def __init__(self, observation_space: Space) -> None:
-        """Begin without any."""
+        """Start with no observations."""
         size = int(np.prod(observation_space.shape or ()))
         self._at_once = max(1, _NUMBERS_AT_ONCE // max(1, size))
         self._waiting: list[np.ndarray] = []
@@ -68,14 +68,14 @@ class Moments:
             self._merge()
 
     def _merge(self) -> None:
-        """Merge those that wait, as Chan, Golub and LeVeque do (1979)."""
+        """Merge the waiting observations by the method of Chan, Golub and LeVeque (1979)."""
         if not self._waiting:
             return
         self.add_rows(np.stack(self._waiting))
         self._waiting = []
 
     def add_rows(self, values: np.ndarray) -> None:
-        """Add observations in the rows of a matrix, at most as many as are merged at once."""
+        """Add the rows of a matrix, at most as many as are merged at once."""
         new = len(values)
         mean = values.mean(axis=0)
         deviations = values - mean
@@ -86,16 +86,16 @@ class Moments:
         self._squares = self._squares + squares + apart * apart * (before * (new / self._count))
 
     def result(self) -> tuple[int, np.ndarray, np.ndarray]:
-        """Return all three."""
+        """Return the count, the mean and the sums."""
         self._merge()
         return self._count, self._mean, self._squares
 
 
 class Recorder:
-    """Is told of each step of single episodes, one after the other."""
+    """Records the steps of single episodes, one after another."""
 
     def __init__(self, keep: Keep, observation_space: Space, action_space: Space) -> None:
-        """Begin without episodes."""
+        """Start with no episodes."""
         self._keep = keep
         self._observation_space = observation_space
         self._action_space = action_space
@@ -114,12 +114,12 @@ class Recorder:
         self._most_steps = int(MOST_BYTES // max(1, size))
 
     def begin(self) -> None:
-        """An episode begins."""
+        """Start an episode."""
         if self._keep.moments:
             self._of_episode = Moments(self._observation_space)
 
     def before(self, observation: Any, action: Any) -> None:
-        """Keep what was observed, and what is done."""
+        """Record an observation and the action."""
         if self._of_episode is not None:
             self._of_episode.add(observation)
         if self._keep.steps:
@@ -127,7 +127,7 @@ class Recorder:
             self._actions.append(self._copy_action(action))
 
     def after(self, observation: Any, reward: float, terminated: bool, truncated: bool) -> None:
-        """Keep what came of it."""
+        """Record the outcome of a step."""
         if self._keep.steps:
             self._rewards.append(reward)
             self._flags.append((bool(terminated), bool(truncated)))
@@ -142,13 +142,13 @@ class Recorder:
                 )
 
     def end(self) -> None:
-        """The episode has come to its end."""
+        """End the episode."""
         if self._of_episode is not None:
             self._moments.append(self._of_episode.result())
         self._complete = len(self._rewards)
 
     def tensors(self) -> dict[str, Tensor]:
-        """Return what was kept of the episodes that have come to their end."""
+        """Return what was kept of the finished episodes."""
         tensors: dict[str, Tensor] = {}
         if self._keep.moments:
             tensors.update(moment_tensors(self._moments))
@@ -168,7 +168,7 @@ class Recorder:
 
 
 def result_tensors(earned: Any, length: Any, terminated: Any, truncated: Any) -> dict[str, Tensor]:
-    """Return what came of episodes as tensors; see ``Played``."""
+    """Return the outcomes of episodes as tensors; see ``Played``."""
     return {
         "return": Tensor.of(np.array(earned, dtype=np.float64)),
         "length": Tensor.of(np.array(length, dtype=np.int32)),
@@ -195,7 +195,7 @@ def step_tensors(
     terminated: np.ndarray,
     truncated: np.ndarray,
 ) -> dict[str, Tensor]:
-    """Return steps, which are batches by name, as tensors with a row for each step."""
+    """Return steps, given as batches by name, as tensors with a row per step."""
     tensors: dict[str, Tensor] = {}
     for name, batch in steps.items():
         space = action_space if name == "action" else observation_space
@@ -207,12 +207,12 @@ def step_tensors(
 
 
 def _copier(space: Space) -> Callable[[Any], Any]:
-    """Return what keeps a value as it is now; an environment may change it in place later."""
+    """Return a function that copies a value; the environment may change it in place later."""
     return _copy_number if isinstance(space, ARRAYS) else _copy_parts
 
 
 def _copy_number(value: Any) -> Any:
-    # A number never changes, and to make an array of it takes longer than a step of a table.
+    # A number never changes, and making an array of it takes longer than a step in a table.
     return value if isinstance(value, _NUMBERS) else np.array(value)
 
 

@@ -1,4 +1,4 @@
-"""What is to be played: an environment, a policy, and episodes."""
+"""What to play: an environment, a policy, and episodes."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 
 from gym_server.envs.config import EnvConfig
 
-# A larger answer is cut after whole episodes, and an episode whose steps take more is refused.
+# Larger results are cut after whole episodes. An episode whose steps exceed this is an error.
 MOST_BYTES = 64 * 2**20
 
 
 @dataclass(frozen=True)
 class Keep:
-    """What is kept of an episode beside its return, its length and its flags.
+    """What to keep of an episode besides its return, length and flags.
 
     Attributes:
-        moments: how many observations there were, their mean, and the sums of squared deviations.
+        moments: the count of observations, their mean, and the sums of squared deviations.
         steps: each observation, action, reward, and both flags.
         next_observation: also the observation after each step.
     """
@@ -32,11 +32,11 @@ class Keep:
 
 
 class Unit(NamedTuple):
-    """Episodes that are played together: one, or as many as a group has.
+    """Episodes that are played together: a single one, or those of a group.
 
     Attributes:
-        seed: of the episode, or of the group.
-        candidates: which candidate plays each episode.
+        seed: the seed of the episode or the group.
+        candidates: the candidate that plays each episode.
         rows: the place of each in its group; None for a single episode.
     """
 
@@ -47,16 +47,16 @@ class Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What all episodes of a request have in common, as it goes to the processes.
+    """What all episodes of a request have in common, as it is sent to processes.
 
     Attributes:
         config: the environment.
-        allowed_modules: names of the modules that an env_id may import.
-        memory: how many bytes an environment may be estimated to take.
+        allowed_modules: the modules that an env_id may import.
+        memory: the largest estimate for the environment in bytes.
         policy: the policy, as a JSON object.
-        tensors: its numbers, by name.
-        max_steps: after how many steps an episode is cut short; None for never.
-        keep: what is kept.
+        tensors: the policy's numbers by name.
+        max_steps: after how many steps an episode is truncated; None for never.
+        keep: what to keep.
     """
 
     config: EnvConfig
@@ -69,6 +69,6 @@ class Task:
 
     @cached_property
     def env_key(self) -> str:
-        """Two tasks with the same key are played in the same environment."""
+        """Identifies the environment: tasks with the same key are played in the same one."""
         config = self.config
         return json.dumps([config.env_id, config.kwargs, config.wrappers], default=str)

@@ -1,4 +1,4 @@
-"""Tensors with a row for each episode, or for each step, put together."""
+"""Combine tensors with a row per episode or per step."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from gym_server.response import Response
 
 
 def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
-    """Return tensors of the same names one below the other."""
+    """Concatenate tensors of the same name."""
     if len(files) == 1:
         return files[0]
     tensors = {}
     for name in files[0] if files else ():
         parts = [file[name] for file in files]
-        # Those of no rows may not know their width.
+        # Tensors without rows may have another width.
         rows = [part for part in parts if part.shape[0]] or parts[:1]
         first = rows[0]
         shape = (sum(part.shape[0] for part in rows), *first.shape[1:])
@@ -24,7 +24,7 @@ def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
 
 
 def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Response:
-    """Return tensors as the body of an answer."""
+    """Return tensors as a response."""
     if by_column:
         tensors = {name: Tensor.of(one.array(), by_column) for name, one in tensors.items()}
     file = write(tensors, metadata)

@@ -1,4 +1,4 @@
-"""What a process of the pool does for rollouts: it describes an environment, and plays episodes."""
+"""What a process of the pool does for rollouts: describe an environment, and play episodes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from gym_server.rollouts.recording import Recorder, check_keep, result_tensors
 from gym_server.rollouts.task import Task, Unit
 from gym_server.rollouts.tensors import concatenated
 
-# Its imports take longer than the start of a process.
+# Importing it takes longer than starting a process.
 start.preload(__name__)
 
-# How long it plays before it tells what came of it, and others get their turn.
+# How long to play before returning the results, so that others get their turn.
 _SECONDS = 0.015
 
-# Environments and tasks that are kept; two clients at a time need no more.
+# How many environments and tasks to keep; enough for two clients at a time.
 _MOST_ENVIRONMENTS = 4
 _MOST_TASKS = 8
 
@@ -46,16 +46,16 @@ def play(number: int, task: Task | None, units: Sequence[Unit]) -> Ready:
     """Play for some milliseconds.
 
     Args:
-        number: the task's.
-        task: itself, where this process has not seen it; else None.
-        units: what is to be played, in this order.
+        number: the number of the task.
+        task: the task, if this process does not have it; else None.
+        units: the units to play, in this order.
 
     Returns:
-        A safetensors file: what came of the first of them. Its metadata is how many units these
-            are (``done``), and the error that the next one ended with, if it did (``error``).
+        A safetensors file with the results of the first units. Its metadata has their number
+        (``done``), and the error of the next unit, if it failed (``error``).
 
     Raises:
-        GymServerError: for an environment that cannot be made, or a policy that does not fit.
+        GymServerError: the environment cannot be made, or the policy does not fit.
     """
     playing = _tasks.get(number)
     if playing is None:
@@ -79,7 +79,7 @@ def _environment(task: Task) -> RolloutEnv:
 
 
 class _Playing:
-    """A task, prepared."""
+    """A task that is ready to play."""
 
     def __init__(self, task: Task) -> None:
         self._task = task
@@ -167,7 +167,7 @@ class _Playing:
     def _actor(self, candidate: int) -> Any:
         actor = self._actors.get(candidate)
         if actor is None:
-            # One candidate's episodes follow one another.
+            # A candidate's episodes come one after another, so one actor is enough.
             self._actors.clear()
             actor = self._actors[candidate] = self._policy.actor(candidate)
         return actor
@@ -176,7 +176,7 @@ class _Playing:
 def _play_until(
     due: float, units: Sequence[Unit], play: Callable[[Unit], None]
 ) -> GymServerError | None:
-    """Play one unit after the other, until the time is over; return why one of them failed."""
+    """Play units until the time is over; return the error of the one that failed, or None."""
     for place, unit in enumerate(units):
         serve.progress[1] = place
         try:
@@ -189,7 +189,7 @@ def _play_until(
 
 
 def _named(failure: BaseException, seed: int) -> GymServerError:
-    """Name the seed of the episode that has failed."""
+    """Add the seed of the failed episode to its error."""
     if not isinstance(failure, GymServerError):
         failure = environment_error(failure)
     return GymServerError(
