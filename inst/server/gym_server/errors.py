@@ -148,11 +148,6 @@ def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError
     )
 
 
-def shutdown_disabled() -> GymServerError:
-    """Report that the operator does not let clients stop the server."""
-    return GymServerError("shutdown_disabled", "Clients cannot stop this server")
-
-
 def shutting_down() -> GymServerError:
     """Report that the server is stopping and accepts no more calls."""
     return GymServerError("shutting_down", "The server is stopping")

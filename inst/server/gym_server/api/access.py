@@ -54,7 +54,8 @@ class Guard:
             access: which requests to accept.
             watch_keys: the keys that open a watch page without the token.
         """
-        self._expected = None if access.token is None else _header(access.token)
+        token = access.token
+        self._expected = None if token is None else f"Bearer {token}".encode("latin-1")
         self._watch_keys = watch_keys
         self._names = {"localhost", access.host.lower()}
         self._origins = {split_host(name) for name in access.allowed_hosts}
@@ -184,10 +185,6 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def _header(token: str) -> bytes:
-    return f"Bearer {token}".encode("latin-1")
 
 
 def split_host(authority: str, default_port: str = "") -> tuple[str, str]:

@@ -26,7 +26,6 @@ from gym_server.errors import (
     body_too_large,
     busy_receiving,
     malformed_request,
-    shutdown_disabled,
 )
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import InstanceManager
@@ -200,7 +199,7 @@ def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Res
 
 
 def _refuse_to_stop() -> None:
-    raise shutdown_disabled()
+    raise GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def _for_flask(response: Response) -> flask.Response:

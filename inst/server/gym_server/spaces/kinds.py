@@ -9,7 +9,7 @@ from typing import Any
 
 from gymnasium.spaces import Space
 
-from gym_server.json_values import brief
+from gym_server.json_values import brief, shortened
 
 
 class NotInSpace(Exception):  # noqa: N818 - it answers a question as often as it is an error
@@ -50,7 +50,7 @@ def brief_space(space: object, width: int = 120) -> str:
     except Exception:
         # A custom space may raise anything, and a space may contain itself.
         text = type(space).__name__
-    return text if len(text) <= width else text[: width - 3] + "..."
+    return shortened(text, width)
 
 
 @singledispatch
