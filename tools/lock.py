@@ -1,8 +1,8 @@
-"""Writes inst/server/lock/: called by tools/lock, with a folder to work in.
+"""Write inst/server/lock/; called by tools/lock, with a folder to work in.
 
-One resolution for all extras, all systems and all Pythons that the server supports. base.txt
-holds what the server itself needs, EXTRA.txt what an extra adds to that, both as requirements
-that pip and uv read. Their first lines are comments, "# key: value", that R reads.
+There is one resolution for all extras, all systems and all Pythons that the server supports.
+base.txt has the server's own requirements, EXTRA.txt those that an extra adds, in the format of pip
+and uv. Their first lines are comments, "# key: value", that R reads.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from packaging.utils import parse_wheel_filename
 SERVER = Path(__file__).parent.parent / "inst" / "server"
 EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video")
 PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
-# The Python that gym_server_install() has uv install.
+# The Python that gym_server_install() installs.
 USUAL_PYTHON = (3, 12)
 
 
 def _manylinux(machine: str) -> list[str]:
-    # glibc 2.28: Debian 10, Ubuntu 20.04, RHEL 8 and what came after them.
+    # glibc 2.28: Debian 10, Ubuntu 20.04, RHEL 8 and later.
     return [f"manylinux_2_{minor}_{machine}" for minor in range(28, 4, -1)] + [
         f"manylinux{old}_{machine}" for old in ("2014", "2010", "1")
     ]
 
 
-# By its name in R (system_name()): the markers' values, the wheels' tags.
-# macOS 14 is the oldest that opencv-python-headless still has wheels for.
+# By the name in R (system_name()): the values of markers, the tags of wheels. macOS 14 is the
+# oldest for which opencv-python-headless still has wheels.
 SYSTEMS = {
     "linux-x86_64": ("linux", "x86_64", _manylinux("x86_64")),
     "linux-aarch64": ("linux", "aarch64", _manylinux("aarch64")),
@@ -46,7 +46,7 @@ SYSTEMS = {
 
 
 def main(folder: Path) -> None:
-    """Resolve what pyproject.toml asks for, and write a file for each part."""
+    """Resolve the requirements of pyproject.toml, and write a file for each part."""
     pyproject = SERVER / "pyproject.toml"
     project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
     _write_project(project, folder)
@@ -75,7 +75,7 @@ def main(folder: Path) -> None:
 
 
 def fingerprint(project: dict) -> str:
-    """Tell one set of dependencies from another; the tests of the server compute it too."""
+    """Return a hash of the dependencies; the server's tests compute it, too."""
     asked = [
         project["dependencies"],
         {e: project["optional-dependencies"][e] for e in EXTRAS},
@@ -84,13 +84,13 @@ def fingerprint(project: dict) -> str:
 
 
 def _write_project(project: dict, folder: Path) -> None:
-    # The server may run on a later Python, too, but not with everything that is locked.
+    # The server may run on a later Python, but not with everything that is locked.
     text = [
         '[project]\nname = "locked"\nversion = "0"\nrequires-python = ">=3.10,<3.14"\n',
         f"dependencies = {json.dumps(project['dependencies'])}\n[project.optional-dependencies]\n",
         *(f"{extra} = {json.dumps(project['optional-dependencies'][extra])}\n" for extra in EXTRAS),
         "[tool.uv]\npackage = false\nno-build = true\n",
-        # Where the newest release of a package has no wheel for these, an older one is taken.
+        # If the newest release of a package has no wheels for these, use an older one.
         "required-environments = [\"sys_platform == 'darwin' and platform_machine == 'x86_64'\"]\n",
     ]
     (folder / "pyproject.toml").write_text("".join(text), encoding="utf-8")
@@ -102,7 +102,7 @@ def _uv(*arguments: str, cwd: Path) -> str:
 
 
 def _export(folder: Path, extras: list[str]) -> dict[str, str]:
-    """Return requirements with hashes, by what stands before their hashes."""
+    """Return the requirements with hashes, by the part before the hashes."""
     text = _uv(
         "export",
         "--quiet",
@@ -164,7 +164,7 @@ def _systems_without_wheels(requirements: dict[str, str], packages: dict) -> Ite
 
 
 def _download(requirements: dict[str, str], packages: dict) -> int:
-    """Return the bytes that the system with the largest files downloads."""
+    """Return the bytes to download on the system with the largest files."""
 
     def size(system: str) -> int:
         needed = filter(None, (_needed(key, system, USUAL_PYTHON) for key in requirements))
@@ -175,7 +175,7 @@ def _download(requirements: dict[str, str], packages: dict) -> int:
 
 
 def _disk(path: Path, target: Path) -> int:
-    """Return the bytes that an installation takes, on Linux with an Intel processor."""
+    """Return the bytes of an installation on Linux with an Intel processor."""
     _uv(
         *(
             "pip",

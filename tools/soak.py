@@ -1,13 +1,13 @@
-"""Prove what takes long to prove: run the parts one after the other, and print a table.
+"""Run the long tests part by part, and print a table.
 
-    make soak                    all of it, some two hours
-    make soak QUICK=1            a glance at each part
-    make soak SECONDS=60         parts that go on for a time go on for so long
+    make soak                    everything, about two hours
+    make soak QUICK=1            a short version of each part
+    make soak SECONDS=60         parts with a duration take this long
     make soak PARTS="cuts idle"  some of the parts
 
 A part is a command that prints a line "PART: figures" (or several, such as "PART-json: ...") and
-fails by its exit status. GYM_SOAK_SERVER has more options for the servers of clients, soak and
-idle, such as "--isolate all".
+fails by its exit status. GYM_SOAK_SERVER has options for the servers of clients, soak and idle,
+such as "--isolate all".
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Part(NamedTuple):
     """One part.
 
     Attributes:
-        command: what is run.
-        where: the folder in which.
-        variables: what is added to the environment.
-        is_here: whether there is anything to run.
+        command: the command.
+        where: the folder to run it in.
+        variables: additional environment variables.
+        is_here: whether it can run here.
     """
 
     command: list[str]
@@ -43,20 +43,20 @@ class Part(NamedTuple):
 
 
 def python(name: str, *arguments: object) -> Part:
-    """Return a part that is a script in Python."""
+    """Return a part that is a Python script."""
     script = SOAK / f"{name}.py"
     return Part([sys.executable, str(script), *map(str, arguments)], is_here=script.exists())
 
 
 def r(name: str, *arguments: object) -> Part:
-    """Return a part that is a script in R."""
+    """Return a part that is an R script."""
     script = SOAK / f"{name}.R"
     command = ["Rscript", "--no-init-file", str(script), *map(str, arguments)]
     return Part(command, is_here=script.exists())
 
 
 def pytest(test: str, **variables: object) -> Part:
-    """Return a part that is tests of the server's, at greater length."""
+    """Return a part that runs tests of the server in their long version."""
     how = ("-q", "--color=no", "-p", "no:cacheprovider")
     return Part(
         [sys.executable, "-m", "pytest", *how, *test.split()],
@@ -66,7 +66,7 @@ def pytest(test: str, **variables: object) -> Part:
 
 
 def testthat(name: str, **variables: object) -> Part:
-    """Return a part that is one of the package's test files, at greater length."""
+    """Return a part that runs a test file of the package in its long version."""
     test = (
         "library(testthat); library(gym); "
         f"test_file('tests/testthat/test-{name}.R', package = 'gym', "
@@ -80,7 +80,7 @@ def testthat(name: str, **variables: object) -> Part:
 
 
 def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
-    """Return the parts by their names."""
+    """Return the parts by name."""
 
     def lasting(long: float, short: float) -> float:
         return seconds or (short if quick else long)
@@ -119,7 +119,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
 
 
 def run(name: str, part: Part) -> tuple[str, list[str]]:
-    """Run a part; return how it went and its figures."""
+    """Run a part; return the result and its figures."""
     if not part.is_here:
         return "MISSING", []
     process = subprocess.Popen(
@@ -140,13 +140,13 @@ def run(name: str, part: Part) -> tuple[str, list[str]]:
             figures.append(found[1])
         elif re.match(r"\d+ (passed|failed|skipped|error)\b.* in [\d.]+s", line):
             tests = line.strip()
-    # A test that was skipped has shown nothing.
+    # A skipped test proves nothing.
     held = process.wait() == 0 and (not tests or "passed" in tests)
     return "held" if held else "FAILED", figures or [tests]
 
 
 def main() -> int:
-    """Run what was asked for; return the exit status."""
+    """Run the requested parts; return the exit status."""
     options = argparse.ArgumentParser()
     options.add_argument("--quick", action="store_true")
     options.add_argument("--seconds", type=float)

@@ -1,4 +1,4 @@
-"""Python's own loop over one environment: the yardstick of rollout()."""
+"""Python's own loop over one environment, the reference for rollout()."""
 
 from collections.abc import Callable
 from functools import cache
@@ -24,7 +24,7 @@ def count_steps(env_id: str, policies: list[Callable], episodes: int) -> int:
 
 
 def make_policies(env_id: str, kind: str, file: str, outputs: int, number: int) -> list[Callable]:
-    """Make some policies, whose numbers stand in the file one after the other."""
+    """Make policies whose numbers are in a file, one after another."""
     env = _environment(env_id)
     return [_policy(env, kind, part, outputs) for part in np.array_split(np.fromfile(file), number)]
 

@@ -1,6 +1,6 @@
-"""The contender Python: loops in process, in the Python of the server.
+"""The contender Python: loops in process, in the server's Python.
 
-Reads one line a turn and answers with one, env steps a second (or what was asked for):
+Reads a line per request and answers with one, env steps per second (or the requested value):
 
     versions                       as JSON
     single SECONDS
@@ -25,7 +25,7 @@ from episodes import count_steps, make_policies
 
 
 def single(seconds: str) -> float:
-    """Play one environment, one step after the other."""
+    """Play one environment, step by step."""
     env = _single_env()
     env.reset()
     steps = 0
@@ -42,7 +42,7 @@ def single(seconds: str) -> float:
 
 
 def vector(seconds: str, number: str, mode: str) -> float:
-    """Play a vector of environments."""
+    """Play a vector environment."""
     envs = _vector_env(int(number), mode)
     actions = [(np.arange(int(number)) + i) % 2 for i in range(2)]
     steps = 0
@@ -57,7 +57,7 @@ def vector(seconds: str, number: str, mode: str) -> float:
 
 
 def episodes(env_id: str, kind: str, file: str, outputs: str, policies: str, number: str) -> float:
-    """Play whole episodes in one environment, one after the other."""
+    """Play whole episodes in one environment, one after another."""
     played = make_policies(env_id, kind, file, int(outputs), int(policies))
     started = time.perf_counter()
     steps = count_steps(env_id, played, int(number))
@@ -79,7 +79,7 @@ def _vector_env(number: int, mode: str) -> gymnasium.vector.VectorEnv:
 
 
 def versions() -> dict:
-    """Tell the versions of Python and of what the server needs, its HTTP server among them."""
+    """Return the versions of Python and the server's dependencies, including its HTTP server."""
     needed = [
         re.match(r"[\w.-]+", requirement).group()
         for requirement in metadata.requires("gym-server")

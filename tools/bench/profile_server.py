@@ -1,13 +1,13 @@
-"""Times one single step beyond R: on the wire, in the server, in Gymnasium, in microseconds.
+"""Time a single step outside R: on the wire, in the server, in Gymnasium, in microseconds.
 
-Reads one line a question and answers with one, in JSON.  PAUSE is how long R is at work between
-two requests, in microseconds: code that was asleep meanwhile is slower than in a busy loop.
+Reads a line per question and answers with a line of JSON. PAUSE is how long R works between two
+requests, in microseconds: code that has slept is slower than in a busy loop.
 
-    record URL             the address of a proxy to the server at URL, which records
-    recorded               the last request and answer, base64
-    round_trip PAUSE URL   the recorded step over a plain socket, each with a key of its own
-    echo PAUSE             as many bytes to another process and back
-    application PAUSE      the recorded step given to the WSGI application, and parts of that
+    record URL             the address of a recording proxy to the server at URL
+    recorded               the last request and response, base64
+    round_trip PAUSE URL   the recorded step over a plain socket, each with its own key
+    echo PAUSE             the same number of bytes to another process and back
+    application PAUSE      the recorded step passed to the WSGI application, and parts of that
 """
 
 import base64
@@ -41,7 +41,7 @@ def timed(
     wait: Callable[[], object],
     reset: Callable[[], object] = lambda: None,
 ) -> float:
-    """Return the median over episodes of the microseconds that a step takes after a wait."""
+    """Return the median over episodes of the microseconds of a step after a pause."""
     taken = []
     for _ in range(_EPISODES):
         reset()
@@ -67,7 +67,7 @@ def _work(pause: str) -> Callable[[], None]:
 
 
 def record(url: str) -> str:
-    """Start a proxy that keeps the last request and answer."""
+    """Start a proxy that keeps the last request and response."""
     listener = socket.create_server(("127.0.0.1", 0))
     threading.Thread(target=_forward, args=(listener, url), daemon=True).start()
     return f"http://127.0.0.1:{listener.getsockname()[1]}"
@@ -108,7 +108,7 @@ def round_trip(pause: str, url: str) -> float:
 
 
 def echo(pause: str) -> float:
-    """Send as many bytes as a step has to a process that answers with as many as the server."""
+    """Send as many bytes as a step to a process that answers with as many as the server."""
     request, answer = _recorded["request"], _recorded["answer"]
     script = (
         "import socket; s = socket.create_server(('127.0.0.1', 0));"
@@ -132,7 +132,7 @@ def echo(pause: str) -> float:
 
 
 def application(pause: str) -> dict[str, float]:
-    """Give the recorded step to an application in this process."""
+    """Pass the recorded step to an application in this process."""
     requests = _requests()
     body = requests(1).split(b"\r\n\r\n", 1)[1]
     answer = json.loads(_recorded["answer"].split(b"\r\n\r\n", 1)[1])
@@ -186,9 +186,9 @@ def _environ(path: str, headers: dict[str, str], body: bytes) -> dict:
 
 
 def _requests() -> Callable[[int], bytes]:
-    """Return a function that gives the recorded step again, each with a key of its own."""
+    """Return a function that returns the recorded step, each with its own key."""
     steps = [_as_step(action) for action in range(2)]
-    # Numbers count for each key, and here they begin anew.
+    # Each key has its own numbers, and here they start again.
     key = b"%08x" % random.getrandbits(32)
     steps = [re.sub(rb'("key":")\w{8}', rb"\g<1>" + key, step) for step in steps]
     numbers = iter(range(1000, 10000))

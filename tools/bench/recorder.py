@@ -1,10 +1,10 @@
-"""Stands between a client and a server, and keeps the client's last request.
+"""A proxy between a client and a server that keeps the client's last request.
 
-    recorder.py PORT    of the server on this machine
+    recorder.py PORT    the port of the server on this machine
 
-Reads one line a turn and answers with one:
+Reads a line per question and answers with one:
 
-    port    where it listens
+    port    the port that it listens on
     last    the last request: its head as text, its body in base64
 """
 
@@ -20,7 +20,7 @@ last: dict[str, bytes] = {}
 
 
 def listen() -> None:
-    """Serve each connection in threads of its own."""
+    """Serve each connection in its own threads."""
     while True:
         client, _ = listener.accept()
         server = socket.create_connection(("127.0.0.1", server_port))
@@ -29,7 +29,7 @@ def listen() -> None:
 
 
 def forward_requests(client: socket.socket, server: socket.socket) -> None:
-    """Hand on request after request, each as a whole."""
+    """Forward requests, each as a whole."""
     with client.makefile("rb") as lines:
         while head := read_head(lines):
             body = lines.read(length_of(head))
@@ -39,7 +39,7 @@ def forward_requests(client: socket.socket, server: socket.socket) -> None:
 
 
 def forward_answers(server: socket.socket, client: socket.socket) -> None:
-    """Hand on bytes as they come."""
+    """Forward bytes as they come."""
     while data := server.recv(2**16):
         client.sendall(data)
 
@@ -55,13 +55,13 @@ def read_head(lines) -> bytes:
 
 
 def length_of(head: bytes) -> int:
-    """Tell the length of the body that follows a head."""
+    """Return the length of the body that follows a head."""
     fields = dict(line.lower().split(b":", 1) for line in head.split(b"\r\n")[1:] if line)
     return int(fields.get(b"content-length", 0))
 
 
 def last_request() -> dict:
-    """Give the last request as JSON can hold it."""
+    """Return the last request as JSON values."""
     return {
         "head": last["head"].decode("latin-1"),
         "body": base64.b64encode(last["body"]).decode(),

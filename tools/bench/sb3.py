@@ -1,9 +1,8 @@
-"""Trains PPO by Stable-Baselines3, one thread, for the bench.
+"""Train PPO by Stable-Baselines3 in one thread, for the benchmark.
 
-Each line of the input is a JSON object with the settings of one training; the answer is a line with
-the processor's seconds that learning took, the steps, and whether the rule to stop was met: that
-the
-last 100 episodes of the training have at least a mean return.
+Each line of the input is a JSON object with the settings of one training. The answer is a line with
+the processor seconds of learning, the steps, and whether the stopping rule was met: the last 100
+training episodes have at least a mean return.
 """
 
 import json
@@ -21,7 +20,7 @@ torch.set_num_threads(1)
 
 
 class UntilTarget(BaseCallback):
-    """Ends where the last 100 episodes have a mean return of at least the target."""
+    """Stops when the mean return of the last 100 episodes reaches the target."""
 
     def __init__(self, target):
         super().__init__()
@@ -37,13 +36,13 @@ class UntilTarget(BaseCallback):
 
 
 def linear(first):
-    """Make a schedule that ends at 0."""
+    """Return a schedule that decreases to 0."""
     return lambda left: left * first
 
 
 def train(task):
-    """Train once and tell what it took."""
-    # make_vec_env() would ask some environments for a picture of each step.
+    """Train once and return the figures."""
+    # make_vec_env() would make some environments draw each step.
     envs = DummyVecEnv([lambda: Monitor(gymnasium.make(task["env_id"]))] * task["num_envs"])
     schedule = linear if task["linear"] else float
     model = PPO(

@@ -1,6 +1,6 @@
 """A proxy that delays each message: python slow_proxy.py SERVER_PORT SECONDS; prints its port.
 
-Half of the delay comes before a message is passed on to the server, half before the answer is.
+Half of the delay comes before a request is forwarded, and half before its response is.
 """
 
 import asyncio

@@ -1,8 +1,8 @@
-"""Makes tests/testthat/gradient_updates.json: ten updates of PPO and of DQN on stored data.
+"""Make tests/testthat/gradient_updates.json: ten updates of PPO and of DQN on stored data.
 
-Each was made twice: by Stable-Baselines3's own PPO.train() and DQN.train(), with networks of
-doubles, and by the NumPy code below, which knows nothing of torch and has double DQN as well. The
-script fails where the two differ. test-agent-gradient-updates.R compares the agents with both.
+Each is made twice: by Stable-Baselines3's PPO.train() and DQN.train() with double precision, and by
+the NumPy code below, which does not use torch and also has double DQN. The script fails if the two
+differ. test-agent-gradient-updates.R compares the agents with both.
 
     python3 -m venv sb3 && sb3/bin/pip install stable-baselines3==2.9.2
     sb3/bin/python tools/learn/updates.py
@@ -35,15 +35,15 @@ rng = np.random.default_rng(40)
 
 
 class InDoubles(FlattenExtractor):
-    """Stable-Baselines3 hands observations to the networks in single precision."""
+    """Keeps double precision: Stable-Baselines3 passes observations in single precision."""
 
     def forward(self, observations):
-        """Flatten, as it is done there, and widen."""
+        """Flatten as the base class does, and convert to double precision."""
         return super().forward(observations).double()
 
 
 class Nothing(gymnasium.Env):
-    """An environment that only has spaces."""
+    """An environment that has only spaces."""
 
     def __init__(self, observation_space, action_space):
         self.observation_space = observation_space
@@ -56,7 +56,7 @@ def box(size, bound=np.inf):
 
 
 def coarse(values):
-    """Round to numbers that single precision has, too, and that are short in a file."""
+    """Round to numbers that single precision can represent, and that are short in a file."""
     return np.round(values * 256) / 256
 
 
@@ -70,7 +70,7 @@ def draw_weights(sizes):
 
 
 def vector(layers, extra=()):
-    """In the order of coef(): layer after layer, each matrix column after column."""
+    """Return weights in the order of coef(): layer after layer, each matrix column by column."""
     return [float(x) for x in np.concatenate([*(w.ravel("F") for w in layers), extra])]
 
 
@@ -95,7 +95,7 @@ SLOPE = {"tanh": lambda y: 1 - y**2, "ReLU": lambda y: (y > 0).astype(float)}
 
 
 def forward(layers, observations, activation):
-    """What comes into each layer, with its constant 1, and the outputs."""
+    """Return the inputs of each layer, with their constant 1, and the outputs."""
     seen, signal = [], observations
     for number, weights in enumerate(layers):
         seen.append(np.column_stack([signal, np.ones(len(signal))]))
@@ -106,7 +106,7 @@ def forward(layers, observations, activation):
 
 
 def backward(layers, seen, outputs, activation):
-    """The gradients of the weights, given that of the outputs."""
+    """Return the gradients of the weights, given that of the outputs."""
     gradients, back = [], outputs
     for number in reversed(range(len(layers))):
         gradients.insert(0, back.T @ seen[number])
@@ -117,14 +117,14 @@ def backward(layers, seen, outputs, activation):
 
 
 class Adam:
-    """Kingma and Ba (2015), algorithm 1, after a cut of the gradient's norm."""
+    """Kingma and Ba (2015), algorithm 1, after clipping the norm of the gradient."""
 
     def __init__(self, learning_rate, eps, max_norm):
         self.learning_rate, self.eps, self.max_norm = learning_rate, eps, max_norm
         self.count, self.first, self.second, self.norms = 0, 0.0, 0.0, []
 
     def step(self, gradients):
-        """Return what is added to the weights."""
+        """Return the change of the weights."""
         flat = np.concatenate([g.ravel() for g in gradients])
         self.norms.append(float(np.sqrt(flat @ flat)))
         flat = flat * min(1.0, self.max_norm / (self.norms[-1] + 1e-6))
@@ -182,7 +182,7 @@ def numpy_ppo(case, policy, value, log_std):
         policy = [w + c for w, c in zip(policy, changes, strict=False)]
         value = [w + c for w, c in zip(value, changes[len(policy) :], strict=True)]
         after.append(vector(policy, () if log_std is None else log_std) + vector(value))
-    # Each rule had something to do, and not everywhere.
+    # Each rule was applied, but not everywhere.
     assert 0 < clipped < len(observations) * UPDATES / 2, clipped
     assert min(adam.norms) < case["max_grad_norm"] < max(adam.norms), adam.norms
     return after
@@ -226,7 +226,7 @@ def numpy_dqn(case, values):
 
 
 def permutations(seed, rows, count):
-    """Draw the orders that the same seed gives Stable-Baselines3."""
+    """Draw the orders that the same seed gives in Stable-Baselines3."""
     np.random.seed(seed)
     return [np.random.permutation(rows) for _ in range(count)]
 
@@ -330,7 +330,7 @@ def sb3_dqn(case, values):
 
 
 def ppo_case(discrete, seed):
-    """Draw what an iteration of PPO might have, and update by it."""
+    """Draw the data of an iteration of PPO, and update with it."""
     rows, batch, epochs = 40, 20, 5
     sizes = [4, 5, 3, 2]
     policy, value = draw_weights(sizes), draw_weights([4, 4, 3, 1])
@@ -371,14 +371,14 @@ def ppo_case(discrete, seed):
 
 
 def drawn_by_r(seed, rows, batch):
-    """Return the rows that agent_dqn() draws after set.seed(), which R has to say."""
+    """Ask R for the rows that agent_dqn() draws after set.seed()."""
     script = f"set.seed({seed}); cat(sample.int({rows}, {batch * UPDATES}, replace = TRUE) - 1L)"
     said = subprocess.run(["Rscript", "-e", script], capture_output=True, check=True, text=True)
     return np.array(said.stdout.split(), dtype=int).reshape(UPDATES, batch).tolist()
 
 
 def dqn_case(seed, *, tau, target_every, max_grad_norm, double=False):
-    """Draw what a memory of DQN might have, and update by it."""
+    """Draw the memory of a DQN agent, and update with it."""
     rows, batch = 40, 16
     sizes = [4, 4, 4, 3]
     values = draw_weights(sizes)

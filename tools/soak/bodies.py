@@ -1,8 +1,8 @@
-"""Bodies that are sent in part, or in tiny pieces, and then nothing: what others get beside them.
+"""Incomplete bodies, and bodies in tiny pieces: how other clients fare meanwhile.
 
     tools/in-env python tools/soak/bodies.py [TIMES]
 
-First one after the other, in chunks of two bytes; then many at once that lack their last byte.
+First one after another, in chunks of two bytes; then many at once without their last byte.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ MEGABYTE = 2**20
 BODY = 16 * MEGABYTE
 CHUNKS = b"2\r\nab\r\n" * 2**14
 HELD_SECONDS = 10
-# Longer than the server waits to give back what is free.
+# Longer than the server waits before it returns free memory.
 AFTER_SECONDS = 45
 
 
 def tiny_chunks(port: int, times: int) -> None:
-    """Send nearly as much as is allowed, two bytes at a time, and leave; several times."""
+    """Send nearly the allowed size, two bytes at a time, and disconnect; several times."""
     for _ in range(times):
         with _connect(port) as one, contextlib.suppress(ConnectionError):
             one.sendall(HEAD + b"Transfer-Encoding: chunked\r\n\r\n")
@@ -35,7 +35,7 @@ def tiny_chunks(port: int, times: int) -> None:
 
 
 def half_sent(port: int, times: int) -> None:
-    """Send all but the last byte of many bodies, wait, and leave."""
+    """Send all but the last byte of many bodies, wait, and disconnect."""
     crowd = [_connect(port) for _ in range(6 * times)]
     for one in crowd:
         one.sendall(HEAD + b"Content-Length: %d\r\n\r\n" % BODY)

@@ -1,4 +1,4 @@
-"""Another client of a server that is treated badly: how long its answers take meanwhile."""
+"""Another client of a server under attack: how long its responses take."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _TIMEOUT_SECONDS = 10.0
 
 
 class Bystander:
-    """Steps on a connection that it keeps, and asks on new ones, until ``stop()``."""
+    """Steps on a kept connection, and sends requests on new ones, until ``stop()``."""
 
     def __init__(self, port: int, token: str | None = None) -> None:
-        """Make an environment and begin to play.
+        """Make an environment and start to play.
 
         Args:
-            port: the server's.
-            token: the server's, too.
+            port: the server's port.
+            token: the server's token.
         """
         self._new = lambda: Client(port, _TIMEOUT_SECONDS, token)
         self._player = self._new()
@@ -60,10 +60,10 @@ class Bystander:
             self._player.post(f"{self._url}/reset/")
 
     def figures(self) -> tuple[str, float, int]:
-        """Return what was measured since the last call.
+        """Return the measurements since the last call.
 
         Returns:
-            The figures in words, the slowest answer in seconds, and how many did not come.
+            The figures in words, the slowest response in seconds, and the number of missing ones.
         """
         seconds, self._seconds = self._seconds, {name: [] for name in self._seconds}
         failed, self._failed = self._failed, 0
@@ -79,7 +79,7 @@ class Bystander:
         )
 
     def stop(self) -> None:
-        """Play no more."""
+        """Stop playing."""
         self._stopped.set()
         self._thread.join()
         self._player.close()

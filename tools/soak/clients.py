@@ -1,9 +1,9 @@
-"""R and Python clients at once, and whether each of their trajectories is Gymnasium's own.
+"""R and Python clients at once, whose trajectories must all equal Gymnasium's.
 
     tools/in-env python tools/soak/clients.py [CLIENTS [STEPS]]
 
-All play at the same time on one server; what they saw is compared with the same environments
-played in this process, number by number.
+All play at the same time on one server. Their observations are compared, number by number, with
+the same environments played in this process.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ HERE = Path(__file__).parent
 
 SEEN = ("observation", "reward", "terminated", "truncated")
 
-# Sub-environments come as tensors, and so do the observations of all that R plays.
+# Sub-environments use tensors, and so do all observations in R.
 KINDS = [
     {"env_id": "CartPole-v1"},
     {"env_id": "Pendulum-v1"},
@@ -38,7 +38,7 @@ KINDS = [
 
 
 def plan(number: int, steps: int, folder: Path) -> dict:
-    """Write down what one client plays; two that follow each other play the same, R and Python."""
+    """Write the task of one client; pairs of an R and a Python client play the same."""
     kind = KINDS[number // 2 % len(KINDS)]
     num_envs = kind.get("num_envs", 1)
     rng = np.random.default_rng(number)
@@ -47,7 +47,7 @@ def plan(number: int, steps: int, folder: Path) -> dict:
     actions = (
         rng.uniform(-2, 2, (steps, num_envs)) if box else rng.integers(0, 2, (steps, num_envs))
     )
-    # As the server has them, which rounds to the action space's dtype.
+    # As on the server, which rounds to the dtype of the action space.
     actions = actions.astype(np.float32 if box else np.int64).astype(np.float64)
     env.close()
     actions.tofile(folder / f"{number}.actions")
@@ -58,11 +58,11 @@ def plan(number: int, steps: int, folder: Path) -> dict:
 
 
 def play_here(task: dict) -> np.ndarray:
-    """Return what is to be seen, from Gymnasium in this process."""
+    """Return the expected values, from Gymnasium in this process."""
     num_envs, box = task["actions_a_step"], task["box"]
     vector = "num_envs" in task
     if vector:
-        # As the server chooses: the environment's own class where it has one.
+        # As the server chooses: the environment's own class if it has one.
         own = gymnasium.spec(task["env_id"]).vector_entry_point is not None
         mode = "vector_entry_point" if own else "sync"
         env = gymnasium.make_vec(task["env_id"], num_envs=num_envs, vectorization_mode=mode)
@@ -85,7 +85,7 @@ def play_here(task: dict) -> np.ndarray:
 
 
 def play_there(port: int, task: dict) -> None:
-    """Play over HTTP, as this client would."""
+    """Play over HTTP like this client."""
     num_envs, box = task["actions_a_step"], task["box"]
     client = Client(port)
     fields = {name: task[name] for name in ("env_id", "num_envs") if name in task}
@@ -117,7 +117,7 @@ def _numbers(dtype: str, shape: list[int], data: bytes) -> np.ndarray:
 
 
 def start(number: int, port: int, folder: Path) -> subprocess.Popen:
-    """Start one client: every other one is R."""
+    """Start one client; every other one is R."""
     task = folder / f"{number}.json"
     if number % 2:
         command = [sys.executable, __file__, "play", str(port), str(task)]

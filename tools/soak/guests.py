@@ -1,11 +1,11 @@
-"""A guest who takes all that one creation can give, beside a client that plays.
+"""A client that creates the most expensive things allowed, while another one plays.
 
     tools/in-env python tools/soak/guests.py PART [ROUNDS]
 
-PART is "memory" (wrappers in one another, a map of a million fields), "loops" (repeats and numbers
-that make a step without an end) or "processes" (creations of 64 processes each). Another client
-plays before, meanwhile and afterwards; what the server holds is printed each time. Each load ends
-after its rounds, or after a minute.
+PART is "memory" (nested wrappers, a map with a million fields), "loops" (repeats and numbers that
+make endless steps) or "processes" (creations of 64 processes each). Another client plays before,
+meanwhile and afterwards, and the server's usage is printed each time. Each load ends after its
+rounds, or after a minute.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from serving import Client, RefusedError, ServerProcess
 MOST_SECONDS = 60
 GUESTS = 4
 
-# What the server grants at its default limits, beside itself.
+# The server's default limit for environments.
 MOST_PROCESSES = 128
 MOST_MB = 4096
 
@@ -32,7 +32,7 @@ ENDLESS = {"max_episode_steps": 10**15}
 
 
 class Player:
-    """Another client, and how long its answers take."""
+    """Another client, and how long its responses take."""
 
     def __init__(self, port: int) -> None:
         self._client = Client(port)
@@ -41,7 +41,7 @@ class Player:
         self._client.post(f"{self._url}/reset/", seed=1)
 
     def play(self, seconds: float, until=lambda: False) -> list[float]:
-        """Play for some seconds; return those of each answer."""
+        """Play for some seconds; return the duration of each response."""
         took: list[float] = []
         end = time.monotonic() + seconds
         while time.monotonic() < end and not until():
@@ -55,7 +55,7 @@ class Player:
 
 
 def ask(client: Client, granted: list[str], path: str, **fields: object) -> dict | None:
-    """Ask for something; return the answer, or None where it was refused."""
+    """Send a request; return the response, or None if it was refused."""
     try:
         answer = client.post(path, **fields)
     except RefusedError as refusal:
@@ -67,7 +67,7 @@ def ask(client: Client, granted: list[str], path: str, **fields: object) -> dict
 
 
 def memory(port: int, granted: list[str]) -> None:
-    """Ask for gigabytes."""
+    """Request gigabytes."""
     client = Client(port)
     ask(client, granted, "/v1/envs/", env_id="CartPole-v1", wrappers=STACKS)
     fields = {"desc": ["S" * 1000] * 1000}
@@ -77,25 +77,25 @@ def memory(port: int, granted: list[str]) -> None:
 
 
 def loops(port: int, granted: list[str]) -> None:
-    """Ask for steps without an end."""
+    """Request endless steps."""
     client = Client(port)
     fields = {"env_id": "CartPole-v1", "kwargs": ENDLESS, "wrappers": REPEATS}
     created = ask(client, granted, "/v1/envs/", **fields)
     if created is not None:
         ask(client, granted, f"/v1/envs/{created['instance_id']}/reset/")
         ask(client, granted, f"/v1/envs/{created['instance_id']}/step/", action=1)
-    # An angle that Acrobot turns back by one round after the other.
+    # Acrobot turns this angle back one round at a time.
     url = f"/v1/envs/{client.post('/v1/envs/', env_id='Acrobot-v1')['instance_id']}"
     if ask(client, granted, f"{url}/reset/", options={"low": 1e17, "high": 1.1e17}):
         ask(client, granted, f"{url}/step/", action=0)
-    # What is not known is broken off when it is given up.
+    # An abandoned creation is interrupted.
     spinning = {"env_id": "faulty_envs:Spins-v0", "kwargs": {"where": "init"}}
     ask(client, granted, "/v1/envs/", **spinning)
     client.close()
 
 
 def processes(port: int, granted: list[str]) -> None:
-    """Ask for many processes, and keep them."""
+    """Request many processes, and keep them."""
     client = Client(port)
     fields = {"num_envs": 64, "num_workers": 64}
     ask(client, granted, "/v1/envs/", env_id="CartPole-v1", **fields)
@@ -107,7 +107,7 @@ PARTS = {"memory": memory, "loops": loops, "processes": processes}
 
 def main(name: str, rounds: int) -> int:
     """Run a part; return the exit status."""
-    # Loops are given up within the minute, and in the server's own process.
+    # Loops are abandoned within the minute, in the server's own process.
     loops = ("--max-call-seconds", "10", "--isolate", "none") if name == "loops" else ()
     server = ServerProcess("--log-level", "error", *loops)
     player = Player(server.port)
@@ -137,7 +137,7 @@ def main(name: str, rounds: int) -> int:
     held["most during"] = most
     close_all(server.port)
     player = Player(server.port)
-    # What was closed is gone a moment later.
+    # Closed processes end a moment later.
     time.sleep(5)
     held["after"], took["after"] = server.usage(), player.play(5)
     status = server.stop()
@@ -160,17 +160,17 @@ def close_all(port: int) -> None:
 
 
 def told(seconds: list[float]) -> str:
-    """Return the median and the worst of some seconds in words."""
+    """Return the median and the worst of some durations in words."""
     if not seconds:
         return "none"
     return f"{1000 * statistics.median(seconds):.1f} (worst {1000 * max(seconds):.0f}) ms"
 
 
 def problems(held: dict[str, dict[str, int]]) -> list[bool]:
-    """Tell what did not hold."""
+    """Return whether each limit was broken."""
     before, most, after = (held[when] for when in ("before", "most during", "after"))
     return [
-        # The server, its helpers, and what is granted; each process has memory of its own.
+        # The server, its helpers, and the granted processes, which have memory of their own.
         most["processes"] > before["processes"] + MOST_PROCESSES + 4,
         most["MB"] > before["MB"] + MOST_MB + 40 * (most["processes"] - before["processes"]),
         after["processes"] > before["processes"] + 2,

@@ -1,8 +1,8 @@
-"""A thousand connections that say nothing, and a thousand that say half of something.
+"""A thousand idle connections, and a thousand with half a request.
 
     tools/in-env python tools/soak/idle.py [CONNECTIONS]
 
-Health must answer within a second beside them, and a client that plays must get on.
+Meanwhile health must answer within a second, and another client must be able to play.
 """
 
 from __future__ import annotations

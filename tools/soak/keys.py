@@ -1,10 +1,10 @@
-"""Fresh idempotency keys without an end, and whether another client's step is still done once.
+"""Endless fresh idempotency keys must not make another client's step be taken twice.
 
     tools/in-env python tools/soak/keys.py [KEYS]
 
-Four processes send so many keys, a quarter each: to an instance that is not there, in steps that
-are refused, in creations that are closed again, and in the victim's own guessed key with a huge
-number. Then the victim repeats its last creation and its last step, whose answers it never got.
+Four processes send the keys, a quarter each: to an unknown instance, in steps that are refused, in
+creations that are closed again, and in the victim's own guessed key with a huge number. Then the
+victim repeats its last creation and its last step, whose responses it never got.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ GUESSED = "guessed"
 
 
 class Caller(Client):
-    """A client that says itself what its requests are called."""
+    """A client that sets its own idempotency keys."""
 
     def call(self, path: str, key: str, number: int, **fields: object) -> dict | bytes | None:
-        """Make a call with an idempotency key; return None where it was refused."""
+        """Make a call with an idempotency key; return None if it is refused."""
         self._key, self._number = key, number
         fields["request"] = {"key": key, "number": number}
         try:

@@ -1,4 +1,4 @@
-"""A server to try things on, a client that speaks to it, and what the system says of it."""
+"""A server to test, a client for it, and its use of resources."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ SERVER = Path(__file__).resolve().parents[2] / "inst" / "server"
 
 
 class ServerProcess:
-    """A server of its own; it ends with this process, however that ends."""
+    """A server of its own that ends with this process, however that ends."""
 
     def __init__(self, *arguments: str, **variables: str) -> None:
-        """Start it, with more environment variables, and wait until it takes connections."""
+        """Start it, with additional environment variables, and wait until it listens."""
         self.process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "gym_server", "--port", "0", "--stop-on-stdin-eof"),
                 *("--allow-module", "faulty_envs", *arguments),
-                # For a soak of another kind: GYM_SOAK_SERVER="--isolate all".
+                # For another kind of soak test: GYM_SOAK_SERVER="--isolate all".
                 *shlex.split(os.environ.get("GYM_SOAK_SERVER", "")),
             ],
             stdin=subprocess.PIPE,
@@ -42,7 +42,7 @@ class ServerProcess:
         self.pid = self.process.pid
 
     def stop(self) -> int:
-        """Stop it by the end of its standard input; return its exit status."""
+        """Stop it by closing its standard input; return its exit status."""
         self.process.stdin.close()
         try:
             return self.process.wait(30)
@@ -51,7 +51,7 @@ class ServerProcess:
             return -9
 
     def usage(self) -> dict[str, int]:
-        """Return memory in MB, threads and open files, of its worker processes too."""
+        """Return memory in MB, threads and open files, including its worker processes."""
         pids = [self.pid, *_descendants(self.pid)]
         return {
             "MB": sum(map(_kilobytes, pids)) // 1024,
@@ -62,7 +62,7 @@ class ServerProcess:
 
 
 def allow_many_open_files(most: int = 16384) -> None:
-    """Let this process open many connections; call it after a server's start, which has its own."""
+    """Let this process open many connections; call it after starting a server."""
     try:
         import resource
     except ImportError:
@@ -74,7 +74,7 @@ def allow_many_open_files(most: int = 16384) -> None:
 def _descendants(pid: int) -> list[int]:
     found: list[int] = []
     for path in Path(f"/proc/{pid}/task").glob("*/children"):
-        # A thread may have ended meanwhile.
+        # The thread may have ended.
         with contextlib.suppress(OSError):
             found += map(int, path.read_text().split())
     return found + [one for child in found for one in _descendants(child)]
@@ -96,7 +96,7 @@ def _count(pid: int, what: str) -> int:
 
 
 class RefusedError(Exception):
-    """An answer that is none of the good ones."""
+    """A response with an error status."""
 
     def __init__(self, status: int, body: dict) -> None:
         super().__init__(f"{status} {body}")
@@ -113,11 +113,11 @@ class Client:
         self._key, self._number = uuid.uuid4().hex, 0
 
     def close(self) -> None:
-        """Leave."""
+        """Disconnect."""
         self._connection.close()
 
     def get(self, path: str) -> dict | bytes:
-        """Return the JSON of an answer, or its bytes where it is none."""
+        """Return the JSON of a response, or its bytes if it is not JSON."""
         return self._call("GET", path, None, {})
 
     def post(self, path: str, **fields: object) -> dict:
@@ -127,7 +127,7 @@ class Client:
         return self._call("POST", path, json.dumps(fields), {})
 
     def post_for_tensors(self, path: str, **fields: object) -> dict:
-        """Make a numbered call; return the tensors of its answer by name, as bytes."""
+        """Make a numbered call; return the tensors of its response by name, as bytes."""
         self._number += 1
         fields["request"] = {"key": self._key, "number": self._number}
         accept = {"Accept": "application/x-safetensors"}

@@ -1,10 +1,10 @@
-"""Days of use in half an hour: clients that come, play, look, go, and some that are killed.
+"""Days of use in half an hour: clients that connect, play, look, leave, or are killed.
 
     tools/in-env python tools/soak/soak.py [SECONDS]
 
-Eight at a time, two of them R; one in ten is killed at a random moment. What the server holds is
-printed at the beginning, six times on the way, and at the end, when it has had the time to close
-what nobody uses (--idle-minutes).
+Eight at a time, two of them R; one in ten is killed at a random moment. The server's usage is
+printed at the start, six times during the test, and at the end, after it has had the time to close
+unused instances (--idle-minutes).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def live(port: int, seed: int, seconds: float) -> None:
 
 
 def step(client: Client, url: str, kind: dict, rng: random.Random) -> None:
-    """Step once, and again reset what has ended."""
+    """Step once, and sometimes reset ended sub-environments."""
     num_envs = kind.get("num_envs")
     if "Pendulum" in kind["env_id"]:
         action: object = [[rng.uniform(-2, 2)] for _ in range(num_envs)]
@@ -66,7 +66,7 @@ def step(client: Client, url: str, kind: dict, rng: random.Random) -> None:
 
 
 def look(client: Client, url: str, rng: random.Random) -> None:
-    """Do what people do beside playing."""
+    """Do what people do besides playing."""
     assert client.get(f"{url}/")["instance_id"] in url
     assert client.get("/v1/health/")["status"] == "ok"
     assert url.split("/")[3] in client.get("/v1/envs/")["all_envs"]
@@ -90,7 +90,7 @@ def refused(client: Client, status: int, path: str, **fields: object) -> None:
 
 
 class Slot:
-    """A place that one client after the other takes."""
+    """A place for one client after another."""
 
     def __init__(self, port: int, in_r: bool, rng: random.Random) -> None:
         self.port, self.in_r, self.rng = port, in_r, rng
@@ -98,11 +98,11 @@ class Slot:
         self.process: subprocess.Popen | None = None
 
     def turn(self) -> None:
-        """See to the one that is there; let in the next one."""
+        """Check the current client, and start the next one."""
         if self.process is None:
             self._begin()
         elif self.process.poll() is not None:
-            # Those that were killed have a negative status.
+            # Killed clients have a negative status.
             if self.process.returncode != 0 and not self.is_to_be_killed:
                 self.failed += 1
             self._begin()
@@ -124,16 +124,16 @@ class Slot:
         self.lives += 1
 
     def end(self) -> None:
-        """Wait for the last one."""
+        """Wait for the last client."""
         if self.process is not None and self.process.wait() != 0 and not self.is_to_be_killed:
             self.failed += 1
 
 
 def main(seconds: float) -> int:
-    """Soak a server; return the exit status."""
+    """Run the test on a server; return the exit status."""
     reaps = "--idle-minutes" in _help()
     options = ("--idle-minutes", str(IDLE_MINUTES)) if reaps else ()
-    # What environments raise here, they raise on purpose.
+    # Environments raise errors on purpose here.
     server = ServerProcess("--log-level", "error", *options)
     watcher = Client(server.port)
     slots = [Slot(server.port, number < 2, random.Random(number)) for number in range(AT_ONCE)]
@@ -181,8 +181,7 @@ def main(seconds: float) -> int:
         status != 0,
         reaps and grown["environments"] > 0,
         grown["threads"] > 8,
-        # The queues of sub-environments in processes of their own go when Python collects its
-        # garbage.
+        # The queues of sub-environments in processes are freed when Python collects garbage.
         grown["files"] > 32,
         grown["processes"] > 2,
         end["MB"] > 1.25 * warm["MB"] + 20,
@@ -191,7 +190,7 @@ def main(seconds: float) -> int:
 
 
 def _warm_up(client: Client) -> None:
-    """Have everything loaded that the first of each kind loads."""
+    """Load everything that the first of each kind loads."""
     for kind in KINDS:
         url = f"/v1/envs/{client.post('/v1/envs/', **kind)['instance_id']}"
         client.post(f"{url}/reset/", seed=1)

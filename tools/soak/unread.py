@@ -1,10 +1,10 @@
-"""Clients that ask and never read their answers: what others get beside them.
+"""Clients that never read their responses: how other clients fare meanwhile.
 
     tools/in-env python tools/soak/unread.py [CONNECTIONS [SECONDS]]
 
-Without a token on a server that has one, asking for the watch page's files, which are everybody's;
-then on a server without a token, asking for large observations, from another address and from the
-same. Those that are sent away come again.
+First without the token on a server that has one, requesting the watch page's files, which need no
+token; then on a server without a token, requesting large observations, from another address and
+from the same. Clients that are disconnected come again.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from serving import Client, ServerProcess, allow_many_open_files
 
 TOKEN = "correct-horse-battery"
 HOST = "HTTP/1.1\r\nHost: 127.0.0.1\r\n"
-# 11 KB each; the observations of so many sub-environments are 256 KB.
+# 11 KB each. The observations of this many sub-environments are 256 KB.
 PAGE_FILE = f"GET /v1/envs/00000000/watch/watch.js {HOST}\r\n".encode() * 100
 NUM_ENVS = 16384
 RECEIVE_BYTES = 2048
-# Only so many come a second.
+# The limit of new connections per second.
 MOST_A_SECOND = 1000
 
 
 def observations(port: int) -> bytes:
-    """Return requests whose answers are large, and cost the server nearly nothing."""
+    """Return requests with large responses that cost the server little."""
     created = Client(port).post("/v1/envs/", env_id="CartPole-v1", num_envs=NUM_ENVS)
     head = (
         f"POST /v1/envs/{created['instance_id']}/reset/ {HOST}Accept: application/x-safetensors\r\n"
@@ -40,7 +40,7 @@ def observations(port: int) -> bytes:
 
 
 def crowd(port: int, source: str, what: str, number: int, seconds: float) -> None:
-    """Ask on so many connections and read nothing, for some seconds."""
+    """Send requests on many connections and read nothing, for some seconds."""
     allow_many_open_files()
     request = PAGE_FILE if what == "files" else observations(port)
     poll = select.poll()
@@ -77,7 +77,7 @@ def _ask(port: int, source: str, request: bytes) -> socket.socket:
 
 
 def beside(what: str, source: str, token: str | None, number: int, seconds: float) -> bool:
-    """Measure another client before, during and after; return whether it got its answers."""
+    """Measure another client before, during and after; return whether it got its responses."""
     asked = "observations" if token is None else "files"
     server = ServerProcess(**({"GYM_SERVER_TOKEN": token} if token else {}))
     bystander = Bystander(server.port, token)
@@ -108,7 +108,7 @@ def _socket_megabytes() -> int:
 
 
 def main(number: int, seconds: float) -> int:
-    """Run them; return the exit status."""
+    """Run all parts; return the exit status."""
     held = [
         beside("no token", "127.0.0.1", TOKEN, number, seconds),
         beside("other address", "127.0.0.2", None, number, seconds),

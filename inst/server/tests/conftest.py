@@ -27,7 +27,7 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    # In this process, where a test can look inside; test_isolated_instance.py tests the others.
+    # In this process, so that tests can look inside; test_isolated_instance.py tests processes.
     app = create_app(
         Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
     )
@@ -37,7 +37,7 @@ def app(monitor_dir):
 
 @pytest.fixture
 def quick():
-    """Return a function that makes an application with limits of its own."""
+    """Return a function that makes an application with its own limits."""
     apps = []
 
     def quick(isolate="none", **limits):
@@ -54,7 +54,7 @@ def quick():
 
 
 def created(client, env_id="faulty_envs:Counting-v0", **fields):
-    """Make an instance and return the URL of its routes."""
+    """Make an instance, and return its URL."""
     answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
     assert answer.status_code == 200, answer.json
     return f"/v1/envs/{answer.json['instance_id']}"
@@ -67,7 +67,7 @@ def client(app):
 
 @pytest.fixture
 def create(client):
-    """Make an instance and return the URL of its routes."""
+    """Make an instance, and return its URL."""
 
     def create(env_id="CartPole-v1", **fields):
         answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})
@@ -84,7 +84,7 @@ def faulty(create):
 
 @pytest.fixture
 def sub_envs(create):
-    """Make a vector instance of the environment whose infos come and go."""
+    """Make a vector instance of an environment whose infos vary."""
 
     def sub_envs(space="Box", num_envs=3, name="Uneven", longest=4, **fields):
         kwargs = {"space": space, "longest": longest}
@@ -94,9 +94,9 @@ def sub_envs(create):
 
 
 class ServerProcess:
-    """A real server in a process of its own.
+    """A real server in its own process.
 
-    Constants of its modules can have other values, so that nobody waits for them in full:
+    Constants of its modules can be changed, so that tests need not wait for long limits:
     ``limits={"gym_server.cli.main._GRACE_SECONDS": 1}``.
     """
 
@@ -154,7 +154,7 @@ class ServerProcess:
         return f"/v1/envs/{answer['instance_id']}"
 
     def takes_no_more(self):
-        """Tell whether it lets nobody in any more, which is the first thing it does to stop."""
+        """Return whether it accepts no more connections, which is the first step of a stop."""
         try:
             self.socket().close()
         except ConnectionError:
@@ -162,7 +162,7 @@ class ServerProcess:
         return False
 
     def stop(self, how=signal.SIGTERM, timeout=30):
-        """Stop it and return exit status, standard output and standard error."""
+        """Stop it; return exit status, standard output and standard error."""
         if how is not None:
             self.process.send_signal(how)
         output = self.process.communicate(timeout=timeout)
@@ -177,13 +177,13 @@ class ServerProcess:
 
 ON_A_FREE_PORT = ("--port", "0", "--allow-module", "faulty_envs")
 
-# Limits of a server that leaves alone after a second what hangs when it stops.
+# Limits of a server that waits only a second for hanging calls when it stops.
 SHORT_GRACE = {"gym_server.cli.main._GRACE_SECONDS": 1, "gym_server.cli.main._LAST_SECONDS": 1}
 
 
 @pytest.fixture
 def serve():
-    """Start a server on a free port; it is gone when the test is over."""
+    """Start a server on a free port, and stop it after the test."""
     servers = []
 
     def serve(*arguments, **how):
@@ -205,14 +205,14 @@ def _server_of_a_file():
 
 @pytest.fixture
 def shared(_server_of_a_file):
-    """Give a server that all tests of a file use who do not stop it; each finds it empty."""
+    """Return a server that the tests of a file share; it has no instances at the start of each."""
     yield _server_of_a_file
     for instance_id in _server_of_a_file.get("/v1/envs/")[1]["all_envs"]:
         _server_of_a_file.post(f"/v1/envs/{instance_id}/close/")
 
 
 class Gate:
-    """Keeps the environment ``Gated`` from going on until the test lets it."""
+    """Blocks the environment ``Gated`` until the test opens it."""
 
     def __init__(self, directory):
         self._begun, self._open = directory / "begun", directory / "open"
@@ -227,7 +227,7 @@ class Gate:
 
 @pytest.fixture
 def gate(tmp_path):
-    """Give a gate; what still waits at it when the test is over goes on then."""
+    """Return a gate, and open it after the test."""
     directory = tmp_path / "gate"
     directory.mkdir()
     gate = Gate(directory)
@@ -240,7 +240,7 @@ TOKEN = "correct-horse-battery"
 
 @pytest.fixture(scope="session")
 def attacked(tmp_path_factory):
-    """Give one server for all attacks: each finds it as the one before left it."""
+    """Return one server for all attacks."""
     root = tmp_path_factory.mktemp("attacked")
     (root / "models").mkdir()
     (root / "models" / "in.xml").write_text("<mujoco/>")
@@ -259,7 +259,7 @@ def attacked(tmp_path_factory):
 
 @pytest.fixture
 def ask(attacked):
-    """Ask with the token; the server must be as well afterwards as before."""
+    """Send requests with the token; afterwards the server must still be well."""
 
     def ask(method, path, body=None):
         connection = attacked.connect()
@@ -276,7 +276,7 @@ def ask(attacked):
 
 @pytest.fixture
 def eventually():
-    """Wait until something holds."""
+    """Wait until a condition is true."""
 
     def eventually(condition, seconds=10):
         end = time.monotonic() + seconds
@@ -289,7 +289,7 @@ def eventually():
 
 @pytest.fixture
 def watch(app):
-    """Return the instance of a URL and a function that counts what is drawn of it."""
+    """Return the instance of a URL, and a function that counts its frames."""
 
     def watch(url):
         instance = app._instances.get(url.rsplit("/", 1)[1])

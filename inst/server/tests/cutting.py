@@ -1,9 +1,9 @@
 """Connections that are cut after a number of bytes, and a client that numbers its requests.
 
-For tests.  ``python cutting.py SERVER_PORT`` is a proxy of its own, for clients in other
-processes: it prints its port, and each line that it reads, ``request 17`` or ``answer 170``, says
-where the next request to a step, or its answer, is to be cut; ``none`` cuts nothing. Each gets a
-line: how often it has cut, and the sizes of the last request and answer that passed whole.
+For tests. ``python cutting.py SERVER_PORT`` runs a proxy for clients in other processes. It prints
+its port and then reads commands: ``request 17`` or ``answer 170`` sets where to cut the next
+request to a step, or its response; ``none`` cuts nothing. It answers each with a line: the number
+of cuts, and the sizes of the last complete request and response.
 """
 
 import json
@@ -14,13 +14,13 @@ import threading
 
 
 class Cutter:
-    """A proxy that passes each byte on at once, and cuts one connection when it is asked to."""
+    """A proxy that forwards each byte at once, and cuts a connection on demand."""
 
     def __init__(self, port, pattern=b"/step"):
         self.port, self.pattern = port, pattern
         self.where, self.after = None, 0
         self.cuts = 0
-        # How many bytes the last ones had that passed whole.
+        # The sizes of the last complete ones.
         self.sizes = {"request": 0, "answer": 0}
         self._lock = threading.Lock()
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -28,7 +28,7 @@ class Cutter:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def cut(self, where, after):
-        """Cut the next one that fits, once ``after`` bytes of its "request" or "answer" passed."""
+        """Cut the next "request" or "answer" after this many bytes."""
         with self._lock:
             self.where, self.after = where, after
 
@@ -53,7 +53,7 @@ class Cutter:
                 pass
 
     def _exchange(self, client, server):
-        """Pass on a request and its answer; return whether the connection is to be kept."""
+        """Forward a request and its response; return whether to keep the connection."""
         request = read_message(client)
         if request is None:
             return False
@@ -83,7 +83,7 @@ class Cutter:
             return cut
 
     def _break(self, client, server):
-        # In turn as by a process that ended, and as by a machine that did.
+        # In turn like a process that ended, and like a machine that failed.
         for one in (client, server):
             if self.cuts % 2:
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -93,7 +93,7 @@ class Cutter:
 
 
 def read_message(connection):
-    """Return one HTTP message, or None when there is none any more."""
+    """Return one HTTP message, or None at the end."""
     data = b""
     while b"\r\n\r\n" not in data:
         chunk = connection.recv(65536)
@@ -115,7 +115,7 @@ def read_message(connection):
 
 
 class NumberedClient:
-    """Numbers its requests and repeats those whose connection broke."""
+    """Numbers its requests, and repeats those whose connection broke."""
 
     def __init__(self, address, key):
         self.address, self.key, self.number = address, key, 0
@@ -131,7 +131,7 @@ class NumberedClient:
         return f"{head}Content-Length: {len(body)}\r\n\r\n".encode() + body
 
     def send(self, request):
-        """Return the JSON of a request's answer, however often it takes."""
+        """Send a request until there is a response; return its JSON."""
         while True:
             if self._socket is None:
                 self._socket = socket.create_connection(self.address, timeout=30)

@@ -1,6 +1,6 @@
-"""Every environment that is registered here: which of them run, and why the others do not.
+"""All registered environments: which run here, and why the others do not.
 
-For tests: ``runnable()`` and ``not_runnable()`` are written out from the registry.
+For tests: ``runnable()`` and ``not_runnable()`` are derived from the registry.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from gym_server.envs.extras import is_available
 with contextlib.suppress(ImportError):
     importlib.import_module("ale_py")
 
-# Tests register some of their own.
+# Tests register their own environments.
 REGISTERED = [
     spec
     for spec in gymnasium.registry.values()
@@ -26,7 +26,7 @@ REGISTERED = [
 
 
 def family(spec: EnvSpec) -> str:
-    """Return the package's word for environments of a kind, such as ``mujoco``."""
+    """Return the package of an environment, such as ``mujoco``."""
     if not isinstance(spec.entry_point, str):
         return "moved away"
     module = spec.entry_point.partition(":")[0].split(".")
@@ -37,7 +37,7 @@ ATARI = {spec.id for spec in REGISTERED if family(spec) == "ale_py"}
 
 
 def reason(spec: EnvSpec) -> str | None:
-    """Return why an environment cannot run here, or None for one that should."""
+    """Return why an environment cannot run here, or None."""
     if not isinstance(spec.entry_point, str):
         if spec.name.startswith("GymV2"):
             return "may import any module that its env_id names; the server refuses it"
@@ -50,14 +50,14 @@ def reason(spec: EnvSpec) -> str | None:
 
 
 def runnable() -> list[str]:
-    """Return the ids that a server here can make."""
+    """Return the ids that a server can make here."""
     return [spec.id for spec in REGISTERED if reason(spec) is None]
 
 
 def atari_played() -> list[str]:
-    """Return the ids of Atari games to play: each game once, and each kind of id again and again.
+    """Return the ids of Atari games to play: each game once, with varying kinds of ids.
 
-    ``GYM_TEST_ENVIRONMENTS=all`` plays a game by each of its ids; ``make soak`` does.
+    ``GYM_TEST_ENVIRONMENTS=all``, which ``make soak`` sets, plays each game by all of its ids.
     """
     atari = [spec for spec in REGISTERED if spec.id in ATARI and reason(spec) is None]
     if os.environ.get("GYM_TEST_ENVIRONMENTS") == "all":
@@ -69,14 +69,14 @@ def atari_played() -> list[str]:
 
 
 def kind_of_id(env_id: str) -> str:
-    """Return what is the same in the ids of all Atari games, such as ``NoFrameskip-v4``."""
+    """Return the part of an Atari id that is the same for all games, such as ``NoFrameskip-v4``."""
     name, _, version = env_id.rpartition("-")
     namespace, _, game = name.rpartition("/")
     return f"{namespace}{'NoFrameskip' if game.endswith('NoFrameskip') else ''}-{version}"
 
 
 def older() -> set[str]:
-    """Return the ids of environments of which a later version is runnable, too."""
+    """Return the ids of environments that have a later version."""
     specs = [gymnasium.spec(env_id) for env_id in runnable()]
     latest: dict[str, int] = {}
     for spec in specs:
@@ -85,5 +85,5 @@ def older() -> set[str]:
 
 
 def not_runnable() -> dict[str, str]:
-    """Return the reason by the id of each of the others."""
+    """Return the ids of all other environments, with the reason."""
     return {spec.id: why for spec in REGISTERED if (why := reason(spec)) is not None}

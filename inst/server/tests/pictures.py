@@ -8,7 +8,7 @@ import numpy as np
 
 
 def decode(data):
-    """Read a PNG of 8 bits and no filters back into an array."""
+    """Decode a PNG with 8 bits and no filters."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     stream, chunks = io.BytesIO(data[8:]), {}
     while header := stream.read(8):

@@ -1,6 +1,6 @@
-"""Random spaces of random nesting, members of them, and what makes two members the same.
+"""Random nested spaces, their members, and a comparison of members.
 
-For tests.  Members come from Gymnasium's ``sample()``, and from what it never gives: NaN,
+For tests. Members come from Gymnasium's ``sample()``, plus values that it never returns: NaN,
 infinities, the ends of every dtype, subnormals, empty sequences.
 """
 
@@ -33,7 +33,7 @@ def pick(rng, items):
 
 
 def random_space(rng, depth=3, tensors=False):
-    """Return a space; with ``tensors``, one whose members travel as tensors."""
+    """Return a space; with ``tensors``, one whose members can be sent as tensors."""
     leaves = [_discrete, _box, _multi_discrete, _multi_binary, _text]
     nests = [_tuple, _dict] if tensors else [_tuple, _dict, _sequence, _graph, _one_of]
     make = pick(rng, leaves if depth == 0 or rng.random() < 0.25 else nests)
@@ -109,7 +109,7 @@ def _is_array(space):
 
 
 def random_member(rng, space):
-    """Return a member of a space; its floats may also be NaN."""
+    """Return a member of a space; its floats may be NaN."""
     if rng.random() < 0.2 and not _has_full_integers(space):
         space.seed(int(rng.integers(2**31)))
         return space.sample()
@@ -171,7 +171,7 @@ def _random_array(rng, space):
 
 
 def _has_full_integers(space):
-    """Tell whether sample() fails: it adds 1 to the largest integer."""
+    """Return whether sample() fails, because it adds 1 to the largest integer."""
     match space:
         case Box():
             return space.dtype.kind in "iu"
@@ -189,9 +189,9 @@ def _has_full_integers(space):
 
 
 def same(one, other):
-    """Tell whether two members are equal in value, dtype and shape."""
+    """Return whether two members are equal in value, dtype and shape."""
     if isinstance(one, (np.ndarray, np.generic)):
-        # Gymnasium itself samples a Box of no dimensions as a scalar or as an array.
+        # Gymnasium itself samples a Box without dimensions as a scalar or as an array.
         return (
             isinstance(other, (np.ndarray, np.generic))
             and (one.dtype, one.shape) == (other.dtype, other.shape)

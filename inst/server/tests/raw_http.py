@@ -9,7 +9,7 @@ def request(method, path, body=b"", *headers):
 
 
 def read_answer(connection):
-    """Return status, headers and body of one answer, and the number of packets it took."""
+    """Return status, headers and body of a response, and its number of packets."""
     data, packets = b"", 0
     while b"\r\n\r\n" not in data:
         data, packets = data + _receive(connection), packets + 1

@@ -1,4 +1,4 @@
-"""Ask for a refusal. For tests."""
+"""Check errors. For tests."""
 
 import pytest
 
@@ -7,14 +7,14 @@ from gym_server.spaces import NotInSpace, decode
 
 
 def refused(space, value):
-    """Return the words with which a value is refused; fail when it is not."""
+    """Return the message of the error for a value; fail if there is none."""
     with pytest.raises(NotInSpace) as refusal:
         decode(space, value)
     return str(refusal.value)
 
 
 def code_of(call, *arguments):
-    """Return the code of the error that a call raises; fail when it raises none."""
+    """Return the code of the error that a call raises; fail if there is none."""
     with pytest.raises(GymServerError) as refusal:
         call(*arguments)
     return refusal.value.code

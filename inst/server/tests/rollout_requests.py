@@ -1,4 +1,4 @@
-"""Requests for rollouts, and what they are compared with."""
+"""Requests for rollouts, and expected results."""
 
 import json
 
@@ -22,13 +22,13 @@ def request_body(seeds, env_id="FrozenLake-v1", policy=RANDOM, tensors=(), **fie
 
 
 def read_answer(data):
-    """Return the arrays of an answer, and its metadata."""
+    """Return the arrays and the metadata of a response."""
     file = safetensors.read(data)
     return {name: tensor.array() for name, tensor in file.tensors.items()}, file.metadata
 
 
 def roll_out(client, seeds, accept=TENSORS, **fields):
-    """Ask for episodes; return the arrays of the answer, and its metadata."""
+    """Request episodes; return the arrays and the metadata of the response."""
     answer = client.post(
         "/v1/rollouts/",
         data=request_body(seeds, **fields),
@@ -40,14 +40,14 @@ def roll_out(client, seeds, accept=TENSORS, **fields):
 
 
 def refused(client, seeds, **fields):
-    """Ask for episodes that cannot be played; return the error."""
+    """Request episodes that cannot be played; return the error."""
     answer = client.post("/v1/rollouts/", data=request_body(seeds, **fields), content_type=TENSORS)
     assert answer.status_code >= 400
     return answer.json
 
 
 def played_by_hand(env_id, seeds, max_steps=None, **kwargs):
-    """Play a random policy in an environment that is made anew for each episode."""
+    """Play a random policy in an environment that is made again for each episode."""
     episodes = []
     for seed in seeds:
         env = gymnasium.make(env_id, **kwargs)

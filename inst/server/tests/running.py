@@ -1,4 +1,4 @@
-"""Processes as Linux lists them."""
+"""Processes as Linux lists them. For tests."""
 
 import os
 import shutil
@@ -11,14 +11,14 @@ from gym_server.processes import memory
 def is_running(pid):
     try:
         os.kill(pid, 0)
-        # A process that has ended and that nobody has waited for is still listed.
+        # A process that has ended stays listed until its parent waits for it.
         return _state(Path(f"/proc/{pid}")) != "Z"
     except (ProcessLookupError, FileNotFoundError):
         return False
 
 
 def is_stopped(pid):
-    """Tell whether a signal has stopped all threads of a process; the last one stops later."""
+    """Return whether a signal has stopped all threads of a process; the last one stops later."""
     return all(_state(task) == "T" for task in Path(f"/proc/{pid}/task").iterdir())
 
 
@@ -31,7 +31,7 @@ def descendants(pid):
 
 
 def r_has_the_package():
-    """Tell whether there is an R with this package in it."""
+    """Return whether there is an R with this package."""
     rscript = shutil.which("Rscript")
     if rscript is None:
         return False

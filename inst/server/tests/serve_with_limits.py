@@ -1,10 +1,10 @@
-"""Runs the server as ``-m gym_server`` does, with constants of its modules set to other values.
+"""Run the server like ``-m gym_server``, with other values for constants of its modules.
 
-So a test of what takes long does not take long itself:
+So tests of long limits need not take long:
 
     serve_with_limits.py '{"gym_server.cli.main._GRACE_SECONDS": 1}' --port 0
 
-The processes that the server starts have the constants as they are.
+Processes that the server starts have the original constants.
 """
 
 import importlib
@@ -13,12 +13,12 @@ import sys
 
 from gym_server.__main__ import main
 
-# Those processes import this file as well.
+# The server's processes import this file, too.
 if __name__ == "__main__":
     for name, value in json.loads(sys.argv.pop(1)).items():
         module, _, constant = name.rpartition(".")
         module = importlib.import_module(module)
-        # An AttributeError for a constant that there is not.
+        # Raises AttributeError for an unknown constant.
         getattr(module, constant)
         setattr(module, constant, value)
     main()

@@ -1,4 +1,4 @@
-"""The real server with a token, on addresses and under names that others can reach."""
+"""A real server with a token, at addresses and names that others can reach."""
 
 import http.client
 import json
@@ -23,14 +23,14 @@ def token_file(tmp_path):
 
 @pytest.fixture(scope="module")
 def locked():
-    """Start a server that asks for the token of the variable."""
+    """Start a server with the token of the environment variable."""
     server = ServerProcess(*ON_A_FREE_PORT, "--log-level", "error", GYM_SERVER_TOKEN=TOKEN)
     yield server
     server.kill()
 
 
 def ask(server, method="GET", path="/v1/health/", body=None, token=TOKEN, **headers):
-    """Return status and answer."""
+    """Return the status and the response."""
     if token is not None:
         headers["Authorization"] = f"Bearer {token}"
     with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)) as connection:
@@ -77,7 +77,7 @@ def test_a_token_of_its_own_is_told_to_who_started_the_server_and_serves_one_use
     assert ask(server, token=server.token)[0] == 200
     assert ask(server, token=None)[0] == ask(server, token=TOKEN)[0] == 401
     assert ask(server, "POST", "/v1/shutdown/", token=None)[0] == 401
-    # It is that user's own machine: monitors may write to any temporary folder.
+    # The machine belongs to one user, so monitors may write to any temporary folder.
     made = ask(server, "POST", "/v1/envs/", {"env_id": "CartPole-v1"}, server.token)[1]
     start = f"/v1/envs/{made['instance_id']}/monitor/start/"
     monitor = {"directory": str(tmp_path / "monitor"), "force": False}
@@ -122,7 +122,7 @@ def test_a_file_that_everybody_can_read_is_warned_of(serve, token_file):
 
 
 def test_there_is_no_option_for_the_token_itself(capsys):
-    # Everybody sees what a process was started with.
+    # Everybody can see the arguments of a process.
     for words in (["--token", TOKEN], [f"--token={TOKEN}"]):
         with pytest.raises(SystemExit):
             main.main(words)

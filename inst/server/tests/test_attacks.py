@@ -1,4 +1,4 @@
-"""Attacks on the real server by what requests say: none may get through."""
+"""Attacks on a real server by the contents of requests; all must fail."""
 
 import os
 import sys
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def refused(ask):
-    """Ask for an environment that must be refused; return the code."""
+    """Create an environment that must be refused; return the code."""
 
     def refused(env_id="CartPole-v1", **fields):
         status, answer = ask("POST", "/v1/envs/", {"env_id": env_id, **fields})
@@ -26,7 +26,7 @@ def refused(ask):
 
 @pytest.fixture
 def made(ask):
-    """Make an environment and return its URL; it is closed afterwards."""
+    """Make an environment, return its URL, and close it afterwards."""
     urls = []
 
     def made(env_id="CartPole-v1", **fields):
@@ -125,7 +125,7 @@ def test_kwargs_name_files_where_they_may(attacked, ask):
         return ask("POST", "/v1/envs/", body)[1]["message"]
 
     models = attacked.root / "models"
-    # It is handed on, and is no such robot.
+    # The path is passed on, but the file is not a robot.
     assert "may be a path" not in code(models / "in.xml")
     assert "may be a path" in code(models / ".." / "secret.xml")
     if os.name == "posix":
@@ -218,7 +218,7 @@ def test_a_monitor_follows_no_link(attacked, ask, made, tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 def test_a_link_that_comes_and_goes_leads_nowhere(attacked, ask, made, tmp_path):
-    """The race: what was a directory when it was looked at is a link when it is used."""
+    """A race: the directory that was checked is a link when it is used."""
     name = attacked.root / "runs" / "race"
     over = threading.Event()
 

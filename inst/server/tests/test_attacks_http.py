@@ -1,4 +1,4 @@
-"""Attacks on the real server by how requests are sent: none may get through."""
+"""Attacks on a real server by the way that requests are sent; all must fail."""
 
 import http.client
 import json
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 
 def talk(server, sent, seconds=10):
-    """Send bytes and return all that comes back until the server has no more to say."""
+    """Send bytes, and return everything that the server sends back."""
     with server.socket() as connection:
         connection.settimeout(seconds)
         with suppress(OSError):
@@ -46,7 +46,7 @@ def statuses(received):
 AUTHORIZED = f"Host: 127.0.0.1\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
 GET = b"GET /v1/health/ HTTP/1.1\r\n" + AUTHORIZED
 POST = b"POST /v1/envs/ HTTP/1.1\r\n" + AUTHORIZED
-# Answered by 410 where it comes to be one.
+# If the server took this for a request, it would answer 410.
 HIDDEN = (
     b'POST /v1/upload/ HTTP/1.1\r\n%bContent-Length: 35\r\n\r\n{"training_dir":"a","api_key":"bcd"}'
 )
@@ -103,7 +103,7 @@ def test_a_long_url_and_many_headers_are_none_of_its_concerns(ask, attacked):
     ids=lambda headers: repr(headers)[2:60],
 )
 def test_where_a_request_ends_is_never_in_doubt(ask, attacked, headers):
-    """What one proxy takes for a body, a request for another to smuggle in, is answered by 400."""
+    """A request that proxies may split in different ways is answered by 400."""
     filled = headers.replace(b"%d", b"%d" % len(b"0\r\n\r\n" + HIDDEN))
     for body in (b"0\r\n\r\n" + HIDDEN, HIDDEN):
         got = statuses(talk(attacked, POST + filled + b"\r\n" + body))
@@ -147,7 +147,7 @@ def test_a_header_cannot_be_brought_in_by_a_url(ask, attacked):
 
 
 def test_who_has_no_token_cannot_make_it_keep_a_large_body(ask, attacked):
-    """A body of any size is thrown away as it comes, once it is clear whose it is."""
+    """The body is discarded as it arrives, once the missing token is noticed."""
     pid = attacked.process.pid
     large = 12 * 2**20
     head = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n" % large
@@ -184,7 +184,7 @@ def test_who_has_no_token_and_asks_first_is_refused_first(ask, attacked):
 
 @pytest.fixture
 def conversation(monkeypatch):
-    """Talk to one connection's code whose timeouts are short."""
+    """Talk to the code of one connection, with short timeouts."""
     monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
     monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
     ours, theirs = socket.socketpair()
@@ -231,14 +231,14 @@ def test_a_request_drop_by_drop_ends_the_connection(conversation, begun):
 
 def test_a_request_that_comes_steadily_is_waited_for(conversation):
     conversation.settimeout(10)
-    # By this it is recognized.
+    # This request is recognized.
     conversation.sendall(b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
     assert conversation.recv(65536).startswith(b"HTTP/1.1 200")
     body = b" " * 4000
     head = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n" % len(body)
     conversation.sendall(head)
     for start in range(0, len(body), 500):
-        # 0.8 seconds in all, which is longer than nothing may come.
+        # 0.8 seconds in all, longer than the longest pause.
         time.sleep(0.1)
         conversation.sendall(body[start : start + 500])
     assert conversation.recv(65536).startswith(b"HTTP/1.1 400")

@@ -1,4 +1,4 @@
-"""What clients of openai/gym-http-api in a dozen languages rely on."""
+"""Behaviour that clients of openai/gym-http-api in a dozen languages depend on."""
 
 import json
 
@@ -9,13 +9,13 @@ ENV_ID = "CartPole-v0"
 
 @pytest.fixture(params=[True, False], ids=["slash", "no slash"])
 def path(request):
-    """Write a URL as some clients do: with or without its last slash."""
+    """Write a URL as clients do: with or without its last slash."""
     return lambda url: url.rstrip("/") + ("/" if request.param else "")
 
 
 @pytest.fixture(params=["application/json", "text/plain", None])
 def post(request, client):
-    """Post JSON under the types that clients declare."""
+    """Post JSON with the content types that clients declare."""
     return lambda url, body=None: client.post(
         url, data=None if body is None else json.dumps(body), content_type=request.param
     )
@@ -23,7 +23,7 @@ def post(request, client):
 
 def test_a_whole_session(client, path, post):
     made = post(path("/v1/envs/"), {"env_id": ENV_ID})
-    # What is said beside it is new, and classic clients leave it alone.
+    # The other fields are new; classic clients ignore them.
     assert next(iter(made.json)) == "instance_id"
     instance_id = made.json["instance_id"]
     url = f"/v1/envs/{instance_id}"
@@ -78,7 +78,7 @@ def test_an_unknown_instance(client):
 
 
 def test_every_error_names_its_documentation(client, create, faulty):
-    """The classic R client prints message and documentation_url, or nothing where one lacks."""
+    """The classic R client prints message and documentation_url, or nothing if one is missing."""
     broken = faulty("RaisesInStep")
     client.post(f"{broken}/reset/")
     answers = [
@@ -165,7 +165,7 @@ def test_continuous_actions_as_classic_clients_send_them(client, create):
 
 
 def test_a_boolean_is_a_discrete_action_and_a_number_a_flag(client, create):
-    """The classic R client sends ``observation[[3]] > 0`` as it is."""
+    """The classic R client sends ``observation[[3]] > 0`` unchanged."""
     urls = [create(ENV_ID) for _ in range(2)]
     for url in urls:
         client.post(f"{url}/reset/", json={"seed": 1})

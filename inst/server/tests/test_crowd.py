@@ -1,4 +1,4 @@
-"""More connections than a server takes."""
+"""More connections than a server allows."""
 
 import json
 import socket
@@ -21,11 +21,11 @@ MOST = 10
 
 @pytest.fixture
 def crowded(monkeypatch):
-    """Run a server that takes few connections; return a function that makes one."""
+    """Run a server that allows few connections; return a function that opens one."""
     monkeypatch.setattr(connections_module, "MOST_CONNECTIONS", MOST)
     monkeypatch.setattr(connections_module, "MOST_OF_ONE_ADDRESS", MOST)
     monkeypatch.setattr(connections_module, "EVICTED_AT_ONCE", 2)
-    # On a busy machine those that were evicted take longer to end, and more would be evicted.
+    # On a busy machine, evicted connections take longer to end, and more would be evicted.
     monkeypatch.setattr(connections_module, "_MOMENT_SECONDS", 5)
     app = create_app()
     server = Server(app, bind("127.0.0.1", 0), 2**20, Budget(2**24))
@@ -35,7 +35,7 @@ def crowded(monkeypatch):
 
     def connect():
         connection = socket.socket()
-        # What is sent to somebody who does not read is soon too much.
+        # A small buffer: a client that does not read soon has too much unread.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         connection.settimeout(20)
         connection.connect(("127.0.0.1", server.port))
@@ -43,7 +43,7 @@ def crowded(monkeypatch):
         return connection
 
     def of_rank(kind):
-        """Count those whose rank is of this kind."""
+        """Count the connections with this kind of rank."""
         now = [one.eviction_rank(time.monotonic()) for one in list(server._connections._all)]
         return sum(rank is not None and rank[0] == kind for rank in now)
 
@@ -71,7 +71,7 @@ def test_silent_connections_leave_for_new_ones(crowded):
     assert all(is_well(connection) for connection in silent)
     assert is_well(silent[0])
     assert all(is_well(crowded()) for _ in range(2))
-    # The one that was silent for longest left; the one that asked last stays.
+    # The longest silent connection was evicted; the one that asked last stays.
     assert silent[1].recv(1) == b""
     assert is_well(silent[0])
 

@@ -1,6 +1,6 @@
-"""Connections that are cut in the middle of a request or an answer lose no step and double none.
+"""When connections are cut within a request or response, no step is lost or taken twice.
 
-``GYM_TEST_CUTS=all`` cuts at each byte; ``make soak`` does.
+``GYM_TEST_CUTS=all``, which ``make soak`` sets, cuts at each byte.
 """
 
 import os
@@ -34,13 +34,13 @@ def test_a_step_that_was_cut_at_any_byte_is_taken_once(cutter, capsys):
         cutter.cut(where, after)
         answer = client.send(request)
         steps += 1
-        # The environment observes how often it was stepped.
+        # The environment observes the number of its steps.
         assert answer["observation"] == [steps], (where, after)
         assert answer["request"]["number"] == client.number, (where, after)
 
     places = {"request": 0, "answer": 0}
     play(None, 0)
-    # Numbers get longer on the way.
+    # Numbers get longer during the test.
     longest = {where: size + 8 for where, size in cutter.sizes.items()}
     for where, most in longest.items():
         for after in range(0, most, EVERY):
@@ -50,12 +50,12 @@ def test_a_step_that_was_cut_at_any_byte_is_taken_once(cutter, capsys):
             if client.repeats > before[1]:
                 places[where] += 1
             else:
-                # All of it had passed.
+                # It was complete before the cut.
                 assert after > 100
     client.close()
     assert all(places.values())
     if EVERY == 1:
-        # Each byte but the last of all, which is the whole.
+        # Each byte except the last, where the message is complete.
         assert places["request"] > 100
         assert places["answer"] > 200
         with capsys.disabled():

@@ -1,4 +1,4 @@
-"""Every family of environments draws, from any thread, while others close, and is recorded."""
+"""Every family of environments draws from any thread while others close, and can be recorded."""
 
 import gc
 import os
@@ -41,7 +41,7 @@ def installed():
 
 def test_all_families_draw_from_any_thread_while_others_close(app, installed):
     failures = []
-    # Some observe pictures, and in JSON these take long.
+    # Some observe pictures, which take long as JSON.
     in_tensors = {"Accept": TENSORS}
 
     def draw_and_close(env_id):
@@ -164,7 +164,7 @@ def test_two_mujoco_environments_each_draw_their_own_picture(client, create, ins
     alone = drawn(first)
     assert drawn(second) != alone
     assert drawn(first) == alone
-    # What a closed environment leaves behind is collected whenever Python likes.
+    # Python may collect the remains of a closed environment at any time.
     client.post(f"{second}/close/")
     client.application._renderer.run(gc.collect)
     assert drawn(first) == alone

@@ -9,13 +9,13 @@ from gym_server.protocol.safetensors import TENSORS, read
 
 OTHERS = [env_id for env_id in environments.runnable() if env_id not in environments.ATARI]
 ROBOTS = [i for i in OTHERS if environments.family(gymnasium.spec(i)) == "mujoco"]
-# Older versions, and all robots but one: they are alike, and take seconds each.
+# Older versions, and all robots but one, are similar and take seconds each.
 LESS_OFTEN = {*environments.older(), *ROBOTS} - {"HalfCheetah-v5"}
 ATARI = environments.atari_played()
 
 
 def played(client, url, how):
-    """Return the answers to a reset and to a step, and what is drawn then."""
+    """Return the responses to a reset and a step, and the frame after these."""
     first = client.post(f"{url}/reset/", headers={"Accept": how})
     action = client.get(f"{url}/action_space/sample").json["action"]
     later = client.post(f"{url}/step/", json={"action": action}, headers={"Accept": how})
@@ -35,7 +35,7 @@ def played(client, url, how):
 def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
     url = create(env_id, seed=1)
     first, later, frame = played(client, url, "application/json")
-    # Some observations lie outside of what their environments promise, none has another shape.
+    # Some observations are out of bounds, but all have the right shape.
     assert np.shape(later.json["observation"]) == np.shape(first.json["observation"])
     assert np.ptp(frame) > 50
     assert client.post(f"{url}/close/").status_code == 204
@@ -43,16 +43,16 @@ def test_it_is_made_reset_stepped_and_drawn(client, create, env_id):
 
 @pytest.mark.parametrize(
     "env_id",
-    # Every eighth is of another kind than the one before.
+    # Every eighth, each of another kind than the one before.
     [pytest.param(i, marks=[pytest.mark.slow] if n % 8 else []) for n, i in enumerate(ATARI)],
 )
 def test_an_atari_game_is_made_reset_stepped_and_drawn(client, create, env_id):
-    # Without a seed, for which the emulator loads the game once more.
+    # Without a seed, because for a seed the emulator loads the game again.
     url = create(env_id)
     first, later, frame = played(client, url, TENSORS)
     before, after = (read(one.data).tensors["observation"].array() for one in (first, later))
     assert after.shape == before.shape
-    # Some of them are black in the beginning, but what is observed is what is drawn.
+    # Some start black, but the frame equals the observation.
     assert np.array_equal(frame, after)
     assert client.post(f"{url}/close/").status_code == 204
 

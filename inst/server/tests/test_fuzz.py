@@ -1,6 +1,6 @@
-"""What reads bytes from anywhere: the tensor reader and the JSON decoder, on all kinds of bytes.
+"""Readers of untrusted bytes: the tensor reader and the JSON decoder, with all kinds of bytes.
 
-``GYM_TEST_FUZZ_SECONDS=600`` goes on for so long with each; ``make soak`` does.
+``GYM_TEST_FUZZ_SECONDS=600``, which ``make soak`` sets, tests each for that long.
 """
 
 import itertools
@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-# Nothing generated may lie below inst/server.
+# Generated files must not be below inst/server.
 os.environ.setdefault(
     "HYPOTHESIS_STORAGE_DIRECTORY", str(Path(tempfile.gettempdir()) / "gym-hypothesis")
 )
 hypothesis = pytest.importorskip("hypothesis", reason="the extra `dev` brings hypothesis")
 
-# About how it shows what went wrong.
+# This concerns only how a failure is shown.
 pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
 
 from hypothesis import strategies as st  # noqa: E402
@@ -29,7 +29,7 @@ from gym_server.protocol import answers, bodies, safetensors  # noqa: E402
 
 SECONDS = float(os.environ.get("GYM_TEST_FUZZ_SECONDS", "0"))
 
-# One case may take so long, and no more memory at once.
+# The longest time for one case. Memory is limited, too.
 _LONGEST_SECONDS = 5.0
 _MOST_BYTES = 2**30
 
@@ -41,7 +41,7 @@ def explore(check, strategy):
     def timed(example):
         nonlocal counted
         counted += 1
-        # The processor's time: others may have it for longer.
+        # Processor time, because other processes may take longer.
         began = time.thread_time()
         check(example)
         assert time.thread_time() - began < _LONGEST_SECONDS
@@ -61,7 +61,7 @@ def explore(check, strategy):
 
 
 class _memory_ceiling:  # noqa: N801
-    """Let nothing take a gigabyte more than there is; an attempt is a MemoryError."""
+    """Limit additional memory to a gigabyte; exceeding it is a MemoryError."""
 
     def __enter__(self):
         try:
@@ -110,7 +110,7 @@ METADATA = st.dictionaries(
 
 @st.composite
 def files(draw):
-    """A file with nothing wrong, or with a thing or two."""
+    """Draw a valid file, or one with a few errors."""
     header, begin = {}, 0
     for name in draw(st.lists(NAMES, max_size=4)):
         dtype, shape = draw(st.sampled_from(list(BYTES))), draw(SHAPES)
@@ -125,7 +125,7 @@ def files(draw):
     if "entry" in kinds and header:
         entry = header[draw(st.sampled_from(list(header)))]
         field = draw(st.sampled_from(["dtype", "shape", "data_offsets", "more"]))
-        # What is nearly right is nearest to a fault in the reader.
+        # Nearly valid files are most likely to reveal bugs.
         nearly = {
             "dtype": st.sampled_from(list(BYTES)),
             "shape": SHAPES,
@@ -138,7 +138,7 @@ def files(draw):
         length = draw(st.integers(0, length + 8) | st.integers(0, 2**64 - 1))
     data = draw(st.binary(min_size=begin, max_size=begin))
     if draw(st.integers(0, 3)):
-        # Bytes that any dtype may have, also a boolean.
+        # Bytes that are valid for all dtypes, including booleans.
         data = bytes(byte & 1 for byte in data)
     if "data" in kinds:
         data = draw(st.sampled_from([data[:-1], data + b"\0", data + data, b""]))
@@ -147,7 +147,7 @@ def files(draw):
 
 
 def mutated(draw, raw):
-    """Return the bytes, a few of them changed, gone or doubled."""
+    """Return the bytes with a few changed, removed or doubled."""
     raw = bytearray(raw)
     for _ in range(draw(st.sampled_from([1, 1, 2, 5]))):
         place = draw(st.integers(0, len(raw)))
@@ -165,7 +165,7 @@ def mutated(draw, raw):
 
 @st.composite
 def texts(draw):
-    """JSON, in one of its encodings, and what is nearly that."""
+    """Draw JSON in one of its encodings, and nearly valid JSON."""
     deep = draw(st.sampled_from([0, 0, 0, 10, 1000, 20_000]))
     opening, closing = draw(st.sampled_from([('{"a":', "}"), ("[", "]")]))
     text = opening * deep + json.dumps(draw(VALUES)) + closing * draw(st.sampled_from([deep, 0]))
@@ -191,7 +191,7 @@ def check_tensors(raw):
         assert isinstance(body, dict)
     if file is None:
         return
-    # Nothing is made up: all of the bytes are somebody's.
+    # Every byte belongs to a tensor.
     arrays = {name: tensor.array() for name, tensor in file.tensors.items()}
     head = 8 + int.from_bytes(raw[:8], "little")
     assert sum(array.nbytes for array in arrays.values()) == len(raw) - head
@@ -209,7 +209,7 @@ def check_json(raw):
     else:
         assert isinstance(body, dict)
         written = answers.dumps(body)
-        # What is deeper, or not finite, is written in other words.
+        # Deeper or non-finite values are written differently.
         if max(raw.count(b"{"), raw.count(b"[")) < 100 and "inf" not in repr(body):
             assert bodies.loads(written) == body
 
@@ -228,7 +228,7 @@ def test_the_json_decoder_takes_or_refuses_any_bytes(capsys):
 
 @pytest.mark.slow
 def test_files_of_all_kinds_are_tried():
-    """The strategy is no good if next to all of its files are refused, or none."""
+    """The strategy is useless if nearly all of its files are refused, or none."""
     outcomes = {True: 0, False: 0}
 
     def count(raw):

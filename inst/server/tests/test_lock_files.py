@@ -1,4 +1,4 @@
-"""The lock that travels with the server is that of what pyproject.toml asks for today."""
+"""The server's lock files are up to date with pyproject.toml."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What one error may take of the log, and of an answer."""
+"""The size of one error in the log and in a response."""
 
 import logging
 
@@ -16,7 +16,7 @@ def fail(message, cause=LONG):
 
 @pytest.fixture
 def logged(monkeypatch):
-    """Return a function that logs an error, and the text that becomes of it."""
+    """Return a function that logs an error, and the resulting text."""
     formatter = logs.Formatter("%(levelname)s %(message)s")
 
     def logged(error, message="It failed"):

@@ -1,4 +1,4 @@
-"""Monitors that name one directory each have one of their own; what is left of gone ones."""
+"""Monitors that share a directory each get their own; files of ended monitors."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ ONE, TWO, THREE = "11111111", "22222222", "33333333"
 
 @pytest.fixture
 def take(monitor_dir):
-    """Take a directory of the same name; all are given back in the end."""
+    """Take a directory of the same name; all are released at the end."""
     root = MonitorRoot(monitor_dir, allow_temporary=False)
     taken = []
 
@@ -38,7 +38,7 @@ def play(directory, *episodes):
 
 
 def crash(directory):
-    """Do to a directory what the end of its process does."""
+    """Leave a directory as if its process had ended."""
     directory.table.close()
 
 
@@ -145,11 +145,11 @@ def test_another_process_keeps_its_files_until_it_is_killed(take, monitor_dir):
     assert table.read_text() == "episode,return,length,seconds\n"
 
 
-# On the wire --------------------------------------------------------------------------------
+# Over HTTP ------------------------------------------------------------------------------------
 
 
 def record(server, url, directory="agents", **fields):
-    """Record an episode; return its table's directory."""
+    """Record an episode; return the directory of its table."""
     start = {"directory": directory, **fields}
     status, answer = server.post(f"{url}/monitor/start/", start)
     assert status == 204, answer

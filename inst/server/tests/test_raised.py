@@ -1,4 +1,4 @@
-"""Whatever an environment raises is an answer, and one that is kept for a repetition."""
+"""Any exception of an environment becomes a response, which is stored for repetitions."""
 
 import signal
 
@@ -61,7 +61,7 @@ def test_drawing_that_ends_its_process_is_an_answer(server, does):
     server.post(f"{url}/reset/")
     status, answer = server.get(f"{url}/render/")
     assert (status, answer["code"]) == (500, "environment_error")
-    # The render thread goes on.
+    # The render thread continues.
     other = server.create("faulty_envs:Drawing-v0")
     server.post(f"{other}/reset/")
     assert server.get(f"{other}/watch/state/")[1]["frame"] is not None

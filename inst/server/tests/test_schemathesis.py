@@ -1,6 +1,6 @@
-"""Schemathesis makes requests of the OpenAPI document, sound ones and others, and checks answers.
+"""Schemathesis generates valid and invalid requests from the OpenAPI document.
 
-``GYM_TEST_SCHEMA_CASES=5000`` asks for that many; ``make soak`` does.
+``GYM_TEST_SCHEMA_CASES=5000``, which ``make soak`` sets, generates that many.
 """
 
 import importlib.util
@@ -22,14 +22,14 @@ pytestmark = pytest.mark.skipif(
 
 
 def run(server, folder, seed, *arguments):
-    """Return what schemathesis found, as it says it, and the number of its cases."""
+    """Return the report of schemathesis, and the number of its cases."""
     result = subprocess.run(
         [
             *(sys.executable, "-c", "from schemathesis.cli import schemathesis; schemathesis()"),
             *("--config-file", HERE / "schemathesis_run" / "schemathesis.toml"),
             *("run", f"http://127.0.0.1:{server.port}/v1/openapi.json"),
             *("--checks", "all", "--seed", str(seed), "--request-timeout", "60"),
-            # It would be the last one.
+            # It would be the last request.
             *("--exclude-operation-id", "shutdown"),
             *arguments,
         ],

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 
 def row(info, index):
-    """Return what a vector info says of one sub-environment."""
+    """Return the part of a vector info for one sub-environment."""
     return {
         key: row(value, index) if isinstance(value, dict) else value[index]
         for key, value in info.items()

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def chromium():
-    """Start a browser without a window."""
+    """Start a headless browser."""
     browser = start_chromium()
     if browser is None:
         pytest.skip("there is no Chromium with its chromedriver on the PATH")
@@ -43,7 +43,7 @@ def chromium():
 
 @pytest.fixture
 def browser(chromium):
-    """Give a browser that shows nothing, and end with one."""
+    """Return a browser with an empty page, and leave it so."""
     chromium.get("about:blank")
     chromium.get_log("browser")
     yield chromium
@@ -61,7 +61,7 @@ def server(shared):
 
 @pytest.fixture
 def play(server):
-    """Play on in the background until the test is over."""
+    """Play in the background until the end of the test."""
     threads, over = [], threading.Event()
 
     def play(url, pause=0.0, render=False):
@@ -73,7 +73,7 @@ def play(server):
                 connection.request(method, url + path, body)
                 return json.loads(connection.getresponse().read())
 
-            # Until the server or the environment is gone.
+            # Until the server or the environment is closed.
             with contextlib.suppress(Exception), contextlib.closing(connection):
                 call("POST", "/reset/", seed=1)
                 while not over.wait(pause):
@@ -109,7 +109,7 @@ search_random(env, rounds = 500, target = Inf, seed = 1, progress = FALSE)
 
 @pytest.fixture
 def search(server):
-    """Search from R, for people to see, in the test's server; return the page's address."""
+    """Start a watched search from R on the test's server; return the page's address."""
     if not r_has_the_package():
         pytest.skip("there is no R with this package")
     process = subprocess.Popen(
@@ -130,7 +130,7 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
     url = search.removeprefix(f"http://127.0.0.1:{server.port}").removesuffix("/watch/")
     browser.get(search)
     eventually(lambda: text(browser, "env") == "CartPole-v0")
-    # The picture changes, and the counters count.
+    # The picture and the counters change.
     eventually(lambda: number(browser, "step") > 0)
     assert moves(browser)
     episode = number(browser, "episode")
@@ -139,7 +139,7 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
     assert text(browser, "state") == "live"
     assert "real time" in text(browser, "pace")
 
-    # Pause freezes this view, and nothing else.
+    # Pause affects only this view.
     steps = server.get(url)[1]["steps"]
     browser.find_element(By.TAG_NAME, "body").send_keys(Keys.SPACE)
     eventually(lambda: text(browser, "state") == "paused")
@@ -149,7 +149,7 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
     assert moves(browser)
     assert complaints(browser) == []
 
-    # Who leaves is drawn no more for, and the search goes on at its full speed.
+    # Without the page, drawing stops and the search runs at full speed.
     browser.get("about:blank")
 
     def is_drawn_for_nobody_else():
@@ -157,9 +157,9 @@ def test_a_search_from_r_is_seen_while_somebody_looks(browser, server, search, e
         eventually(lambda: server.get(url)[1]["steps"] > steps + 20)
         return drawn(server, url) == before + 1
 
-    # The last request of the page may still be under way.
+    # The last request of the page may still be in progress.
     eventually(is_drawn_for_nobody_else)
-    # That was a look, too; then no step waits for eyes any more.
+    # That was also a look; afterwards no step waits for watchers.
     eventually(lambda: not server.get(url)[1]["watched"])
     eventually(lambda: pace(server, url) > 60, seconds=60)
 
@@ -184,7 +184,7 @@ def test_two_people_watch_and_only_one_of_them_pauses(browser, server, play, loo
 
 @pytest.fixture
 def in_slow_motion(browser, server, play, look, eventually):
-    """Choose a speed; return functions that tell which episode is shown, and which is played."""
+    """Choose a speed; return functions for the episode that is shown, and the one played."""
 
     def in_slow_motion(speed):
         url = server.create("CartPole-v1")
@@ -211,7 +211,7 @@ def test_slow_motion_is_slower_than_what_is_played(browser, in_slow_motion, even
 def test_slow_motion_goes_on_from_the_present(in_slow_motion, eventually):
     shown, played = in_slow_motion("2")
     eventually(lambda: shown() < played() - 1)
-    # Two seconds take four; then it is the present's turn.
+    # Two seconds take four; then the page shows the current state.
     eventually(lambda: shown() >= played(), seconds=30)
 
 
@@ -285,7 +285,7 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, eventua
     server.stop()
     eventually(lambda: text(browser, "words") == "The server is gone")
     serve("--port", str(server.port))
-    # A new one does not know it.
+    # A new server does not know it.
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
@@ -305,7 +305,7 @@ def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, even
 
 @pytest.fixture
 def locked(serve):
-    """Start a server that asks for a token; return it and a function that asks with it."""
+    """Start a server with a token; return it, and a function that uses the token."""
     server = serve(GYM_SERVER_TOKEN=TOKEN)
 
     def ask(path, **fields):
@@ -331,7 +331,7 @@ def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
     eventually(lambda: picture(browser) != first)
     assert text(browser, "env") == "CartPole-v1"
     assert complaints(browser) == []
-    # The sub-environment's and the speed's controls ask with the key, too.
+    # The controls for sub-environment and speed use the key, too.
     browser.find_element(By.ID, "pause").click()
     eventually(lambda: text(browser, "state") == "paused")
     time.sleep(0.5)
@@ -348,7 +348,7 @@ def test_a_link_with_a_key_opens_the_page_and_without_one_it_says_what_to_do(
 
 
 def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eventually):
-    """A page of another server's on this machine, with a real browser's headers."""
+    """A page of another server on this machine, with a real browser's headers."""
     url = server.create("CartPole-v1")
     other = serve()
     browser.get(f"http://127.0.0.1:{other.port}/v1/health/")
@@ -366,7 +366,7 @@ def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eve
                     mode,
                     kind,
                 )
-        # A form is sent in the page's place.
+        # Submit a form from the page.
         browser.execute_script(
             """
             const form = document.createElement("form");
@@ -379,7 +379,7 @@ def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eve
         eventually(lambda: "foreign_origin" in browser.page_source)
         browser.get(f"http://127.0.0.1:{other.port}/v1/health/")
     assert server.get(url)[1]["steps"] == 0
-    # Nobody reset it, either.
+    # The environment was not reset, either.
     assert server.post(f"{url}/step/", {"action": 0})[1]["code"] == "reset_needed"
     server.post(f"{url}/reset/")
     drawn_by_image = browser.execute_async_script(
@@ -393,7 +393,7 @@ def test_a_page_from_elsewhere_cannot_drive_a_server(browser, server, serve, eve
         f"{target}{url}/render/",
     )
     assert drawn_by_image is False
-    # A link may be followed.
+    # Following a link is allowed.
     browser.get(f"{target}{url}/watch/")
     assert browser.find_element(By.ID, "picture")
 

@@ -1,4 +1,4 @@
-"""Watchers as the real server has them: those that wait, that leave, that never read."""
+"""Watchers on a real server: those that wait, leave, or never read."""
 
 import json
 import socket
@@ -11,8 +11,8 @@ from raw_http import answered, read_answer, request
 
 pytestmark = pytest.mark.slow
 
-# The longest that a client is waited for at the stop that has sent half a request, or does not
-# read what a watcher gets.
+# How long the server waits, at the stop, for a client that has sent half a request or does not read
+# a watcher's response.
 SOON_DROPPED = {"gym_server.http_server.server._HALF_SENT_SECONDS": 0.5}
 
 
@@ -52,7 +52,7 @@ def test_the_stop_does_not_wait_for_watchers(server, pole):
     for watcher in watchers:
         watcher.sendall(ask(pole, number))
     time.sleep(0.3)
-    # Far less than a watcher is kept waiting when nothing moves.
+    # Much less than a watcher waits when nothing moves.
     assert server.stop(timeout=8)[0] == 0
     for watcher in watchers:
         assert read_answer(watcher)[0] == 503
@@ -61,7 +61,7 @@ def test_the_stop_does_not_wait_for_watchers(server, pole):
 
 @pytest.fixture
 def deaf(server, pole):
-    """Ask on and on, and never read, until the server can send no more to this watcher."""
+    """Send requests without reading, until the server can send no more to this watcher."""
     with server.socket() as connection:
         asked = []
 
@@ -73,7 +73,7 @@ def deaf(server, pole):
 
         thread = threading.Thread(target=ask_for_ever, daemon=True)
         thread.start()
-        # It sends nothing any more, because the server reads nothing any more.
+        # It cannot send any more, because the server does not read any more.
         while not asked or time.monotonic() < asked[-1] + 0.3:
             time.sleep(0.05)
         yield
@@ -83,7 +83,7 @@ def deaf(server, pole):
 
 
 def test_the_stop_does_not_wait_for_a_watcher_that_never_reads(server, deaf):
-    # Less than a request under way may take.
+    # Less than a request in progress may take.
     assert server.stop(timeout=8)[0] == 0
 
 
@@ -96,7 +96,7 @@ def test_what_is_asked_after_watching_is_answered_at_the_stop(server, gate, even
         eventually(gate.is_reached)
         server.process.terminate()
         eventually(server.takes_no_more)
-        # For longer than a watcher that does not read is waited for.
+        # Longer than the server waits for a watcher that does not read.
         time.sleep(1)
         gate.open()
         assert read_answer(connection)[0] == 200
@@ -115,7 +115,7 @@ def test_a_watcher_that_left_stops_the_drawing(server, pole):
     with server.socket() as watcher:
         watcher.sendall(ask(pole, number))
         time.sleep(0.2)
-    # One that it still waited for, and no more.
+    # One in addition to those that it waited for, and no more.
     for _ in range(5):
         step(server, pole, 10)
         time.sleep(0.05)

@@ -16,7 +16,7 @@ from gym_server.protocol.safetensors import TENSORS
 from gym_server.spaces.stacking import stack
 
 MODES = ["NextStep", "SameStep", "Disabled"]
-# The same for what takes long: `make test` runs the first one.
+# For slow tests: `make test` runs only the first mode.
 MODES_SLOWLY = [MODES[0], *(pytest.param(mode, marks=pytest.mark.slow) for mode in MODES[1:])]
 ACCEPT = {"Accept": TENSORS}
 KINDS = [kind for kind in faulty_envs.SPACES if kind != "nothing"]
@@ -24,7 +24,7 @@ IN_TENSORS = [kind for kind in KINDS if spaces.travels_as_tensors(faulty_envs.SP
 
 
 def in_process(env_id, num_envs, autoreset_mode="NextStep", **kwargs):
-    """Return Gymnasium's own, whose infos are those that our answers must hold."""
+    """Return Gymnasium's vector environment, whose infos the responses must equal."""
     return gymnasium.make_vec(
         env_id,
         num_envs=num_envs,
@@ -43,7 +43,7 @@ def actions_of(env, seed):
 
 
 def members(env, batch):
-    """Return a batch's members, one for each sub-environment, as JSON values."""
+    """Return the members of a batch as JSON values."""
     return [
         plain(spaces.encode(env.single_observation_space, member))
         for member in iterate(env.observation_space, batch)
@@ -51,7 +51,7 @@ def members(env, batch):
 
 
 def apart(space, batch):
-    """Return the sub-environments of a batch that came as JSON."""
+    """Return the members of a batch that was received as JSON."""
     match space:
         case Dict():
             parts = {key: apart(part, batch[str(key)]) for key, part in space.spaces.items()}
@@ -67,7 +67,7 @@ def apart(space, batch):
 
 
 def split_final(env, info):
-    """Return an info without the last observations, these as JSON values, and their
+    """Split an info into the info without last observations, these as JSON values, and their
     sub-environments."""
     info = dict(info)
     final, which = info.pop("final_obs", None), info.pop("_final_obs", None)
@@ -83,7 +83,7 @@ def split_final(env, info):
 
 
 def check_step(env, answer, expected):
-    """Hold a step's JSON answer equal to what Gymnasium returned."""
+    """Check that a step's JSON response equals Gymnasium's result."""
     observation, reward, terminated, truncated, info = expected
     info, final, sub_envs = split_final(env, info)
     space = env.single_observation_space
@@ -99,7 +99,7 @@ def check_step(env, answer, expected):
 
 
 def check_tensors(space, name, file, batch):
-    """Hold the tensors of a batch equal to it, byte for byte."""
+    """Check that the tensors of a batch equal it, byte for byte."""
     texts = json.loads(file.metadata.get("texts", "{}"))
     match space:
         case Dict():
@@ -119,7 +119,7 @@ def check_tensors(space, name, file, batch):
 
 
 def read_tensors(answer):
-    """Return the file in an answer."""
+    """Return the file in a response."""
     assert (answer.status_code, answer.content_type) == (200, TENSORS), answer.data
     return safetensors.read(answer.data)
 
@@ -141,7 +141,7 @@ def refusal(client, url, route, **body):
 
 
 def reset_those_that_ended(client, url, env, ended):
-    """Reset them here and there, as the mode without autoreset wants it."""
+    """Reset them in both, as the mode without autoreset requires."""
     expected, info = env.reset(options={"reset_mask": np.array(ended)})
     answer = post(client, url, "reset", reset_mask=ended)
     space = env.single_observation_space
@@ -158,7 +158,7 @@ def action_file(env, batch, **metadata):
 
 
 def check_that_no_sub_env_moved(client, url, kind, seed, mode="NextStep"):
-    """Hold the next step equal to the first one after a reset."""
+    """Check that the next step equals the first one after a reset."""
     env = twin(kind, autoreset_mode=mode)
     env.reset(seed=seed)
     actions, batch = actions_of(env, 0)

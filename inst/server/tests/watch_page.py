@@ -1,4 +1,4 @@
-"""The watch page in a browser without a window, and what it shows."""
+"""The watch page in a headless browser, and what it shows. For tests."""
 
 import shutil
 import time
@@ -13,7 +13,7 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def start_chromium():
-    """Start a browser without a window; return None where there is none."""
+    """Start a headless browser; return None if there is none."""
     binary = next(filter(None, map(shutil.which, _BROWSERS)), None)
     driver = shutil.which("chromedriver")
     if binary is None or driver is None:
@@ -42,7 +42,7 @@ def picture(browser):
 
 
 def pictures(browser, seconds=0.7):
-    """Return the different pictures that are shown for a while."""
+    """Return the different pictures that are shown within a time."""
     seen, end = set(), time.monotonic() + seconds
     while time.monotonic() < end:
         seen.add(picture(browser))
@@ -50,7 +50,7 @@ def pictures(browser, seconds=0.7):
 
 
 def moves(browser, seconds=20):
-    """Tell, as soon as it is so, that the pictures change again and again."""
+    """Return as soon as the pictures have changed several times; fail after some seconds."""
     seen, end = set(), time.monotonic() + seconds
     while len(seen) <= 5 and time.monotonic() < end:
         seen.add(picture(browser))
@@ -62,12 +62,12 @@ def complaints(browser):
 
 
 def drawn(server, url):
-    """Return how often an environment was drawn; asking for it draws it, too, if it moved."""
+    """Return how often an environment was drawn; asking draws it, too, if it moved."""
     return server.get(f"{url}/watch/state/")[1]["number"]
 
 
 def pace(server, url, seconds=1):
-    """Return how many steps a second an environment takes; one that is watched takes 50."""
+    """Return how many steps a second an environment takes; a watched one takes 50."""
     began, before = time.monotonic(), server.get(url)[1]["steps"]
     time.sleep(seconds)
     return (server.get(url)[1]["steps"] - before) / (time.monotonic() - began)

@@ -1,4 +1,4 @@
-"""Who is let in, and who is not."""
+"""Which requests are accepted, and which are refused."""
 
 import pytest
 from flask import Flask
@@ -15,7 +15,7 @@ HEALTH = "/v1/health/"
 
 
 def refusal(access, method="GET", path=HEALTH, keys=None, query="", **headers):
-    """Return the code by which a request is refused, None for one that passes."""
+    """Return the code of the error for a request, None if it is accepted."""
     environ = {
         "REQUEST_METHOD": method,
         "PATH_INFO": path,
@@ -26,7 +26,7 @@ def refusal(access, method="GET", path=HEALTH, keys=None, query="", **headers):
     guard = Guard(access, keys or WatchKeys())
     match = Router(Flask("rooms", static_folder=None), ROOMS).match(environ)
     try:
-        # Twice, as it remembers what it let in.
+        # Twice, because the guard remembers accepted hosts.
         guard.check(environ, match)
         guard.check(environ, match)
     except GymServerError as error:
@@ -89,7 +89,7 @@ def test_the_machines_own_name_is_answered_to(monkeypatch):
     monkeypatch.setattr("socket.gethostname", lambda: "Lab7")
     monkeypatch.setattr("socket.getfqdn", lambda: "lab7.example.org")
     assert refusal(Access(), host="lab7:5000") is None
-    # Its name in the network means it only where the network reaches it.
+    # This machine's network name is valid only if the server can be reached by the network.
     assert refusal(Access(), host="lab7.example.org") == "foreign_host"
     assert refusal(Access(host="0.0.0.0"), host="lab7.example.org") is None
 
@@ -117,7 +117,7 @@ def test_names_that_clients_think_up_take_no_room():
         ("http://LOCALHOST:5000", "localhost:5000"),
         ("https://gym.example.org", "gym.example.org"),
         ("https://gym.example.org", "gym.example.org:443"),
-        # By a proxy that does not hand on the name by which it was asked.
+        # From a proxy that does not forward the Host header.
         ("https://gym.example.org", "127.0.0.1:5000"),
         ("https://other.example:8443", "127.0.0.1:5000"),
     ],

@@ -1,4 +1,4 @@
-"""What a client wants of the answers to reset, step and render: infos, and tensors by column."""
+"""What a client can ask of the responses to reset, step and render: infos, tensors by column."""
 
 import json
 
@@ -20,14 +20,14 @@ def read_tensors(answer):
 
 
 def arrays(answer):
-    """Return the tensors of an answer in the order of Python's, whatever that on the wire."""
+    """Return the tensors of a response in Python's order, whatever the order in the file."""
     by_column = answer.content_type == COLUMN_TENSORS
     tensors = {name: part.array() for name, part in read_tensors(answer).tensors.items()}
     return {name: array.T if by_column else array for name, array in tensors.items()}
 
 
 def pair(create, *arguments, **fields):
-    """Return two instances that go the same way."""
+    """Return two instances that play the same."""
     return [create(*arguments, **fields) for _ in range(2)]
 
 
@@ -185,7 +185,7 @@ def test_tensors_can_be_sent_with_the_wish_for_no_infos(client, create):
     assert "'info'" in json.loads(answer.data)["message"]
 
 
-# What the R client sends; see R/http-connection.R.
+# The Accept header of the R client; see R/http-connection.R.
 R_ACCEPTS = "application/x-safetensors; order=column, application/x-safetensors;q=0.9"
 
 

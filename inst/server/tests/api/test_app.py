@@ -124,7 +124,7 @@ def test_no_flood_of_keys_makes_a_step_be_taken_twice(app, client, faulty):
     first = client.post(f"{url}/step/", json=once("victim", 2, action=0))
     for number in range(10_001):
         flood(app, "/v1/envs/0/step/", once(f"flood{number}", 1, action=0))
-        # Nor one of calls that the instance refuses.
+        # Neither does one for calls that the instance refuses.
         flood(app, f"{url}/step/", once(f"refused{number}", 1, action=9))
     app._exactly_once._drop_gone()
     assert client.post(f"{url}/step/", json=once("victim", 2, action=0)).data == first.data
@@ -132,7 +132,7 @@ def test_no_flood_of_keys_makes_a_step_be_taken_twice(app, client, faulty):
 
 
 def flood(app, path, fields):
-    """Send a request without a client's detours, which would take ten times as long."""
+    """Send a request directly; the test client takes ten times as long."""
     body = json.dumps(fields).encode()
     environ = {
         "REQUEST_METHOD": "POST",
@@ -176,7 +176,7 @@ def test_what_raised_inside_the_environment_is_not_done_again(client, faulty, na
     client.post(f"{url}/reset/")
     answers = [client.post(f"{url}/step/", json=once("a", 1, action=1)) for _ in range(2)]
     assert answers[0].data == answers[1].data
-    # The number is known: with another action it is a conflict.
+    # The number is known: another action is a conflict.
     assert client.post(f"{url}/step/", json=once("a", 1, action=0)).status_code == 409
 
 

@@ -9,7 +9,7 @@ from gym_server.response import Response
 
 
 class Counter:
-    """Counts how often it was done, on an instance or making one."""
+    """Counts its calls, which use or create an instance."""
 
     def __init__(self, did_something=True, instance_id=None):
         self.calls = 0
@@ -21,19 +21,19 @@ class Counter:
 
 
 def outcome(text, *what, size=0):
-    """Return an outcome whose response says a text, and has so many bytes."""
+    """Return an outcome whose response has a text and a size in bytes."""
     return Outcome(Response(200, bytes(size), str(text)), *what)
 
 
 class Once(ExactlyOnce):
-    """One whose calls move the instance "i", if they do not say another."""
+    """An ``ExactlyOnce`` whose calls use the instance "i" by default."""
 
     def __init__(self, living=("i",), **limits):
         self.living = set(living)
         super().__init__(self.living.__contains__, **limits)
 
     def answer(self, request_id, content, act, instance_id="i"):
-        """Return the text of the response, as a number where it is one."""
+        """Return the text of the response, or the number in it."""
         if isinstance(act, Counter) and act.instance_id is None:
             act.instance_id = instance_id
         text = self.respond(request_id, instance_id, content, len(content), act).content_type
@@ -130,7 +130,7 @@ def test_what_was_refused_before_anything_moved_leaves_nothing():
     assert not once._table
     assert once.answer(RequestId("a", 1), "step", act) == 1
     once.answer(RequestId("a", 2), "step", refuse)
-    # What the key did before is still known.
+    # The key's previous request is still known.
     assert once.answer(RequestId("a", 1), "step", act) == 1
     assert act.calls == 1
 
@@ -164,7 +164,7 @@ NUMBER_1 = RequestId("a", 1)
 
 def test_numbers_grow_for_each_instance_by_itself():
     once, act = Once(living=["i", "j"]), Counter()
-    # A guessed key blocks only the instance on which it is used.
+    # A guessed key blocks only the instance that it is used on.
     once.answer(RequestId("a", 2**62), "step", Counter(), "j")
     assert once.answer(NUMBER_1, "step", act) == 1
     assert once.answer(NUMBER_1, "step", act) == 1
@@ -185,7 +185,7 @@ def test_the_last_call_on_a_living_instance_and_its_creation_are_never_forgotten
     once.answer(NUMBER_1, "create", created, None)
     once.answer(NUMBER_1, "step", Counter())
     once.answer(RequestId("b", 1), "step", stepped)
-    # Another key's call has been idle for so long that it makes room.
+    # Another key was idle for so long that it makes room.
     refuse = Counter(did_something=False)
     once.answer(RequestId("c", 1), "step", refuse)
     assert set(once._table["i"]) == {"b"}
@@ -260,7 +260,7 @@ def test_what_never_comes_back_is_answered_by_another_thread():
     assert once.answer(RequestId("a", 2), "step", act) == 1
     may_end.set()
     thread.join(10)
-    # The answer that came too late is dropped.
+    # The late answer is dropped.
     assert once.answer(RequestId("a", 2), "step", act) == 1
     assert once.abandon(thread.ident, str) is None
 
@@ -273,7 +273,7 @@ def test_what_all_keep_together_is_bounded_and_nothing_is_done_again():
             NUMBER_1, "x" * 10, lambda size=size: outcome(size, True, size=size), instance_id
         )
     act = Counter()
-    # The largest one had to go.
+    # The largest one was dropped.
     assert [once.answer(NUMBER_1, "x" * 10, act, one) for one in "ij"] == [90, 70]
     assert once.answer(RequestId("first", 1), "", act, "i") == "first"
     assert conflict(once, NUMBER_1, "x" * 10, act, "k")

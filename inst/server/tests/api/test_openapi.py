@@ -115,7 +115,7 @@ def test_sub_envs_are_described():
 
 
 def test_the_environment_ids_that_it_names_can_be_created(client):
-    """A fuzzer that knows no others finds instances to go on with."""
+    """So that a fuzzer that knows no other ids finds instances."""
     body = document(ROUTES)["paths"]["/v1/envs/"]["post"]["requestBody"]
     examples = body["content"]["application/json"]["schema"]["properties"]["env_id"]["examples"]
     assert len(examples) > 1

@@ -1,4 +1,4 @@
-"""A request finds its route."""
+"""Find the route of a request."""
 
 import pytest
 

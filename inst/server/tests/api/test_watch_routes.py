@@ -1,4 +1,4 @@
-"""The watch page as the server hands it out."""
+"""The watch page as the server sends it."""
 
 import json
 

@@ -27,7 +27,7 @@ def test_one_line_says_where_the_server_is(serve):
 def test_a_signal_stops_it_with_status_0(serve, how):
     server = serve()
     server.create("CartPole-v1")
-    # Far less than a request under way may take.
+    # Much less than a request in progress may take.
     assert server.stop(how, timeout=8)[0] == 0
 
 
@@ -57,7 +57,7 @@ def test_the_log_is_removed_when_standard_input_closes_without_a_line(serve, tmp
 def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
     server = serve("--isolate", isolate, limits=SHORT_GRACE, TMPDIR=str(tmp_path))
     how = {"num_envs": 1, "vectorization_mode": "async"}
-    # The second is made by processes that the first has left as they are.
+    # The second one uses the processes that the first one left.
     urls = [server.create("faulty_envs:Hanging-v0", **how) for _ in range(2)]
     assert any(tmp_path.iterdir())
     for url in urls:
@@ -180,7 +180,7 @@ def test_a_video_under_way_is_finished_at_the_stop(serve, tmp_path):
 @needs_signals
 def test_what_never_returns_does_not_keep_it_alive(serve, tmp_path, gate, eventually):
     pytest.importorskip("moviepy")
-    # Time enough for the videos of the others.
+    # Enough time for the other videos.
     limits = {**SHORT_GRACE, "gym_server.cli.main._LAST_SECONDS": 4}
     server = serve("--monitor-dir", str(tmp_path), limits=limits)
     stepping = server.create("faulty_envs:Gated-v0", kwargs=gate.kwargs)

@@ -1,4 +1,4 @@
-"""The Containerfile starts the server with options that it has."""
+"""The Containerfile uses only options that the server has."""
 
 import json
 import re

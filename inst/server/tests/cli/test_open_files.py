@@ -18,7 +18,7 @@ print(*resource.getrlimit(resource.RLIMIT_NOFILE))
     ("soft", "hard", "then"), [(256, 2000, 2000), (300, 300, 300), (2000, 2000, 2000)]
 )
 def test_the_limit_is_raised_as_far_as_is_allowed(soft, hard, then):
-    # In a process of its own: the limit cannot be raised again.
+    # In a process of its own, because the limit cannot be raised again.
     words = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(soft=soft, hard=hard)],
         capture_output=True,

@@ -13,7 +13,7 @@ def test_the_end_of_a_long_log_is_kept_and_written_on(tmp_path, monkeypatch):
         own_log.shorten(file, log.fileno())
         assert file.read_bytes() == b"".join(lines[:100])
         log.write(b"".join(lines[100:]))
-        # As another process of the server's has it.
+        # Like the descriptor of another process of the server.
         other = os.dup(log.fileno())
         own_log.shorten(file, log.fileno())
         os.write(other, b"more\n")

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 
 def refused(port):
-    """Start a server on a taken port; return the one line that it says."""
+    """Start a server on a taken port; return the line that it prints."""
     second = subprocess.run(
         [sys.executable, "-m", "gym_server", "--port", str(port)],
         cwd=SERVER,

@@ -22,7 +22,7 @@ def test_a_file_holds_the_token(tmp_path, end):
 def test_the_variable_holds_it_where_there_is_no_file(tmp_path):
     variables = {VARIABLE: f"{TOKEN}-2"}
     assert find_token(None, variables) == f"{TOKEN}-2"
-    # Nothing that an environment starts inherits it.
+    # Processes that an environment starts do not inherit it.
     assert variables == {}
     variables = {VARIABLE: f"{TOKEN}-2"}
     assert find_token(written(tmp_path, TOKEN.encode()), variables) == TOKEN

@@ -1,4 +1,4 @@
-"""One call takes only so many steps, and arguments are only so large."""
+"""Limits on the steps of one call, and on the size of arguments."""
 
 import pytest
 
@@ -7,7 +7,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def refused(client):
-    """Ask for what must be refused; return the message."""
+    """Create an environment that must be refused; return the message."""
 
     def refused(env_id="CartPole-v1", **fields):
         answer = client.post("/v1/envs/", json={"env_id": env_id, **fields})

@@ -77,7 +77,7 @@ CLASSIC_ATARI = {
 
 @pytest.fixture
 def no_atari(monkeypatch):
-    """Take ale_py away, as if it were not installed."""
+    """Simulate that ale_py is not installed."""
     monkeypatch.setattr(registry, "_registered", set())
     monkeypatch.setitem(sys.modules, "ale_py", None)
     known = dict(gymnasium.registry)
@@ -116,7 +116,7 @@ def test_another_id_is_no_atari_game(env_id):
 
 
 def test_what_cannot_be_made_in_any_way_is_not_offered():
-    # phys2d/CartPole-v1 needs jax, which is in no extra.
+    # phys2d/CartPole-v1 needs jax, which no extra installs.
     assert "phys2d" not in refusal("CartPol-v1").hint
     refused = refusal("phys2d/CartPole-v1")
     assert refused.code == "missing_dependency"

@@ -1,4 +1,4 @@
-"""Memory is estimated before it is taken, for all environments together."""
+"""Memory is estimated before it is used, for all environments together."""
 
 import sys
 import tracemalloc
@@ -29,7 +29,7 @@ MB = 2**20
 
 @pytest.fixture
 def limited():
-    """Return a client of an application whose environments may take so many MiB."""
+    """Return a client of an application with a memory limit in MiB."""
     apps = []
 
     def limited(max_memory_mb=Limits.max_memory_mb, isolate="none"):
@@ -58,7 +58,7 @@ def refused(answer):
 
 @pytest.fixture
 def nothing_large(monkeypatch):
-    """Fail where a space of more than 64 MB is made."""
+    """Fail if a space of more than 64 MB is made."""
     make_box = spaces.Box.__init__
 
     def small(self, low, high, shape=None, dtype=np.float32, **how):
@@ -98,13 +98,13 @@ def test_nested_wrappers_are_refused_before_they_take_memory(
     assert any(wrapper["name"] in answer.json["message"] for wrapper in wrappers)
     assert "4,096 MiB for all environments together" in answer.json["message"]
     assert "--max-memory-mb" in answer.json["hint"]
-    # Nothing of it stays taken.
+    # All memory was returned to the budget.
     assert client.application._instances._budget.left == 4096 * MB
 
 
 @pytest.mark.parametrize(("num_envs", "most"), [(None, 200), (2, 400)])
 def test_what_discretizing_multiplies_is_refused_before_it_is_flattened(limited, num_envs, most):
-    # Small pictures and little memory: to discretize each number of a picture takes time.
+    # Small pictures and little memory: discretizing each number of a picture takes time.
     wrappers = [
         {"name": "AddRenderObservation"},
         {"name": "ResizeObservation", "kwargs": {"shape": [110, 110]}},
@@ -145,13 +145,13 @@ def test_what_may_take_much_at_once_is_made_in_a_process(limited, num_envs):
         assert client.get(url).json["isolated"] is isolated
         assert client.post(f"{url}/close/").status_code == 204
     assert client.application._instances._budget.left == 4096 * MB
-    # What fits nowhere is refused, and not made in a process to find out.
+    # An environment that fits nowhere is refused without trying it in a process.
     assert refused(create(client, wrappers=[*pictures, *stacks(1000)], num_envs=num_envs))
 
 
 def test_sub_environments_count(limited):
     client = limited()
-    # 600 x 400 x 3 bytes, of which small integers are sent.
+    # 600 x 400 x 3 bytes, which are sent as small integers.
     pictures = [{"name": "AddRenderObservation"}]
     assert create(client, wrappers=pictures, num_envs=2).status_code == 200
     assert refused(create(client, wrappers=pictures, num_envs=1024))
@@ -184,7 +184,7 @@ def test_a_vector_implementation_that_was_tried_in_vain_is_not_counted(limited):
     made = create(client, num_envs=8, vectorization_mode="sync").json["instance_id"]
     alone = budget.left
     client.post(f"/v1/envs/{made}/close/")
-    # CartPole's own implementation resets in the next step only.
+    # CartPole's own implementation supports only resets in the next step.
     create(client, num_envs=8, autoreset_mode="SameStep")
     assert budget.left == alone
 

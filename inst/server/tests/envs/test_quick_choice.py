@@ -1,4 +1,4 @@
-"""Cards are drawn quickly, and are those that Gymnasium draws."""
+"""Cards are drawn quickly, and are the same as Gymnasium's."""
 
 import gymnasium
 import numpy as np
@@ -14,7 +14,7 @@ def test_a_list_is_chosen_from_as_numpy_does():
         assert [ours.choice(items) for _ in range(100)] == [
             numpys.choice(items) for _ in range(100)
         ]
-    # Anything else is NumPy's.
+    # All other calls use NumPy.
     assert ours.choice([1, 2, 3], 5).tolist() == numpys.choice([1, 2, 3], 5).tolist()
     assert ours.choice([1, 2], p=[0.9, 0.1]) == numpys.choice([1, 2], p=[0.9, 0.1])
     assert ours.choice(7) == numpys.choice(7)

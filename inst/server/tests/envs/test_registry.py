@@ -90,7 +90,7 @@ def test_what_an_allowed_module_registers_belongs_to_it(client):
 @pytest.mark.parametrize("env_id", ["GymV21Environment-v0", "GymV26Environment-v0"])
 @pytest.mark.parametrize("name", ["{}", "faulty_envs:{}"])
 def test_an_environment_that_imports_what_it_is_told_is_refused(client, monkeypatch, env_id, name):
-    # As shimmy would register it.
+    # As shimmy registers it.
     spec = gymnasium.envs.registration.EnvSpec(env_id, lambda env_id: __import__(env_id))
     monkeypatch.setitem(gymnasium.registry, env_id, spec)
     assert [entry["available"] for entry in found(client, search=env_id)] == [False]
@@ -103,7 +103,7 @@ def test_an_environment_that_imports_what_it_is_told_is_refused(client, monkeypa
 
 
 def python(code):
-    """Run code in a process of its own; return the JSON that it prints."""
+    """Run code in its own process; return the JSON that it prints."""
     command = [sys.executable, "-c", code]
     return json.loads(subprocess.check_output(command, cwd=SERVER, text=True, timeout=60))
 

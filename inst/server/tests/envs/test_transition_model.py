@@ -1,4 +1,4 @@
-"""Environments tell how they move, where they have a table of it."""
+"""Environments with a table of transitions return it as a model."""
 
 import inspect
 
@@ -30,7 +30,7 @@ CASES = [
     (TaxiEnv, ["Taxi-v4"], {"is_rainy": True, "rainy_probability": 0.1}),
     (TaxiEnv, ["Taxi-v4"], {"fickle_probability": 0.5}),
 ]
-# Of another version of Gymnasium may be an id or an argument.
+# Other versions of Gymnasium may lack an id or an argument.
 MADE_HERE = [
     (env_id, kwargs)
     for kind, env_ids, kwargs in CASES
@@ -40,7 +40,7 @@ MADE_HERE = [
 
 
 def of_gymnasium(env_id, kwargs):
-    """Return the model of Gymnasium's environment, written out."""
+    """Return the model of a Gymnasium environment, computed in the test."""
     env = gymnasium.make(env_id, **kwargs).unwrapped
     rows = [
         (state, action, next_state, probability, reward, terminated)
@@ -67,7 +67,7 @@ def refusal(client, url, status=400, code="not_supported"):
 def test_a_model_is_the_table_of_gymnasium(client, create, env_id, kwargs):
     answer = client.get(f"{create(env_id, kwargs=kwargs)}/model/")
     assert answer.status_code == 200, answer.json
-    # Exactly: a float is the same one after its way through JSON.
+    # Exactly: JSON does not change a float.
     assert answer.json == {"model": of_gymnasium(env_id, kwargs)}
 
 
@@ -105,7 +105,7 @@ def test_numbers_are_those_of_the_table_and_impossible_transitions_are_left_out(
     assert [model[name][3:] for name in COLUMNS[2:]] == [
         [1, 0],
         [0.5, 0.5],
-        # The nearest float of 32 bits, with all its digits.
+        # The nearest 32-bit float, with all digits.
         [0.10000000149011612, -100],
         [True, False],
     ]

@@ -23,9 +23,9 @@ def wrapped(name, **kwargs):
     return {"name": name, "kwargs": kwargs}
 
 
-# Each wrapper that Gymnasium may have, with arguments, and an environment that it fits.
+# Each wrapper of Gymnasium, with arguments and an environment that it fits.
 EXAMPLES = [
-    # Whose pictures are small.
+    # An environment with small pictures.
     ("faulty_envs:Drawing-v0", wrapped("AddRenderObservation", render_only=False)),
     ("CartPole-v1", wrapped("AddWhiteNoise", probability_of_noise_per_pixel=0.5)),
     ("Pendulum-v1", wrapped("ClipAction")),
@@ -281,7 +281,7 @@ def test_a_wrapper_whose_library_is_missing_names_the_extra(client, monkeypatch)
     ],
 )
 def test_no_wrapper_may_use_up_the_machine(name, kwargs):
-    # The check alone: were it missing, the real thing would take all memory.
+    # Only the check: without it, the real wrapper would take all memory.
     with pytest.raises(GymServerError) as refusal:
         check_wrapper(Wrapper(name, kwargs))
     assert refusal.value.code == "invalid_kwargs"

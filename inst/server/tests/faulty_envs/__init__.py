@@ -1,7 +1,7 @@
 """Environments that misbehave, or have spaces that the classic ones lack.
 
-For tests: ``--allow-module faulty_envs`` lets a server make them, as in
-``faulty_envs:Echo-v0``.  The module needs Gymnasium and nothing else.
+For tests: with ``--allow-module faulty_envs`` a server can make them, as in
+``faulty_envs:Echo-v0``. The module needs only Gymnasium.
 """
 
 import gymnasium

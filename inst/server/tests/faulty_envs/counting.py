@@ -1,5 +1,5 @@
-"""The environment that most of the others derive from, which behaves, and one that changes what
-it has returned."""
+"""A well-behaved environment that most others derive from, and one that changes what it has
+returned."""
 
 import time
 
@@ -9,7 +9,7 @@ from gymnasium import spaces
 
 
 class Counting(gymnasium.Env):
-    """Observes how often it was stepped since it was made; an episode lasts ``length`` steps."""
+    """Observes the number of its steps; an episode lasts ``length`` steps."""
 
     observation_space = spaces.Box(0, 2**62, (1,), np.int64)
     action_space = spaces.Discrete(2)
@@ -34,9 +34,9 @@ class Counting(gymnasium.Env):
 
 
 class KeepsItsArrays(Counting):
-    """Returns and draws the same objects all the time, and changes them in place.
+    """Always returns and draws the same objects, and changes them in place.
 
-    It observes how many steps the episode has taken.
+    It observes the number of steps of the episode.
     """
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012

@@ -1,4 +1,4 @@
-"""Environments that draw, and one that cannot draw what the server wants."""
+"""Environments that draw, and one that cannot draw what the server needs."""
 
 import threading
 import time
@@ -9,7 +9,7 @@ from faulty_envs.counting import Counting
 
 
 class Drawing(Counting):
-    """Draws what its kwarg says, and notes the threads that draw and close it."""
+    """Draws what its kwarg says, and notes which threads draw and close it."""
 
     threads = set()  # noqa: RUF012
 

@@ -16,7 +16,7 @@ class Hanging(Counting):
 
 
 class Meeting(Counting):
-    """A step waits until as many files lie in a directory as are to come, its own included."""
+    """A step adds a file to a directory, and waits until the directory has a number of files."""
 
     def __init__(self, directory, count):
         super().__init__()
@@ -33,9 +33,9 @@ class Meeting(Counting):
 
 
 class Gated(Counting):
-    """Waits until a test lets it go on, in its step or, where its kwarg says so, in its drawing.
+    """Waits until a test lets it continue, in its step or, if its kwarg says so, when drawing.
 
-    It makes a file "begun" in a directory then, and waits for a file "open".
+    It creates a file "begun" in a directory, and waits for a file "open".
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
@@ -64,7 +64,7 @@ class Gated(Counting):
 
 
 class HangsWhere(Counting):
-    """Hangs for some seconds where its kwarg says: in "init", "reset", "render" or "close"."""
+    """Hangs for some seconds in the method that its kwarg names: init, reset, render or close."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
     closed = 0
@@ -92,9 +92,9 @@ class HangsWhere(Counting):
 
 
 class Spins(Counting):
-    """Loops without an end where its kwarg says: in "init", "step", "render" or "close".
+    """Loops forever in the method that its kwarg names: init, step, render or close.
 
-    With "init elsewhere" in the constructor, in a process that another one has started.
+    With "init elsewhere", in the constructor in a process that another one has started.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
@@ -123,7 +123,7 @@ class Spins(Counting):
 
 
 class HangsWhenClosedElsewhere(Counting):
-    """Hangs when it is closed in a process that another one has started."""
+    """Hangs when it is closed in a child process."""
 
     def close(self):
         if multiprocessing.parent_process() is not None:

@@ -7,7 +7,7 @@ from faulty_envs.counting import Counting
 
 
 class Echo(Counting):
-    """Observes the action that it got; its Box is what the kwargs say."""
+    """Observes its last action; the kwargs define its Box."""
 
     def __init__(self, dtype="float32", low=-1, high=1, shape=(1,)):
         super().__init__()
@@ -33,7 +33,7 @@ _NAMED = ("inf", "-inf")
 
 
 class Shifted(Counting):
-    """A Discrete space that does not begin at 0."""
+    """Has a Discrete space that does not start at 0."""
 
     action_space = spaces.Discrete(3, start=-1)
 
@@ -42,7 +42,7 @@ class Shifted(Counting):
 
 
 class NotANumber(Counting):
-    """Everything that JSON has no word for."""
+    """Returns everything that JSON cannot express."""
 
     observation_space = spaces.Box(-np.inf, np.inf, (4,), np.float32)
 
@@ -65,7 +65,7 @@ class NotANumber(Counting):
 
 
 class Nested(Counting):
-    """Observes the action that it got, of all kinds that travel as tensors."""
+    """Observes its last action, with all kinds of spaces that can be sent as tensors."""
 
     action_space = observation_space = spaces.Dict(
         {
@@ -84,7 +84,7 @@ class Nested(Counting):
 
 
 class Letters(Counting):
-    """Spaces that travel as JSON only."""
+    """Has spaces that are sent as JSON only."""
 
     action_space = observation_space = spaces.Sequence(spaces.Discrete(26))
 
@@ -125,7 +125,7 @@ class CustomSpace(Counting):
 
 
 class Deep(Counting):
-    """Has a space in a space in a space."""
+    """Has a deeply nested space."""
 
     def __init__(self, depth):
         super().__init__()

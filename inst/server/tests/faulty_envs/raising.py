@@ -43,14 +43,14 @@ class RaisesInClose(Counting):
 
 
 class Variables(Counting):
-    """Tells the variables of its process, as an environment might."""
+    """Returns the environment variables of its process."""
 
     def __init__(self):
         raise ValueError(dict(os.environ))
 
 
 class RaisesElsewhere(Counting):
-    """Cannot be made in a process that another one has started."""
+    """Cannot be made in a child process."""
 
     def __init__(self, seconds=0.001):
         super().__init__(seconds)

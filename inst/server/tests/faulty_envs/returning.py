@@ -1,4 +1,4 @@
-"""An environment that returns what it is told to."""
+"""An environment that returns given values."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from faulty_envs.counting import Counting
 
 
 class Returning(Counting):
-    """Returns this reward, as an array, and this info; the info of a reset only when asked to."""
+    """Returns a given reward, as an array, and info; an info of a reset only on request."""
 
     def __init__(self, reward=1.5, info=None, in_reset=False):
         super().__init__()

@@ -1,4 +1,4 @@
-"""An environment that ends its process, or does worse to it."""
+"""An environment that ends its process, or attacks it."""
 
 import contextlib
 import ctypes
@@ -14,7 +14,7 @@ from faulty_envs.counting import Counting
 
 
 class Rogue(Counting):
-    """Does something to its process, by name, where its kwarg says."""
+    """Attacks its process, in a way and at a place that its kwargs name."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
@@ -94,7 +94,7 @@ class Rogue(Counting):
         self.hoard.append(np.ones(2**24))
 
     def never_returns(self):
-        # Nor does any other thread of its process run meanwhile.
+        # No other thread of its process runs meanwhile.
         ctypes.PyDLL(None).sleep(3600)
 
     def forges(self):
@@ -106,7 +106,7 @@ class Rogue(Counting):
 
 
 class Unpickled:
-    """Creates the file that a test looks for, where it is unpickled."""
+    """Creates a file when it is unpickled, which the test looks for."""
 
     def __reduce__(self):
         return open, (os.environ.get("FORGED_FILE", os.devnull), "w")
@@ -115,5 +115,5 @@ class Unpickled:
 _FORGED = pickle.dumps(Unpickled())
 
 
-# As a message of the server's own.
+# In the format of the server's own messages.
 FORGED = len(_FORGED).to_bytes(8, "little") + _FORGED

@@ -1,4 +1,4 @@
-"""Environments with tables of their transitions, sound ones and others."""
+"""Environments with tables of their transitions, valid and invalid ones."""
 
 from fractions import Fraction
 
@@ -14,7 +14,7 @@ _ITSELF.append(_ITSELF)
 
 
 def _with(outcomes):
-    """Return a table of two states and actions, one of which has certain outcomes."""
+    """Return a table of two states and actions, with given outcomes of one action."""
     return {0: {0: _STAYS, 1: _STAYS}, 1: {0: _STAYS, 1: outcomes}}
 
 
@@ -81,7 +81,7 @@ STARTS = {
 
 
 class Table(Counting):
-    """Has a table, a distribution of the first state, and spaces, by name; it moves by none."""
+    """Has a table, a start distribution and spaces, by name; it does not move by them."""
 
     action_space = spaces.Discrete(2)
 
@@ -105,7 +105,7 @@ class Table(Counting):
 
 
 class _TimeLimit(gymnasium.wrappers.TimeLimit):
-    """Is a TimeLimit by its class, and gives other rewards."""
+    """A subclass of TimeLimit that changes rewards."""
 
     def step(self, action):
         observation, reward, *others = super().step(action)
@@ -113,5 +113,5 @@ class _TimeLimit(gymnasium.wrappers.TimeLimit):
 
 
 def LooksTimed():  # noqa: N802
-    """Make an environment with that wrapper."""
+    """Make an environment with this wrapper."""
     return _TimeLimit(Table(), 100)

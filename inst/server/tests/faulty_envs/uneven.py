@@ -1,4 +1,4 @@
-"""Environments whose episodes differ, for vector environments; some of them fail."""
+"""Environments with different episodes, for vector environments; some of them fail."""
 
 import copy
 import os
@@ -11,7 +11,7 @@ from faulty_envs.odd_spaces import SPACES
 
 
 class Uneven(gymnasium.Env):
-    """Its seed decides how long each episode lasts; its infos come and go."""
+    """Its seed decides how long each episode lasts; its infos vary."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
@@ -45,7 +45,7 @@ class Uneven(gymnasium.Env):
 
 
 class KillsItself(Uneven):
-    """Its process is gone in the second step."""
+    """Ends its process in the second step."""
 
     def step(self, action):
         if self.left == 1:
@@ -55,7 +55,7 @@ class KillsItself(Uneven):
 
 
 class CannotSaySo(Uneven):
-    """What it raises cannot be sent to another process."""
+    """Raises an exception that cannot be sent to another process."""
 
     def step(self, action):
         failure = RuntimeError("here")
@@ -64,7 +64,7 @@ class CannotSaySo(Uneven):
 
 
 class SpoilsOneSubEnv(Uneven):
-    """Fails in the sub-environment whose episodes are longest."""
+    """Fails in the sub-environment with the longest episodes."""
 
     def step(self, action):
         if self.left == self.longest:
@@ -73,7 +73,7 @@ class SpoilsOneSubEnv(Uneven):
 
 
 class Insists(Uneven):
-    """Takes members of its action space alone, and at times not even those."""
+    """Accepts only members of its action space, and sometimes not even those."""
 
     def step(self, action):
         assert self.action_space.contains(action), "no action"

@@ -1,4 +1,4 @@
-"""One connection's code, whose timeouts are short, and a client that behaves badly."""
+"""The code of one connection, with short timeouts, and a client that behaves badly."""
 
 import gc
 import socket
@@ -23,7 +23,7 @@ ROOM = 2**18
 
 
 class App:
-    """Answers with as many bytes as the path says."""
+    """Returns as many bytes as the path says."""
 
     def __init__(self, recognizes):
         self.recognizes = recognizes
@@ -48,7 +48,7 @@ def short_timeouts(monkeypatch):
 
 @pytest.fixture
 def converse(short_timeouts):
-    """Return a function that connects a client to a connection of its own, and that thread."""
+    """Return a function that connects a client to a new connection, and returns the thread."""
     listener = socket.create_server(("127.0.0.1", 0))
     clients, threads = [], []
 
@@ -105,7 +105,7 @@ def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
     received = 0
     with suppress(ConnectionError):
         while thread.is_alive() and received < 2**21:
-            # Never nothing for as long as that may be, and yet too little.
+            # Never idle for the longest allowed time, but too slow.
             received += len(client.recv(4096))
             thread.join(0.01)
     assert received < 2**21
@@ -116,7 +116,7 @@ def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
     client.sendall(GET % b"%d" % 2**21)
     began, received = time.monotonic(), len(read_head(client))
     while received < 2**21:
-        # Twice as fast as it has to be, for longer than nothing may be read.
+        # Twice as fast as required, for longer than the longest allowed pause.
         time.sleep(max(0, began + received / 2**21 - time.monotonic()))
         received += len(client.recv(65536))
     client.sendall(GET % b"")
@@ -127,7 +127,7 @@ def test_a_client_that_is_recognized_may_be_silent_for_long(converse):
     client, _ = converse()
     client.sendall(GET % b"")
     assert b"200 OK" in read_head(client)
-    # Longer than it may be while it sends or reads.
+    # Longer than a pause may be while it sends or reads.
     time.sleep(1)
     client.sendall(GET % b"")
     assert b"200 OK" in read_head(client)
@@ -170,7 +170,7 @@ def test_an_unrecognized_client_may_not_be_silent(converse, begun):
 def test_a_client_that_is_not_recognized_gains_no_time_by_dripping(
     converse, monkeypatch, begun, drop
 ):
-    # Each byte gains a second for a client that is recognized.
+    # Each byte gains a second for a recognized client.
     monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 1)
     client, thread = converse(most=2 * LARGE, recognizes=recognizes_nobody)
     until = time.monotonic() + 1.5

@@ -9,7 +9,7 @@ from gym_server.http_server.connections import Connections
 
 
 class Fake:
-    """A connection as others see it."""
+    """Imitates a connection."""
 
     thread = 0
 

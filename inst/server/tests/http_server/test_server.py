@@ -225,7 +225,7 @@ def test_a_request_repeated_after_the_connection_broke_is_done_once(server, gate
     with server.socket() as connection:
         connection.sendall(step(url, 1))
         eventually(gate.is_reached)
-        # Closing with a reset, as a network that fails does.
+        # Close with a reset, like a network that fails.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     with server.socket() as connection:
         connection.sendall(step(url, 1))
@@ -243,7 +243,7 @@ def test_repetitions_that_arrive_while_the_first_runs_are_done_once(server, gate
     for connection in connections:
         connection.sendall(step(url, 1))
     eventually(gate.is_reached)
-    # Time for the others to come; it holds as well for one that comes later.
+    # Time for the others to come; the test is also valid for one that comes later.
     time.sleep(0.05)
     gate.open()
     bodies = {read_answer(connection)[2] for connection in connections}
@@ -266,7 +266,7 @@ def test_many_clients_are_served_at_the_same_time(server, tmp_path):
         connection.close()
 
 
-# What a client that has sent half a request is waited for, at the stop.
+# How long the server waits, at the stop, for a client that has sent half a request.
 SOON_DROPPED = {"gym_server.http_server.server._HALF_SENT_SECONDS": 0.5}
 
 
@@ -277,7 +277,7 @@ def test_idle_and_silent_clients_hold_nobody_up(serve):
         answered(connection, request("GET", "/v1/health/"))
     idle[60].sendall(b"POST /v1/envs/ HTTP/1.1\r\nContent-Le")
     assert server.get("/v1/health/")[0] == 200
-    # Less than a request under way may take.
+    # Less than a request in progress may take.
     assert server.stop(timeout=9)[0] == 0
     for connection in idle:
         connection.close()
@@ -285,7 +285,7 @@ def test_idle_and_silent_clients_hold_nobody_up(serve):
 
 @pytest.mark.parametrize("how", ["signal", "shutdown", "end of input"])
 def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, gate, eventually, how):
-    # One that did not wait for its requests would be gone soon.
+    # A server that did not wait for its requests would end soon.
     limits = {"gym_server.cli.main._LAST_SECONDS": 0.1}
     server = serve("--stop-on-stdin-eof", limits=limits)
     url = gated(server, gate)
@@ -309,10 +309,10 @@ def test_a_request_under_way_is_answered_in_full_at_the_stop(serve, gate, eventu
 def test_a_large_answer_under_way_arrives_in_full(serve, eventually):
     server = serve()
     url = server.create("faulty_envs:Counting-v0")
-    # Its options come back, each letter as an escape of six.
+    # Its options are returned, each letter as an escape of six characters.
     options = {"text": "é" * 500_000}
     with socket.socket() as connection:
-        # Far less than the answer, which has to wait for this client.
+        # Much smaller than the response, which must wait for this client.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**17)
         connection.settimeout(30)
         connection.connect(("127.0.0.1", server.port))

@@ -1,4 +1,4 @@
-"""Box actions outside of their bounds: handed on, as Gymnasium does in process."""
+"""Box actions out of bounds are passed to the environment, as in Gymnasium."""
 
 import gymnasium
 import numpy as np
@@ -13,7 +13,7 @@ from gym_server.instances.actions import ActionReader
 from gym_server.protocol import safetensors
 from gym_server.protocol.safetensors import TENSORS, Tensor
 
-# What an unclipped Gaussian policy sends, and the float32 next to a bound.
+# Actions of an unclipped Gaussian policy, and the float32 next to a bound.
 OUTSIDE = [2.5, -2.000000238, 1e30, -7.0]
 
 
@@ -67,7 +67,7 @@ def test_so_do_its_sub_envs(client, create, mode):
 
 @pytest.fixture(scope="module")
 def isolating():
-    """Start a server that runs each environment in a process of its own."""
+    """Start a server that runs each environment in its own process."""
     server = ServerProcess(*ON_A_FREE_PORT, "--isolate", "all")
     yield server
     server.kill()

@@ -296,7 +296,7 @@ def test_a_frame_shows_the_current_state(client, faulty):
 
 
 def test_a_frame_that_is_not_sent_yet_stays_as_it_is():
-    # Others may step an environment while a frame of it becomes a file.
+    # Others may step an environment while its frame is encoded.
     config = EnvConfig("KeepsItsArrays-v0")
     how = ((), 1, RenderThread(), contextlib.ExitStack(), MemoryReservation())
     instance = make_instance(config, *how)

@@ -29,7 +29,7 @@ from gym_server.protocol import safetensors
 from gym_server.protocol.safetensors import TENSORS, Tensor
 from gym_server.spaces.stacking import stack, unstack
 
-# What comes is what Gymnasium has ------------------------------------------------------------
+# The same as in Gymnasium --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mode", MODES_SLOWLY)
@@ -60,7 +60,7 @@ def check_play(client, url, kind, mode, steps=12):
         if mode == "Disabled" and any(answer["done"]):
             reset_those_that_ended(client, url, env, answer["done"])
         if step == 7:
-            # Also when an autoreset was to come.
+            # Even if an automatic reset is due.
             expected, _ = env.reset(seed=[3, None, 5])
             answer = post(client, url, "reset", seed=[3, None, 5])
             assert apart(space, answer["observation"]) == members(env, expected)
@@ -182,7 +182,7 @@ def test_a_seed_that_is_no_list_for_these_sub_envs_is_refused(client, sub_envs):
     assert refusal(client, url, "reset", seed=[1, "a", 3])[0] == "invalid_parameter"
 
 
-# Episodes that are over ----------------------------------------------------------------------
+# Episodes that have ended --------------------------------------------------------------------
 
 
 def test_a_sub_env_that_ended_does_not_step_when_nobody_resets_it(client, sub_envs):

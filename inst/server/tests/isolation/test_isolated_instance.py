@@ -1,4 +1,4 @@
-"""Environments in processes of their own, through a real server: they answer as others do."""
+"""Environments in their own processes, through a real server: they answer like others."""
 
 import itertools
 import json
@@ -18,7 +18,7 @@ needs_posix = pytest.mark.skipif(os.name != "posix", reason="signals, and proces
 
 @pytest.fixture(scope="module")
 def servers(tmp_path_factory):
-    """Return a server with a process for each environment, and one without any."""
+    """Return a server with a process for each environment, and one without processes."""
     servers = {}
     for mode in ("all", "none"):
         directory = tmp_path_factory.mktemp(mode)
@@ -46,7 +46,7 @@ def raw(server, method, path, body=b"", accept="application/json"):
 
 
 def both(servers, env_id, calls, **fields):
-    """Return what each server answers to calls, a list of method, path, body and accept."""
+    """Return the responses of each server to calls, a list of method, path, body and accept."""
     heard = []
     for server in servers.values():
         url = server.create(env_id, **fields)
@@ -105,7 +105,7 @@ FORMS = [
 
 @pytest.mark.parametrize(("env_id", "action", "fields"), CASES)
 def test_an_isolated_environment_answers_as_any_other_does(servers, env_id, action, fields):
-    # One after the other in the same environment.
+    # One after another in the same environment.
     calls = [call for accept in FORMS for call in calls_of(action, accept)]
     isolated, ordinary = both(servers, env_id, calls, **fields)
     for call, ours, theirs in zip(calls, isolated, ordinary, strict=True):
@@ -302,7 +302,7 @@ def test_modules_are_imported_in_other_processes_only(serve, tmp_path):
     server = serve("--allow-module", "tells_where", PYTHONPATH=str(tmp_path), TOLD=str(told))
     assert server.create("tells_where:Told-v0")
     assert "Told-v0" in {one["id"] for one in server.get("/v1/registry/")[1]["environments"]}
-    # As the list has it.
+    # With the id from the list.
     assert server.get(f"{server.create('Told-v0')}/")[1]["isolated"]
     assert not server.get(f"{server.create('CartPole-v1')}/")[1]["isolated"]
     pids = told.read_text().split()
@@ -321,7 +321,7 @@ def test_a_module_that_hangs_or_stays_leaves_no_process_of_the_list(
     limit = "2" if hangs else "60"
     arguments = ("--allow-module", "never_ends", "--max-call-seconds", limit)
     server = serve(*arguments, PYTHONPATH=str(tmp_path))
-    # What starts processes stays. This one may take too long on a busy machine, which is no matter.
+    # The processes that start others stay. This call may be too slow on a busy machine.
     server.post("/v1/envs/", {"env_id": "faulty_envs:Counting-v0"})
     eventually(lambda: len(descendants(server.process.pid)) >= 2)
     before = set(descendants(server.process.pid))

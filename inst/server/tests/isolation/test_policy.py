@@ -1,4 +1,4 @@
-"""Which environments get a process of their own."""
+"""Which environments get their own process."""
 
 import faulty_envs  # noqa: F401 - it registers what is asked for here
 import pytest
@@ -16,7 +16,7 @@ ALLOWED = ["faulty_envs"]
         ("gymnasium.envs.classic_control:CartPole-v1", ["gymnasium.envs.classic_control"], ["all"]),
         ("faulty_envs:Counting-v0", ALLOWED, ["foreign", "all"]),
         ("Counting-v0", ALLOWED, ["foreign", "all"]),
-        # Maybe an allowed module registers it.
+        # An allowed module may register it.
         ("Nobody-v0", ALLOWED, ["foreign", "all"]),
         ("Nobody-v0", [], ["all"]),
         # Refused without a process.

@@ -1,4 +1,4 @@
-"""What is held is measured, and the instance that has grown most goes."""
+"""Memory is measured, and the instance that has grown most is closed."""
 
 import contextlib
 import sys
@@ -13,7 +13,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux"),
 ]
 
-# In one draw such an environment takes 64 MiB.
+# Drawing this environment takes 64 MiB each time.
 HOARDER = {"frame": "hoards"}
 
 
@@ -44,7 +44,7 @@ def test_above_the_limit_nothing_grows(client, monkeypatch):
 
 @pytest.fixture
 def limited(serve):
-    """Start a server whose environments may hold 100 MiB."""
+    """Start a server with a memory limit of 100 MiB."""
     return lambda isolate: serve(
         "--isolate",
         isolate,
@@ -58,7 +58,7 @@ def limited(serve):
 
 
 def drawn(server, url):
-    """Draw a picture; return the status."""
+    """Draw a frame; return the status."""
     with contextlib.closing(server.connect()) as connection:
         connection.request("GET", f"{url}/render/")
         with connection.getresponse() as answer:
@@ -78,7 +78,7 @@ def test_what_grows_when_it_is_drawn_is_closed_and_the_others_go_on(limited, eve
     answer = server.get(hoarder)[1]
     assert answer["code"] == "instance_memory_closed"
     assert "had grown most, by " in answer["message"]
-    # As soon as the memory is given back.
+    # As soon as the memory is released.
     eventually(lambda: drawn(server, other) == 200)
     assert server.post(f"{other}/reset/")[0] == 200
 

@@ -19,7 +19,7 @@ def test_an_instance_that_nobody_uses_is_closed_and_says_so(quick, eventually):
 def test_an_instance_that_is_used_or_watched_stays(quick):
     client = quick(idle_minutes=0.01).test_client()
     used, watched = created(client), created(client)
-    # Twice as long as one may be idle.
+    # Twice as long as an instance may be idle.
     end = time.monotonic() + 1.2
     while time.monotonic() < end:
         assert client.post(f"{used}/reset/").status_code == 200

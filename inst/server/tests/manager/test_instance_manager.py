@@ -12,7 +12,7 @@ from gym_server.manager.instance_manager import InstanceManager
 
 @pytest.fixture
 def in_background(app):
-    """POST from another thread; call the result for the answer."""
+    """POST from another thread; call the result for the response."""
 
     def in_background(url, body=None):
         answers = []
@@ -92,7 +92,7 @@ def test_environments_do_not_wait_for_each_other(
     assert client.post(f"{quick}/reset/").status_code == 200
     assert client.get("/v1/envs/").status_code == 200
     create()
-    # Had one of these waited for the step, it would have given up by now.
+    # If one of these had waited for the step, it would have given up by now.
     (meeting / "the test").touch()
     assert step().status_code == 200
 
@@ -169,7 +169,7 @@ def test_instances_are_listed_with_who_uses_them_how_much(client, create):
     expected = {"name": None, "num_envs": 3, "steps": 3, "watched": True}
     assert {key: second[key] for key in expected} == expected
     assert client.get(url).json["name"] == "Änne's pole"
-    # Strictly typed classic clients know no more than this.
+    # Strictly typed classic clients know only this field.
     assert set(client.get("/v1/envs/").json) == {"all_envs"}
 
 

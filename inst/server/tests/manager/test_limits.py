@@ -1,4 +1,4 @@
-"""How much there is for all clients together."""
+"""Limits for all clients together."""
 
 import os
 import threading
@@ -94,7 +94,7 @@ def test_all_together_have_only_so_many_sub_envs(limited):
         "All environments together may have 10 sub-environments, and 2 are left, not 3"
     )
     assert "--max-total-sub-envs" in refusal.json["hint"]
-    # One without sub-environments is one.
+    # A single environment counts as one.
     assert make(client).status_code == make(client).status_code == 200
     assert refused(make(client), "too_many_sub_envs")
 
@@ -152,7 +152,7 @@ def test_all_together_have_only_so_many_processes(limited):
     )
     assert "--max-processes" in refusal.json["hint"]
     assert ask_for_processes(client, 1).status_code == 200
-    # What takes none is not refused.
+    # An environment that needs none is not refused.
     assert make(client, num_envs=8).status_code == make(client).status_code == 200
     client.post(f"/v1/envs/{first.json['instance_id']}/close/")
     assert ask_for_processes(client, 2).status_code == 200
@@ -169,9 +169,9 @@ def test_processes_that_nobody_asked_for_are_no_more_than_there_is_room_for(limi
     assert [chosen_of(client), chosen_of(client)] == [3, 0]
     refusal = ask_for_processes(client, 1)
     assert refused(refusal, "too_many_processes")
-    # One alone would run nothing beside another one.
+    # A single process would not be faster.
     assert chosen_of(limited(max_processes=1)) == 0
-    # A choice of fewer than what was kept ready leaves room.
+    # Choosing fewer than were reserved leaves room.
     client = limited(max_processes=4)
     assert make(client, env_id="CliffWalking-v1", num_envs=64).status_code == 200
     assert chosen_of(client) == 4
@@ -228,11 +228,11 @@ def test_processes_count_until_they_have_ended(limited, monkeypatch):
 
 def test_isolated_environments_and_their_processes_count(limited):
     client = limited(max_processes=5, isolate="all")
-    # Its own, a fork server and those that it forks.
+    # Its own process, a fork server and the processes that this forks.
     before = len(descendants(os.getpid()))
     first = ask_for_processes(client, 2)
     assert first.status_code == 200
-    # The server has a fork server and a tracker of resources, once.
+    # The server itself has one fork server and one resource tracker.
     assert len(descendants(os.getpid())) - before <= 4 + 2
     assert refused(ask_for_processes(client, 1), "too_many_processes")
     second = make(client)

@@ -32,7 +32,7 @@ def in_background(call):
 
 
 def asked(server, seeds, **how):
-    """Ask a real server for episodes; return the arrays of its answer."""
+    """Request episodes from a real server; return the arrays of the response."""
     with contextlib.closing(server.connect()) as connection:
         body = request_body(seeds, **how)
         connection.request("POST", "/v1/rollouts/", body, {"Content-Type": TENSORS})
@@ -40,7 +40,7 @@ def asked(server, seeds, **how):
 
 
 def ask_and_leave(server, seconds, seeds, **how):
-    """Ask a real server for episodes, and leave before it has answered."""
+    """Request episodes from a real server, and disconnect before the response."""
     with contextlib.closing(server.connect()) as connection:
         body = request_body(seeds, **how)
         connection.request("POST", "/v1/rollouts/", body, {"Content-Type": TENSORS})
@@ -115,7 +115,7 @@ def test_a_queue_that_is_full_asks_to_come_again(quick, tmp_path, eventually, mo
 
 def test_a_long_request_does_not_keep_others_waiting(quick):
     app = quick(max_rollout_processes=1)
-    # Started, and known.
+    # Now it is started, and its speed is known.
     roll_out(app.test_client(), [1], env_id="LunarLander-v3")
     over = []
     long = in_background(

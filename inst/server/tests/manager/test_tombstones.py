@@ -15,7 +15,7 @@ def test_a_reason_is_kept():
     tombstones.add("a", reason(1))
     found = tombstones.why("a")
     assert (found.code, found.message, found.hint) == ("call_too_long", "reason 1", "hint")
-    # What is raised over and over must not grow.
+    # An exception must not grow when it is raised repeatedly.
     assert tombstones.why("a") is not found
     assert "a" in tombstones
 

@@ -22,12 +22,12 @@ from gym_server.manager.limits import Limits
 
 pytestmark = pytest.mark.slow
 
-# Ample for whatever does not hang.
+# Enough time for anything that does not hang.
 SOON = 20
 
 
 class Call:
-    """A call in a thread of its own, on a connection of its own."""
+    """A call in its own thread, on its own connection."""
 
     def __init__(self, server, method, path, body=None):
         self.connection = server.connect()
@@ -48,13 +48,13 @@ class Call:
         return self.outcome[0]
 
 
-# What does not hang takes less, also on a machine that is busy.
+# Calls that do not hang take less, even on a busy machine.
 STRICT = ("--max-call-seconds", "1", "--isolate", "none")
 
 
 @pytest.fixture(scope="module")
 def strict():
-    """Start a server on which a call may take one second; it survives whatever hangs in it."""
+    """Start a server on which a call may take one second; no hanging call may break it."""
     server = ServerProcess(*ON_A_FREE_PORT, *STRICT)
     yield server
     server.kill()
@@ -83,7 +83,7 @@ def test_a_call_that_takes_too_long_is_answered_and_its_instance_is_gone(
     stuck = call(f"{url}/step/", {"action": 0})
     eventually(gate.is_reached)
     queued = [call(f"{url}/reset/"), call(f"{url}/action_space/sample/", method="GET")]
-    # The others do not notice.
+    # Other instances are not affected.
     assert strict.post(f"{other}/reset/")[0] == 200
     status, body = stuck.answer()
     assert (status, body["code"]) == (504, "call_too_long")
@@ -113,7 +113,7 @@ def test_the_answer_is_given_to_repetitions_too(strict, call):
     assert (status, body["request"]) == (504, step["request"])
     assert second.answer() == (status, body)
     assert strict.post(f"{url}/step/", step) == (status, body)
-    # And the key is free for what comes next.
+    # The key is free for the next request.
     next_one = {"env_id": "CartPole-v1", "request": {"key": "mine", "number": 8}}
     assert strict.post("/v1/envs/", next_one)[0] == 200
 
@@ -139,7 +139,7 @@ def test_drawing_may_hang_and_others_are_drawn_all_the_same(
         strict.post(f"{one}/reset/")
     stuck = call(f"{url}/render/", method="GET")
     eventually(gate.is_reached)
-    # It waits for its turn, which is no fault of its own.
+    # It waits for its turn, and is not stuck itself.
     waiting = strict.connect()
     waiting.request("GET", f"{other}/render/")
     assert too_long(stuck.answer())
@@ -180,10 +180,10 @@ def test_a_server_with_calls_that_hang_stops_all_the_same(serve):
 
 @pytest.fixture
 def impatient_later(quick, monkeypatch):
-    """Make an application in which a call may take long until what it needs is there.
+    """Make an application whose limit of call time can be shortened later.
 
-    Return it and a function after which a call may take a second: to start a process takes its
-    time, and on a busy machine more.
+    Returns the application, and a function that sets the limit to one second. Starting a process
+    takes longer than that on a busy machine.
     """
 
     monkeypatch.setattr(watchdog, "_LONGEST_TICK", 0.1)
@@ -217,7 +217,7 @@ def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
     app, be_impatient = impatient_later(isolate="all")
 
     def ask(method, path, **body):
-        # A client is for one thread.
+        # A client must not be shared by threads.
         answer = app.test_client().open(path, method=method, json=body or None)
         return answer.status_code, answer.json
 
@@ -226,7 +226,7 @@ def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
         return url, ask("POST", f"{url}/reset/")[1]["info"]["pid"]
 
     def begin(*args, **body):
-        # A daemon, for one that never returns.
+        # A daemon thread, in case it never returns.
         answers = queue.SimpleQueue()
         call = threading.Thread(target=lambda: answers.put(ask(*args, **body)), daemon=True)
         call.start()
@@ -243,7 +243,7 @@ def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
         # One hangs, and the others wait for it.
         calls = [begin("POST", f"{url}/step/", action=0) for _ in range(3)]
         calls.append(begin("POST", "/v1/envs/", env_id="faulty_envs:Rogue-v0", kwargs=kwargs))
-        # Also one that is asked while nothing moves.
+        # Also a call that does not wait for the environment.
         calls.append(begin("GET", f"{still}/action_space/"))
         assert all(too_long(answers.get(timeout=SOON)) for answers in calls)
         assert too_long(ask("POST", f"{url}/step/", action=0))
@@ -355,7 +355,7 @@ def impatient():
     ("where", "fields"),
     [
         ("init", {}),
-        # Processes may be chosen, or have been.
+        # Worker processes may be chosen, or were chosen.
         ("init", {"num_envs": 64}),
         ("init", {"num_envs": 4, "num_workers": 2}),
         ("init elsewhere", {"num_envs": 4, "num_workers": 2}),
@@ -371,7 +371,7 @@ def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, field
         return len(os.listdir(f"/proc/{server.process.pid}/task"))
 
     def threads_at_rest():
-        """Count them in ten looks: that of a connection which was closed ends a little later."""
+        """Count them ten times, because the thread of a closed connection ends a little later."""
         counts = []
         for _ in range(10):
             counts.append(threads())
@@ -389,7 +389,7 @@ def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, field
             return server.get(f"{url}/render/")
         return server.post(f"{url}/{where}/", {"action": 0})
 
-    # The render thread has begun.
+    # Now the render thread exists.
     url = server.create("faulty_envs:Drawing-v0")
     server.post(f"{url}/reset/")
     server.get(f"{url}/watch/state/")
@@ -398,7 +398,7 @@ def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, field
     eventually(lambda: threads() <= before)
     # None of them uses the processor any more.
     eventually(lambda: _busy_threads(server.process.pid) == 0)
-    # None is left but the two from which processes start.
+    # Only the two remain that start processes.
     eventually(lambda: len(descendants(server.process.pid)) <= 2)
 
 
@@ -426,7 +426,7 @@ def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
 
 
 def _busy_threads(pid):
-    """Count the threads that Linux finds running, in five looks."""
+    """Count the threads that Linux reports as running, in five samples."""
     busy = set()
     for _ in range(5):
         for stat in Path(f"/proc/{pid}/task").glob("*/stat"):
@@ -445,7 +445,7 @@ def test_0_seconds_are_for_ever(quick):
 
 
 def test_an_answer_for_another_never_reaches_the_next_request(strict):
-    # The thread comes back while the watchdog answers for it, again and again.
+    # The thread returns while the watchdog answers for it, again and again.
     connection = http.client.HTTPConnection("127.0.0.1", strict.port, timeout=SOON)
     for _ in range(2):
         url = strict.create(
@@ -470,7 +470,7 @@ def test_an_answer_for_one_whose_making_fails_never_reaches_its_next_request(qui
 
     def answer_for(*_):
         abandoned.set()
-        # The creating thread must not come back before this is done.
+        # The creating thread must not return before this is done.
         waited.append(not came_back.wait(0.5))
 
     def create():

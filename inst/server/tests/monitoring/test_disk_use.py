@@ -1,4 +1,4 @@
-"""What monitors may write on the disk."""
+"""Limits on what monitors write to the disk."""
 
 import csv
 
@@ -53,7 +53,7 @@ def test_a_full_monitor_stops_recording_and_says_so(limited, monitor_dir, isolat
     url = created(client)
     assert start(client, url, "run").status_code == 204
     play(client, url)
-    # As if these were videos.
+    # As if this were a video.
     (monitor_dir / "run" / "rl-video-episode-0.mp4").write_bytes(bytes(5000))
     play(client, url)
     play(client, url)
@@ -88,7 +88,7 @@ def test_the_limit_is_that_of_all_monitors_and_of_what_they_leave(limited, monit
     assert (refusal.status_code, refusal.json["code"]) == (429, "monitors_full")
     assert not (monitor_dir / "d").exists()
     assert start(client, url, "d", force=True).status_code == 429
-    # That one's files make room for it.
+    # Its deleted files make room.
     assert start(client, url, "a", force=True).status_code == 204
 
 

@@ -9,7 +9,7 @@ import weakref
 import pytest
 
 pytest.importorskip("moviepy")
-# Moviepy depends on it.
+# moviepy depends on it.
 count_frames_and_secs = pytest.importorskip("imageio_ffmpeg").count_frames_and_secs
 
 

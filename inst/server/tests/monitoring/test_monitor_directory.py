@@ -15,7 +15,7 @@ def root(monitor_dir):
 
 @pytest.fixture(autouse=True)
 def taken():
-    """Give back at the end whatever a test has taken."""
+    """Release at the end what a test has taken."""
     TAKEN.clear()
     yield
     for directory in TAKEN:

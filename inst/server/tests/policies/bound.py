@@ -1,4 +1,4 @@
-"""Make policies for tests, and compute by hand what they must do."""
+"""Make policies for tests, and compute their actions by hand."""
 
 import itertools
 import math
@@ -50,7 +50,7 @@ def plogis(x):
     return 1 / (1 + math.exp(-x)) if x > -700 else 0.0
 
 
-# R's package sigmoid, and tanh() and plogis().
+# R's package sigmoid, and R's tanh() and plogis().
 FORMULAS = {
     "tanh": math.tanh,
     "logistic": plogis,
@@ -67,7 +67,7 @@ def outputs_of(sizes, activation, weights, inputs, bias=False):
     signal = [float(x) for x in inputs]
     for neurons, name in zip(sizes[1:], activation, strict=True):
         signal = [*signal, 1.0] if bias else signal
-        # Column after column: the weights of all neurons for the first input come first.
+        # Column by column: the weights of all neurons for the first input come first.
         columns = [[weights.pop(0) for _ in range(neurons)] for _ in signal]
         signal = [
             FORMULAS[name](math.fsum(c[n] * x for c, x in zip(columns, signal, strict=True)))
@@ -77,7 +77,7 @@ def outputs_of(sizes, activation, weights, inputs, bias=False):
 
 
 def box_action(outputs, name, low, high):
-    """Return R's box_action() of one row, before it is cast."""
+    """Return the result of R's box_action() for one row, before it is cast."""
     action = []
     for x, lowest, highest in zip(outputs, low, high, strict=True):
         if name in ("tanh", "logistic", "Gompertz"):

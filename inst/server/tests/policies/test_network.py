@@ -73,7 +73,7 @@ def test_of_saturated_outputs_the_first_is_taken(name):
     weights = [[-1000.0, 1000.0, 2000.0]]
     actor = begun(network([1, 3], [name], box(1), Discrete(3), weights))
     assert actor.act(np.array([1], np.float32)) == 1
-    # And where the sums are far below 0.
+    # The same if the sums are far below 0.
     assert actor.act(np.array([-5], np.float32)) == 0
 
 

@@ -1,4 +1,4 @@
-"""Groups in lockstep: what a row does must not depend on who plays the others."""
+"""Groups in lockstep: a row's actions must not depend on the other rows."""
 
 import numpy as np
 import pytest

@@ -60,7 +60,7 @@ def sampler(space, seed):
 @pytest.mark.parametrize("space", SPACES, ids=str)
 def test_it_draws_as_sample_does(space):
     actor = read_policy(RANDOM, {}, OBSERVED, space).actor(0)
-    # A second episode, and one that ends early, begin anew.
+    # A second episode, and one that ends early, start anew.
     for seed, steps in ((3, 700), (4, 5), (2**40, 60), (3, 40)):
         actor.begin(seed)
         sample = sampler(space, seed)

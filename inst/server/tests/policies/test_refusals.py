@@ -1,4 +1,4 @@
-"""What is wrong with a policy is told in a sentence that names it."""
+"""The error for an invalid policy names the problem in a sentence."""
 
 import numpy as np
 import pytest

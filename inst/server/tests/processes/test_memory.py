@@ -1,4 +1,4 @@
-"""Memory goes back to the system."""
+"""Memory is returned to the system."""
 
 import gc
 import subprocess
@@ -28,7 +28,7 @@ def test_what_refers_to_itself_is_collected():
         gc.enable()
 
 
-# In processes of their own, where nothing was freed before.
+# In separate processes, where nothing was freed before.
 RESIDENT = """
 import os, threading
 from gym_server.processes import memory

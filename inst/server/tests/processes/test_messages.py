@@ -1,4 +1,4 @@
-"""What the process of an environment sends is checked before it is used."""
+"""Messages from an environment's process are checked before use."""
 
 import multiprocessing
 import pickle
@@ -24,7 +24,7 @@ from gym_server.response import JSON
 
 @pytest.fixture(params=[Pipe, ConnectionPipe])
 def ends(request, monkeypatch):
-    """Return a pipe for calls and the pipe at its other end."""
+    """Return a pipe for calls, and its other end."""
     monkeypatch.setattr("gym_server.processes.messages.Pipe", request.param)
     ours, theirs = multiprocessing.Pipe()
     pipe, other = CallPipe(ours), request.param(theirs)

@@ -92,7 +92,7 @@ def test_they_end_after_a_while(warm, eventually):
 
 
 class Clock:
-    """Stands in for the modules ``time`` and ``threading``; its timers ring when told to."""
+    """Replaces the modules ``time`` and ``threading``; the test triggers its timers."""
 
     Lock = threading.Lock
 

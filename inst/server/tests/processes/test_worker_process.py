@@ -1,4 +1,4 @@
-"""Environments that end their own process, or try to do more: nobody else notices."""
+"""Environments that end or attack their own process do not affect others."""
 
 import os
 import signal
@@ -50,7 +50,7 @@ def test_it_is_told_how_a_process_ended_and_the_instance_is_gone(server, does, h
     status, answer = server.post(f"{url}/step/", {"action": 0})
     assert (status, answer["code"]) == (500, "environment_died")
     assert how in answer["message"]
-    # Later calls get the reason, whatever they are.
+    # All later calls get the reason.
     eventually(lambda: url[-8:] not in server.get("/v1/envs/")[1]["all_envs"])
     for method, path in [(server.post, "step/"), (server.get, ""), (server.post, "close/")]:
         arguments = [{"action": 0}] if path == "step/" else []
@@ -106,7 +106,7 @@ def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
     eventually(lambda: process._calls._pipe.poll(0))
     os.kill(process.pid, signal.SIGKILL)
     eventually(lambda: not process.is_alive)
-    # The thread that waited for the end closes its pipes now.
+    # The thread that waited for the end now closes its pipes.
     time.sleep(0.2)
     assert process.finish().value[0]["id"].startswith("CartPole-v")
 

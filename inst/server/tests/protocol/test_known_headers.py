@@ -8,7 +8,7 @@ from gym_server.protocol import bodies, known_headers
 
 
 def body(number, key="k", data=None, dtype="I32", spaces=0, first=True, **metadata):
-    """Return a body as a client sends it, with the metadata before or behind the tensor."""
+    """Return a client's body, with the metadata before or after the tensor."""
     data = np.arange(4, dtype="<i4").tobytes() if data is None else data
     request = f'{{"key":{json.dumps(key)},"number":{number}}}'
     about = {"__metadata__": {"request": request, **metadata}}
@@ -36,7 +36,7 @@ def test_a_header_that_comes_again_is_not_parsed_again(parsed, first):
         read = bodies.loads_tensors(raw)
         assert read["request"] == {"key": "k", "number": number}
         assert read["action"].tensors["action"].array().tolist() == [*range(number, number + 4)]
-    # The first two, and the second once more with another number.
+    # The first two, and the second again with another number.
     assert len(parsed) == 3
 
 

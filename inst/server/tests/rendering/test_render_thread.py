@@ -46,7 +46,7 @@ def test_drawing_may_call_for_drawing():
 
 @pytest.fixture
 def occupied():
-    """Return a render thread that is at work until the test lets it go on, and how to do that."""
+    """Return a render thread that is busy until the test releases it, and a function for that."""
     renderer, over = RenderThread(), threading.Event()
     blocker = threading.Thread(target=renderer.run, args=(over.wait, 30))
     blocker.start()
@@ -68,7 +68,7 @@ def test_a_job_whose_turn_takes_too_long_is_not_drawn(occupied):
 
 def test_a_job_that_has_begun_is_waited_for():
     renderer, asked = RenderThread(), threading.Event()
-    # It ends only after the question whether to wait on.
+    # The function ends only after may_wait was called.
     assert renderer.run_while(asked.set, asked.wait, 30)
     renderer.stop()
 
@@ -96,7 +96,7 @@ def test_another_thread_draws_on_when_one_hangs():
     asking.join(10)
     assert outcomes == ["it hangs"]
     first = renderer.run(threading.get_ident)
-    # The one that comes back draws no more.
+    # The thread that returns draws no more.
     may_end.set()
     assert {renderer.run(threading.get_ident) for _ in range(20)} == {first}
     assert not renderer.abandon(first, ValueError("it does not hang"))

@@ -1,4 +1,4 @@
-"""What the environment is given, and what is kept."""
+"""What the environment gets, and what is kept."""
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -13,7 +13,7 @@ STEPS = Keep(steps=True)
 
 
 class Noting:
-    """Notes each action; alone, or with two sub-environments."""
+    """Notes each action; as a single environment, or with two sub-environments."""
 
     single_observation_space = Box(0, 1, (1,), np.float32)
     single_action_space = Box(-1, 1, (2,), np.float32)

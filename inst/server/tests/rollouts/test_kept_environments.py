@@ -1,4 +1,4 @@
-"""An environment that has played an episode plays the next one as a new one does."""
+"""An environment that has played an episode plays the next one like a new environment."""
 
 import environments
 import numpy as np
@@ -10,13 +10,13 @@ from gym_server.rollouts.task import Task
 
 OTHERS = [env_id for env_id in environments.runnable() if env_id not in environments.ATARI]
 OLDER = environments.older()
-# Of each kind of environment one, whose episodes follow one another soon.
+# One of each kind of environment, with short episodes.
 SOME = ("BipedalWalker-v3", "FrozenLake-v1", "HalfCheetah-v5", "LunarLander-v3", "Pendulum-v1")
 STEPS = 60
 
 
 def episode(env, seed):
-    """Return what is observed and earned in an episode of random actions."""
+    """Return the observations and rewards of an episode with random actions."""
     generator = np.random.default_rng(seed)
     env.action_space.seed(int(generator.integers(1000)))
     observation, _ = env.reset(seed=seed)
@@ -30,13 +30,13 @@ def episode(env, seed):
 
 
 def task(env_id):
-    # What has a wrapper is not played in groups, which have nothing to keep.
+    # Environments with wrappers are not played in groups.
     limit = Wrapper("TimeLimit", {"max_episode_steps": 10_000})
     return Task(EnvConfig(env_id, wrappers=(limit,)), frozenset(), np.inf)
 
 
 def differs(env_id):
-    """Tell whether the third episode of an environment is another one in a new one."""
+    """Return whether the third episode of an environment differs from that in a new one."""
     kept = environment.RolloutEnv(task(env_id))
     for seed in (1, 2):
         episode(kept.for_an_episode(), seed)

@@ -1,4 +1,4 @@
-"""Episodes that are played beside the environment are those that are played by hand."""
+"""Rollouts give the same episodes as playing by hand."""
 
 import gymnasium
 import numpy as np
@@ -10,7 +10,7 @@ from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 
 SEEDS = [3, 2**40, 3, 0]
 
-# Linear policies: of a discrete observation, and of a box; and of a box of actions.
+# Linear policies: for discrete observations, for a Box, and for a Box of actions.
 LUNAR = {"kind": "network", "sizes": [8, 4], "activation": ["identity"], "bias": True}
 
 
@@ -265,14 +265,14 @@ def test_episodes_need_a_policy_and_a_seed(client):
 
 
 def test_what_was_finished_before_an_error_is_answered(client):
-    # It raises when the action is 1, which it is not at once with these seeds.
+    # It raises when the action is 1; with these seeds that comes later.
     how = {"env_id": "faulty_envs:RaisesInStep-v0", "max_steps": 1}
     arrays, metadata = roll_out(client, range(100, 150), **how)
     finished = len(arrays["return"])
     assert 0 < finished < 50
     assert f"seed {100 + finished}" in metadata["error"]
     assert "the pole broke" in metadata["error"]
-    # None of the others is missing: the next one fails by itself.
+    # No episode is missing: the next one fails by itself.
     assert refused(client, [100 + finished], **how)["code"] == "environment_error"
 
 

@@ -1,4 +1,4 @@
-"""What schemathesis needs to know to get beyond the doors: environments that exist."""
+"""Hooks that make schemathesis use existing environments."""
 
 import itertools
 import threading
@@ -30,19 +30,19 @@ _turn = threading.local()
 
 
 def _takes_turns(name, every):
-    """Tell whether it is this one's turn: the same cases in each run."""
+    """Return whether it is this one's turn, for the same cases in each run."""
     turns = _turn.__dict__.setdefault(f"turns of {name}", itertools.count())
     return next(turns) % every == 0
 
 
 def _is_meant(case, place):
-    """Tell whether a part of the case is as the document wants it."""
+    """Return whether a part of the case conforms to the document."""
     component = case.meta and case.meta.components.get(place)
     return component is None or component.mode is GenerationMode.POSITIVE
 
 
 def _living(base):
-    """Return the instance_id of an environment; a new one every now and then."""
+    """Return the instance_id of an environment; sometimes a new one."""
     if getattr(_turn, "living", None) is None or _takes_turns("living", 25):
         answer = requests.post(f"{base}/v1/envs/", json=next(ENV_IDS), timeout=30)
         _turn.living = answer.json()["instance_id"]
@@ -52,7 +52,7 @@ def _living(base):
 
 @schemathesis.hook
 def before_call(context, case, kwargs):
-    """Let most requests name an environment that exists."""
+    """Use existing environments in most requests."""
     name = case.operation.definition.raw["operationId"]
     if "instance_id" in (case.path_parameters or {}) and _is_meant(case, ParameterLocation.PATH):
         linked = case.meta is not None and case.meta.phase.name.value == "stateful"
@@ -62,10 +62,10 @@ def before_call(context, case, kwargs):
             if name in ("env_close", "env_delete"):
                 _turn.living = None
     if isinstance(case.body, bytes) and not case.body.strip():
-        # Of all random bytes blanks alone are a body: an empty one.
+        # Of all random bytes, only blanks are a valid body: an empty one.
         case.body = b"{"
     if name == "env_watch_state" and not _takes_turns("patient", 50):
-        # Who knows the present waits for something new.
+        # A request that knows the current frame waits for a new one.
         case.query.pop("after", None)
     if (
         name == "env_create"
@@ -79,7 +79,7 @@ def before_call(context, case, kwargs):
 
 @schemathesis.check
 def fields_are_taken(context, response, case):
-    """What the document allows is no field of a wrong form."""
+    """Fields that conform to the document are not refused for their form."""
     name = case.operation.definition.raw["operationId"]
     if isinstance(case.body, dict) and _is_meant(case, ParameterLocation.BODY) and name in FIELDS:
         read(case.body, FIELDS[name])

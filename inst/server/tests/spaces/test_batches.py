@@ -11,7 +11,7 @@ from gym_server.spaces.stacking import stack
 
 
 def are_readable(space, members):
-    """Tell whether what was drawn is a member, which NaN in bounds is not."""
+    """Return whether a sample is a member, which it is not if bounds are NaN."""
     try:
         for member in members:
             spaces.decode(space, plain(spaces.encode(space, member)))

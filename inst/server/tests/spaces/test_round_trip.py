@@ -17,7 +17,7 @@ SPACES, MEMBERS = 25, 5
 
 @pytest.fixture(autouse=True)
 def not_a_number_is_a_member(monkeypatch):
-    # It is none to Gymnasium, but environments observe it, and it must come back.
+    # NaN is not a member for Gymnasium, but environments observe it, so it must be sent unchanged.
     for module in (arrays, tensor_parts):
         monkeypatch.setattr(module, "check_bounds", lambda space, bounds, array: None)
 
@@ -49,7 +49,7 @@ def test_a_member_comes_back_through_tensors_as_it_was(seed):
         sent = Parts(file.tensors, json.loads(file.metadata["texts"]))
         back = spaces.tensor_reader(space, "action")(sent)
         assert same(member, back), (space, member, back)
-        # Another reader sees the same.
+        # Another reader gives the same result.
         published = safetensors.numpy.load(raw)
         assert published.keys() == file.tensors.keys()
         for name, array in published.items():

@@ -1,4 +1,4 @@
-"""Work that is ended by its own thread, or by one that answers for it, and never by both."""
+"""Work is ended by its own thread, or by one that answers for it, never by both."""
 
 import threading
 import time
@@ -58,7 +58,7 @@ def test_a_thread_whose_work_was_abandoned_waits_until_it_was_answered_for():
     work.answered("key")
     thread.join(10)
     assert 0.15 < waited[0] < 5
-    # And not once more.
+    # Not a second time.
     wait()
     assert waited[1] < 0.1
 

@@ -7,7 +7,7 @@ from gym_server.threads.interrupt import interrupt, interrupted_by
 
 @pytest.fixture
 def in_thread():
-    """Run a function in a thread until it says that it waits; return the thread and what came."""
+    """Run a function in a thread until it waits; return the thread and the result."""
 
     def in_thread(play):
         came, waits = [], threading.Event()
@@ -45,7 +45,7 @@ def test_what_is_broken_off_otherwise_gets_to_its_end_first(in_thread):
     def play(waits):
         with interrupted_by(broken_off.set):
             waits()
-            # As a lock of C's would be: no exception comes here.
+            # Like a lock in C: no exception can interrupt it.
             assert broken_off.wait(10)
             steps.append("the rest")
         steps.append("what follows")

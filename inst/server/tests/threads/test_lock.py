@@ -12,7 +12,7 @@ from gym_server.threads.lock import InstanceLock
 
 @pytest.fixture
 def cleared():
-    """Return what the lock has cleared away so far."""
+    """Return what the lock has closed so far."""
     return []
 
 
@@ -119,7 +119,7 @@ def test_it_can_be_taken_away_from_a_thread_that_is_stuck(lock, cleared):
     with pytest.raises(GymServerError, match="too long"):
         lock.acquire(0)
     may_end.set()
-    # Its next request might get the answer that is still on its way for this one.
+    # Otherwise its next request might get the answer that is still being sent for this one.
     stuck.join(0.2)
     assert stuck.is_alive()
     lock.answered()

@@ -15,7 +15,7 @@ from gym_server.vector_envs.sub_env import SubEnv
 
 pytestmark = pytest.mark.slow
 
-# Besides none, by name without version.
+# Also without kwargs; by name without version.
 KWARGS = {
     "Blackjack": [{"natural": True, "sab": False}],
     "CliffWalking": [{"is_slippery": True}, {"max_episode_steps": 7}],
@@ -44,12 +44,12 @@ def made_new(env_id, count=3, **kwargs):
 
 
 def are_copies(envs):
-    """Tell whether they share a space, which each would make for itself."""
+    """Return whether they share a space, of which separate ones would have their own."""
     return all(env.action_space is envs[0].action_space for env in envs)
 
 
 def play(envs, steps=60):
-    """Return all that comes of playing some in turn, so that what they share would be seen."""
+    """Return all results of playing some in turn, which would show shared state."""
     came = [env.reset(seed=seed) for seed, env in enumerate(envs)]
     rng = np.random.default_rng(0)
     for _ in range(steps):
@@ -66,7 +66,7 @@ def test_copies_play_as_new_ones(env_id, kwargs):
     copies = made_by(env_id, **kwargs)
     assert are_copies(copies)
     np.testing.assert_equal(play(copies), play(made_new(env_id, **kwargs)))
-    # What was played has left no trace in what they share.
+    # Playing has changed nothing in the shared parts.
     np.testing.assert_equal(play(copies), play(made_new(env_id, **kwargs)))
     assert [str(env.spec) for env in copies] == [str(copies[0].spec)] * 3
     assert copies[0].spec == gymnasium.make(env_id, disable_env_checker=True, **kwargs).spec
@@ -106,7 +106,7 @@ def test_a_group_of_copies_resets_each_with_its_seed():
     assert observations.tolist() == [new.reset(seed=seed)[0] for seed in range(5)]
 
 
-# Which are made anew --------------------------------------------------------------------------
+# Environments that are not copied -------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kwargs", [{"map_name": None}, {"map_name": None, "desc": None}])
@@ -138,7 +138,7 @@ def test_others_than_toy_text_are_made_anew(env_id):
 
 
 def test_what_a_function_makes_is_made_anew():
-    # It may make another one each time, as this one does.
+    # A function may make another environment each time, like this one.
     spec = EnvSpec(
         "faultyRandomLake-v0", entry_point=lambda **_: FrozenLakeEnv(desc=generate_random_map())
     )

@@ -8,7 +8,7 @@ from gym_server.vector_envs.entry_point import EntryPointEnv
 
 
 class KeepsResults(VectorEnv):
-    """Returns the same arrays at every step, and changes them in place."""
+    """Returns the same arrays in every step, and changes them in place."""
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
     num_envs = 2

@@ -11,7 +11,7 @@ from gym_server.manager.limits import Limits
 
 
 class OwnSubEnvs(VectorEnv):
-    """A vector implementation that knows one argument and resets in the same step."""
+    """A vector implementation that accepts one argument, and resets in the same step."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
     made = 0
@@ -240,9 +240,9 @@ def about(client, env_id="Acrobot-v1", **fields):
         ({"num_envs": None}, None, None),
         ({"env_id": "CartPole-v1", "num_envs": 128}, "vector_entry_point", None),
         ({"env_id": "CartPole-v1", "num_envs": 2, "num_workers": 0}, "sync", 0),
-        # A step of it takes 5 us.
+        # Its steps take 5 us.
         ({"env_id": "FrozenLake-v1", "num_envs": 64}, "sync", 0),
-        # A step of this one is measured.
+        # Its steps are measured.
         (
             {"env_id": "faulty_envs:Counting-v0", "num_envs": 64, "kwargs": {"seconds": 0.001}},
             "async",
@@ -286,7 +286,7 @@ def test_a_number_of_processes_that_cannot_be_is_refused(client, fields, wanted)
 def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeypatch, env_id, why):
     monkeypatch.setattr("gym_server.vector_envs.num_workers.usable_cores", lambda: 4)
     gymnasium.register("faultyLocal-v0", entry_point=lambda: Counting(seconds=0.001))
-    # A name can be sent whatever it means there.
+    # A name can be sent, even if it means nothing there.
     known_here = types.ModuleType("known_here")
     known_here.Slow = type("Slow", (SlowCounting,), {"__module__": "known_here"})
     monkeypatch.setitem(sys.modules, "known_here", known_here)

@@ -1,4 +1,4 @@
-"""What is measured to choose the number of processes."""
+"""The measurement for choosing the number of processes."""
 
 import gymnasium
 import pytest

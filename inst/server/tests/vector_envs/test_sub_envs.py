@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def make():
-    """Make sub-environments, by default three in a process each; they are gone after the test."""
+    """Make sub-environments, by default three in separate processes; close them after the test."""
     made = []
 
     def make(name="Uneven", num_envs=3, num_workers=3, mode="NextStep", keep=False, **kwargs):
@@ -47,7 +47,7 @@ def zeros(env):
 
 
 def frozen(value):
-    """Return a value whose parts can be compared, with the bytes of its arrays."""
+    """Return a value with comparable parts, including the bytes of its arrays."""
     if isinstance(value, np.ndarray):
         data = value.tolist() if value.dtype == object else value.tobytes()
         return (value.dtype.str, value.shape, frozen(data))
@@ -59,7 +59,7 @@ def frozen(value):
 
 
 def play(env, steps, seed=7, mode="NextStep", with_infos=True):
-    """Return all that comes of some steps, of all sub-environments and of some."""
+    """Return the results of some steps, of all sub-environments and of some."""
     came = [env.reset(seed, None, None, with_infos)]
     rng = np.random.default_rng(0)
     waiting = np.zeros(env.num_envs, dtype=bool)
@@ -208,7 +208,7 @@ def test_closing_does_not_wait_for_a_process_that_hangs(make, monkeypatch, event
     env = make("HangsWhenClosedElsewhere")
     env.reset(1, None, None)
     pids = env.pids
-    # An hour if it waited.
+    # If it waited, this would take an hour.
     env.close()
     eventually(lambda: not any(map(is_running, pids)))
 
@@ -297,5 +297,5 @@ def test_a_step_that_hangs_in_a_process_does_not_keep_the_server(serve, gate, ev
         )
         eventually(gate.is_reached)
         assert server.stop()[0] == 0
-    # Before anybody lets it go on.
+    # Before the gate is opened.
     eventually(lambda: not any(map(is_running, children)))

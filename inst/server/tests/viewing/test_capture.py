@@ -1,4 +1,4 @@
-"""What a look waits for, and what does not wait for it."""
+"""What a capture waits for, and what does not wait for it."""
 
 import threading
 import time
@@ -11,7 +11,7 @@ from gym_server.viewing import viewer
 
 @pytest.fixture
 def occupied(app, client, faulty, watch):
-    """Have another environment draw for as long as the test does not call what it is given."""
+    """Let another environment draw until the test calls the returned function."""
     url = faulty("Drawing")
     instance, _ = watch(url)
     begun, over = threading.Event(), threading.Event()
@@ -37,7 +37,7 @@ def occupied(app, client, faulty, watch):
 
 
 def waits_for_its_turn(app):
-    """Tell whether a watcher waits behind the one who has the render thread."""
+    """Return whether a watcher waits for another one that has the render thread."""
     return len(app._renderer._jobs) > 1
 
 

@@ -1,4 +1,4 @@
-"""What the watchers of an environment get to see, and when it is drawn for them."""
+"""What the watchers of an environment see, and when it is drawn for them."""
 
 import base64
 import contextlib
@@ -28,7 +28,7 @@ def in_background(call, *args, **how):
     results = []
 
     def run():
-        # What was closed meanwhile cannot be played on.
+        # The environment may have been closed meanwhile.
         with contextlib.suppress(AssertionError):
             results.append(call(*args, **how))
 
@@ -112,7 +112,7 @@ def test_each_sub_env_can_be_watched(client, create, mode):
         (1, 3, 8),
         (2, 3, 8),
     ]
-    # The carts went apart.
+    # The carts moved differently.
     assert not np.array_equal(frame_of(seen[0]), frame_of(seen[1]))
     refused = client.get(f"{url}/watch/state/?sub_env=3")
     assert (refused.status_code, refused.json["code"]) == (400, "invalid_parameter")
@@ -240,7 +240,7 @@ def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch
     while time.monotonic() - began < 1.5:
         play(client, url)
         number = state(client, url, after=number)["number"]
-    # A fifth of the time, and not half of it; the second comes a little early.
+    # A fifth of the time; half would be more. The second one comes a little early.
     assert 2 <= len(drawn) <= 2 + (time.monotonic() - began) / 0.25
 
 
