@@ -17,7 +17,7 @@ from gym_server.api.access import Access, Guard
 from gym_server.api.calls import Services
 from gym_server.api.endpoint import Endpoint, failure
 from gym_server.api.exactly_once import ExactlyOnce
-from gym_server.api.routes import ROOMS, ROUTES
+from gym_server.api.routes import BLUEPRINTS, ROUTES
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
@@ -100,7 +100,7 @@ class GymApp(Flask):
         pool.most_mb = config.limits.max_memory_mb + OWN_MB
         self._rollouts = Rollouts(config.limits.rollout_processes)
         self._exactly_once = ExactlyOnce(self._instances.lives)
-        self._router = Router(self, ROOMS)
+        self._router = Router(self, BLUEPRINTS)
         services = Services(
             self._instances,
             self._rollouts,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import INSTANCE, Room
+from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.protocol.answers import Ready, frame_tensor
 from gym_server.protocol.bodies import loads_tensors
@@ -12,10 +12,10 @@ from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.rendering.png import png
 from gym_server.response import Response
 
-ROOM = Room("envs")
+bp = RouteBlueprint("envs")
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     "/v1/envs/",
     Field("env_id", env_fields.ANY_ID, "The id, such as CartPole-v1.", required=True),
@@ -69,7 +69,7 @@ def env_create(call: Call) -> dict:
     return call.services.instances.create(EnvConfig(**fields)).about()
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     "/v1/envs/",
     answer="all_envs: env_id by instance_id",
@@ -82,7 +82,7 @@ def env_list_all(call: Call) -> dict:
     return {"all_envs": call.services.instances.env_ids()}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     "/v1/instances/",
     answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
@@ -96,7 +96,7 @@ def instance_list(call: Call) -> dict:
     return {"instances": call.services.instances.list()}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE,
     answer="everything about the environment; needs_reset is true after done, too",
@@ -107,7 +107,7 @@ def env_about(call: Call) -> dict:
     return call.instance.about()
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     INSTANCE + "reset/",
     Field(
@@ -140,7 +140,7 @@ def env_reset(call: Call) -> dict | Ready:
     )
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     INSTANCE + "step/",
     Field(
@@ -184,7 +184,7 @@ def env_step(call: Call) -> dict | Ready:
     )
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "render/",
     Field(
@@ -203,7 +203,7 @@ def env_render(call: Call) -> Response:
     return Response(200, png(frame), "image/png")
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "model/",
     answer="model: num_states and num_actions, both numbered from 0; start, the probability that "
@@ -218,13 +218,13 @@ def env_model(call: Call) -> dict | Ready:
     return call.instance.transition_model()
 
 
-@ROOM.declare("POST", INSTANCE + "close/", once=True, ends_instance=True)
+@bp.declare("POST", INSTANCE + "close/", once=True, ends_instance=True)
 def env_close(call: Call) -> None:
     """Close an environment."""
     call.services.instances.close(call.path["instance_id"])
 
 
-@ROOM.declare("DELETE", INSTANCE, once=True, ends_instance=True)
+@bp.declare("DELETE", INSTANCE, once=True, ends_instance=True)
 def env_delete(call: Call) -> None:
     """Close an environment, like the route close/."""
     env_close(call)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from gym_server.api import env_fields
 from gym_server.api.calls import Call
-from gym_server.api.routing import INSTANCE, Room
+from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.protocol.fields import BOOLEAN, TEXT, Field
 
-ROOM = Room("monitors")
+bp = RouteBlueprint("monitors")
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     INSTANCE + "monitor/start/",
     Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
@@ -31,7 +31,7 @@ def env_monitor_start(call: Call) -> None:
     )
 
 
-@ROOM.declare("POST", INSTANCE + "monitor/close/")
+@bp.declare("POST", INSTANCE + "monitor/close/")
 def env_monitor_close(call: Call) -> None:
     """Finish the monitor's files; without a monitor, do nothing."""
     call.instance.close_monitor()

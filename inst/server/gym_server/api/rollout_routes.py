@@ -10,7 +10,7 @@ import numpy as np
 
 from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import Room
+from gym_server.api.routing import RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, answer_to, invalid_parameter
 from gym_server.protocol.answers import dumps
@@ -22,7 +22,7 @@ from gym_server.rollouts.environment import GROUP
 from gym_server.rollouts.task import Keep, Unit
 from gym_server.rollouts.tensors import content
 
-ROOM = Room("rollouts")
+bp = RouteBlueprint("rollouts")
 
 _KEPT = ("moments", "steps", "next_observation")
 
@@ -40,7 +40,7 @@ _KEEP = Kind(
 )
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     "/v1/rollouts/",
     Field("env_id", env_fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),

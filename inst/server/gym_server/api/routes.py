@@ -9,12 +9,12 @@ from gym_server.api import (
     watch_routes,
 )
 
-ROOMS = (
-    env_routes.ROOM,
-    space_routes.ROOM,
-    monitor_routes.ROOM,
-    rollout_routes.ROOM,
-    watch_routes.ROOM,
-    server_routes.ROOM,
+BLUEPRINTS = (
+    env_routes.bp,
+    space_routes.bp,
+    monitor_routes.bp,
+    rollout_routes.bp,
+    watch_routes.bp,
+    server_routes.bp,
 )
-ROUTES = tuple(route for room in ROOMS for route in room.routes.values())
+ROUTES = tuple(route for one in BLUEPRINTS for route in one.routes.values())

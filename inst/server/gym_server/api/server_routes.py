@@ -12,17 +12,17 @@ import numpy
 from gym_server import __version__
 from gym_server.api import openapi, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import Room
+from gym_server.api.routing import RouteBlueprint
 from gym_server.envs.registry import LONGEST_ID
 from gym_server.errors import GymServerError
 from gym_server.protocol.answers import HTML
 from gym_server.protocol.fields import ANYTHING, TEXT, Field
 from gym_server.response import Response
 
-ROOM = Room("server")
+bp = RouteBlueprint("server")
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     "/v1/upload/",
     Field("training_dir", TEXT, "A monitor's directory.", required=True),
@@ -39,7 +39,7 @@ def upload(call: Call) -> None:
     )
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     "/v1/shutdown/",
     answer="message",
@@ -59,7 +59,7 @@ def shutdown(call: Call) -> dict | Response:
 _SEARCH = replace(TEXT, schema={"type": "string", "maxLength": LONGEST_ID})
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     "/v1/registry/",
     Field("search", _SEARCH, "A part of the id; if no id contains it, the most similar ids."),
@@ -74,7 +74,7 @@ def env_registry(call: Call) -> dict:
     return {"environments": call.services.instances.registered(call.fields["search"])}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     "/v1/health/",
     answer="status, instances, versions, pid, rollouts (true: it plays whole episodes)",
@@ -104,7 +104,7 @@ def health(call: Call) -> dict:
     }
 
 
-@ROOM.declare("GET", "/v1/openapi.json/", answer="this document")
+@bp.declare("GET", "/v1/openapi.json/", answer="this document")
 def openapi_document(call: Call) -> dict:
     """Describe the protocol for machines."""
     return openapi.document(call.services.routes)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from gym_server.api import schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import INSTANCE, Room
+from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, Field
 
-ROOM = Room("spaces")
+bp = RouteBlueprint("spaces")
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "action_space/",
     answer="info: the space",
@@ -22,7 +22,7 @@ def env_action_space_info(call: Call) -> dict:
     return {"info": call.instance.space_info("action_space")}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "observation_space/",
     answer="info: the space",
@@ -33,7 +33,7 @@ def env_observation_space_info(call: Call) -> dict:
     return {"info": call.instance.space_info("observation_space")}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "action_space/sample/",
     answer="action",
@@ -44,7 +44,7 @@ def env_action_space_sample(call: Call) -> dict:
     return {"action": call.instance.sample_action()}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     INSTANCE + "action_space/contains/<x>/",
     answer="member: true or false",
@@ -59,7 +59,7 @@ def env_action_space_contains(call: Call) -> dict:
 _VALUE = Field("value", ANYTHING, "The value to check; without it, the body is a description.")
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     INSTANCE + "action_space/contains/",
     _VALUE,
@@ -71,7 +71,7 @@ def env_action_space_contains_posted(call: Call) -> dict:
     return {"member": call.instance.contains("action_space", call.body)}
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     INSTANCE + "observation_space/contains/",
     _VALUE,

@@ -7,7 +7,7 @@ from pathlib import Path
 from gym_server import viewing
 from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
-from gym_server.api.routing import INSTANCE, Callers, Room
+from gym_server.api.routing import INSTANCE, Callers, RouteBlueprint
 from gym_server.api.watch_keys import KEY_SECONDS
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import Field
@@ -35,7 +35,7 @@ _PAGE_HEADERS = (
 )
 
 
-ROOM = Room("watch")
+bp = RouteBlueprint("watch")
 
 
 def page(url: str, status: int) -> Response:
@@ -52,7 +52,7 @@ def page(url: str, status: int) -> Response:
     return Response(status, html, _HTML, _PAGE_HEADERS)
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     _WATCH,
     answer="a page for a browser",
@@ -73,7 +73,7 @@ def env_watch(call: Call) -> Response:
     return page(call.url, status)
 
 
-@ROOM.declare(
+@bp.declare(
     "POST",
     _WATCH + "key/",
     answer="key: opens the page as watch/?key=KEY, without a token; seconds: how long it is valid "
@@ -91,7 +91,7 @@ def env_watch_key(call: Call) -> dict:
     return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     _WATCH + "watch.css/",
     answer="the page's style sheet",
@@ -103,7 +103,7 @@ def env_watch_style(call: Call) -> Response:
     return Response(200, _read("watch.css"), _CSS, headers=_PAGE_HEADERS)
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     _WATCH + "<script>.js/",
     answer="one of the page's scripts",
@@ -118,7 +118,7 @@ def env_watch_script(call: Call) -> Response:
     return Response(200, _read(f"{name}.js"), _JAVASCRIPT, headers=_PAGE_HEADERS)
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     _WATCH + "state/",
     Field(
@@ -146,7 +146,7 @@ def env_watch_state(call: Call) -> Response:
     return Response(200, body, JSON, headers=(_NO_STORE,))
 
 
-@ROOM.declare(
+@bp.declare(
     "GET",
     _WATCH + "presence/",
     answer="watched: true",

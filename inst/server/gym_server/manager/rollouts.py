@@ -311,7 +311,7 @@ class Rollouts:
         """Return how many units were played, their results, and the error that ended them."""
         process = player.process
         if process is None:
-            process = pool.take(_WORKER, polite=True, trusted=player.key is None)
+            process = pool.take(_WORKER, low_priority=True, trusted=player.key is None)
             process.report_end(lambda why: None)
             player.known.clear()
         process.progress[1] = 0

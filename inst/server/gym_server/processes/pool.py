@@ -46,7 +46,7 @@ class Pool:
     def take(
         self,
         module: str,
-        polite: bool = False,
+        low_priority: bool = False,
         trusted: bool = True,
         most_mb: int = 0,
         hint: str | None = None,
@@ -55,25 +55,25 @@ class Pool:
 
         Args:
             module: the module whose functions it is to run.
-            polite: whether it runs at a lower priority from now on, also for later users. Such
-                processes are not given to callers that did not ask for this.
+            low_priority: whether it runs at a lower priority from now on, also for later users.
+                Such processes are not given to callers that did not ask for this.
             trusted: see ``WorkerProcess``; an untrusted process is always new, and must not be put
                 back.
             most_mb: the memory limit of a new process in MiB; 0 for the pool's limit.
             hint: what to do if a new process ends unexpectedly.
         """
-        idle = self._take_idle(polite) if trusted else None
+        idle = self._take_idle(low_priority) if trusted else None
         process = idle or WorkerProcess(most_mb or self.most_mb, trusted, hint)
         process.module = module
-        if polite:
-            process.give_way()
+        if low_priority:
+            process.lower_priority()
         return process
 
-    def _take_idle(self, polite: bool) -> WorkerProcess | None:
+    def _take_idle(self, low_priority: bool) -> WorkerProcess | None:
         with self._lock:
             for place in reversed(range(len(self._idle))):
                 process = self._idle[place][1]
-                if process.is_alive and (polite or not process.gives_way):
+                if process.is_alive and (low_priority or not process.has_low_priority):
                     del self._idle[place]
                     return process
         return None

@@ -47,7 +47,7 @@ class WorkerProcess:
         pid: the process number.
         why: the error for every caller once it has ended, else None.
         progress: two integers that the running function may set.
-        gives_way: whether it runs at a lower priority.
+        has_low_priority: whether it runs at a lower priority.
     """
 
     def __init__(self, most_mb: int = 0, trusted: bool = True, hint: str | None = None) -> None:
@@ -59,7 +59,7 @@ class WorkerProcess:
             hint: what to do if it ends unexpectedly.
         """
         self.module = ""
-        self.gives_way = False
+        self.has_low_priority = False
         self.why: GymServerError | None = None
         self._hint = hint
         self._on_end: Callable[[GymServerError], None] = lambda why: None
@@ -174,12 +174,12 @@ class WorkerProcess:
         # A process that even the system cannot end has no exit status.
         return self.why.again() if self.why else self._died(None)
 
-    def give_way(self) -> None:
+    def lower_priority(self) -> None:
         """Run at a lower priority than other processes, including the server, from now on."""
-        if not self.gives_way and hasattr(os, "setpriority"):
+        if not self.has_low_priority and hasattr(os, "setpriority"):
             with contextlib.suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, self.pid, _LOWER_PRIORITY)
-        self.gives_way = True
+        self.has_low_priority = True
 
     # The end --------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from flask import Flask
 
 from gym_server.api.access import Access, Guard
 from gym_server.api.app import Config, create_app
-from gym_server.api.routes import ROOMS, ROUTES
+from gym_server.api.routes import BLUEPRINTS, ROUTES
 from gym_server.api.routing import Callers, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.errors import GymServerError
@@ -24,7 +24,7 @@ def refusal(access, method="GET", path=HEALTH, keys=None, query="", **headers):
         **{f"HTTP_{name.upper()}": text for name, text in headers.items() if text is not None},
     }
     guard = Guard(access, keys or WatchKeys())
-    match = Router(Flask("rooms", static_folder=None), ROOMS).match(environ)
+    match = Router(Flask("routes", static_folder=None), BLUEPRINTS).match(environ)
     try:
         # Twice, because the guard remembers accepted hosts.
         guard.check(environ, match)

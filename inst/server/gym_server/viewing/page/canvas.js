@@ -1,6 +1,6 @@
-// What all drawings of this page share.
+// Functions that all drawings of this page share.
 
-// Empty a canvas and give it the resolution of the display; lengths are in CSS pixels.
+// Clear a canvas and set its resolution to the display's; lengths are in CSS pixels.
 export function prepare(canvas) {
   const scale = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas;

@@ -1,4 +1,4 @@
-// Draws the returns of the last episodes, a point each, and the return that counts as solved.
+// Draws the returns of the last episodes as points, and the return that counts as solved.
 
 import { number, prepare } from "./canvas.js";
 
@@ -44,7 +44,7 @@ export function drawChart(canvas, returns, goal) {
     stroke(pen, [[left, y(goal)], [right, y(goal)]]);
     pen.setLineDash([]);
     const above = y(goal) - 20 > top;
-    // On the left, where the returns of the first episodes seldom reach.
+    // On the left, where points rarely are: early episodes have low returns.
     pen.textAlign = "left";
     pen.fillText(`solved: mean of ${number(goal)}`, left + 4, y(goal) + (above ? -9 : 11));
   }

@@ -1,4 +1,4 @@
-// Shows frames live, or collects a short clip, shows it slowly and goes on from the present.
+// Shows frames live, or records a short clip, plays it slowly, and continues live.
 
 const CLIP_SECONDS = 2;
 
@@ -10,7 +10,7 @@ export class Playback {
     this.drop();
   }
 
-  // Whether more frames are wanted: not while a clip that is complete is still being shown.
+  // Whether more frames are wanted: not while a complete clip is playing.
   get wants() {
     return !this.paused && !this.complete;
   }
@@ -22,7 +22,7 @@ export class Playback {
 
   setPaused(paused) {
     this.paused = paused;
-    // After a pause it goes on with the latest frame.
+    // After a pause, continue with the latest frame.
     this.drop();
   }
 
@@ -30,7 +30,7 @@ export class Playback {
     clearTimeout(this.timer);
     this.timer = null;
     this.clip = [];
-    // Since when the clip is filmed; null while there is none. It may be empty in between.
+    // When recording started, or null. The clip may be empty meanwhile.
     this.filmed = null;
     this.complete = false;
   }
@@ -56,7 +56,7 @@ export class Playback {
   playNext() {
     const next = this.clip[0];
     if (!next) {
-      // The clip was shown to its end.
+      // The clip is over.
       this.timer = null;
       if (this.complete || performance.now() - this.filmed > CLIP_SECONDS * 1000) this.drop();
       return;

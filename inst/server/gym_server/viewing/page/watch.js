@@ -1,4 +1,4 @@
-// Follows one environment: asks for new frames, and shows them.
+// Follows one environment: requests new frames, and shows them.
 
 import { number } from "./canvas.js";
 import { drawChart } from "./chart.js";
@@ -6,14 +6,14 @@ import { Observation } from "./observation.js";
 import { Playback } from "./playback.js";
 
 const $ = (id) => document.getElementById(id);
-// Opens the page in place of a token, where the server needs one.
+// Opens the page instead of the token, if the server has one.
 const KEY = new URLSearchParams(location.search).get("key");
-// The page's own address, whether or not it was asked for with its last slash.
+// The page's own address, with its last slash even if it was requested without.
 const HERE = new URL(location.pathname.replace(/\/?$/, "/"), location.href);
 const GONE_PAUSE = 1000;
 const PRESENCE_PAUSE = 700;
 const STILL_AFTER = 1500;
-// After these errors the environment does not come back.
+// After these errors the environment is closed for good.
 const CLOSED = new Set([
   "unknown_instance", "instance_idle_closed", "call_too_long", "environment_died",
 ]);
@@ -36,7 +36,7 @@ async function follow() {
       if (playback.wants && !document.hidden) {
         await askForFrame();
       } else {
-        // Keep watching without a frame.
+        // Keep watching without requesting a frame.
         await ask("presence/");
         if (document.body.dataset.state === "gone") returnFromGone();
         await sleep(PRESENCE_PAUSE);
@@ -57,7 +57,7 @@ async function follow() {
       }
       after = null;
       if (problem.status === 500 || problem.status === 429) showMessage("faulty", "This cannot be shown", problem.message);
-      else showMessage("gone", "The server is gone", "This page goes on by itself when it is back.");
+      else showMessage("gone", "The server is gone", "This page continues when the server is back.");
       await sleep(GONE_PAUSE);
     }
   }
@@ -70,7 +70,7 @@ async function askForFrame() {
   const frame = await ask(`state/?${query}`);
   if (asked !== subEnv || playback.paused) return;
   if (frame.state === "busy") {
-    setState("busy", "busy: a picture has to wait");
+    setState("busy", "busy: the picture must wait");
     return;
   }
   const isNew = frame.number !== after;
@@ -121,7 +121,7 @@ async function show(frame) {
   $("scene").classList.toggle("observing", Boolean(frame.observation));
   $("picture").hidden = !frame.frame;
   if (frame.state === "not_reset") {
-    showMessage("waiting", "Not reset yet", "There is something to see when its first episode begins.");
+    showMessage("waiting", "Not reset yet", "It is shown when its first episode starts.");
     return;
   }
   setLive(frame);
@@ -180,7 +180,7 @@ function showReturns({ returns, num_envs: numEnvs, reward_threshold: goal }) {
   drawChart($("chart"), returns, goal);
 }
 
-// The steps of all sub-environments are counted; real time holds for each of them.
+// Steps are counted over all sub-environments; real time applies to each.
 function showPace({ steps, fps, num_envs: numEnvs }) {
   const now = performance.now();
   if (!pace || steps < pace.steps) pace = { steps, now, rate: null };
@@ -208,7 +208,7 @@ function setLive({ state }) {
   quiet = setTimeout(() => {
     if (document.body.dataset.state !== "live" || playback.paused) return;
     setState("still", still);
-    $("pace").textContent = "Nobody steps it at the moment";
+    $("pace").textContent = "Nobody is stepping it";
     pace = null;
   }, STILL_AFTER);
 }
@@ -216,7 +216,7 @@ function setLive({ state }) {
 const BADGES = {
   waiting: "waiting for a reset",
   locked: "no key",
-  faulty: "a fault",
+  faulty: "error",
   closed: "closed",
   gone: "server gone",
 };
@@ -241,7 +241,7 @@ function hideMessage() {
 
 function showLocked({ message }) {
   const advice =
-    "In R, env_watch() or env$watch() makes a new link. It lasts until nobody has used it for 10 minutes.";
+    "In R, env_watch() or env$watch() makes a new link. It expires 10 minutes after its last use.";
   showMessage("locked", `${message}.`, advice);
   $("pause").disabled = true;
   if (!shown) $("env").textContent = "Locked";
@@ -253,7 +253,7 @@ async function showClosed(problem) {
   $("pause").disabled = true;
   $("pace").textContent = "";
   if (!shown) $("env").textContent = "Closed";
-  // The key is good for this environment only.
+  // The key is valid only for this environment.
   if (KEY !== null) return;
   for (;;) {
     try {
@@ -267,13 +267,13 @@ async function showClosed(problem) {
       });
       $("advice").textContent = open.length
         ? "Others on this server:"
-        : "There is no other on this server at the moment.";
+        : "There are no others on this server.";
       if (links.length !== $("others").children.length || links.some((item, i) =>
         item.textContent !== $("others").children[i].textContent)) {
         $("others").replaceChildren(...links);
       }
     } catch {
-      $("advice").textContent = "Its server is gone, too.";
+      $("advice").textContent = "The server is gone, too.";
       $("others").replaceChildren();
     }
     await sleep(2 * GONE_PAUSE);
@@ -285,7 +285,7 @@ async function showClosed(problem) {
 function setPaused(paused) {
   playback.setPaused(paused);
   $("pause").setAttribute("aria-pressed", paused);
-  $("pause").textContent = paused ? "Go on" : "Pause";
+  $("pause").textContent = paused ? "Continue" : "Pause";
   clearTimeout(quiet);
   pace = null;
   if (document.body.dataset.state !== "gone") {
