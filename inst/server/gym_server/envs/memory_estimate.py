@@ -17,6 +17,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Dict, Graph, OneOf, Sequence, Text, Tuple
 
 from gym_server.envs.registry import module_of
+from gym_server.spaces import parts_of
 
 _KB, _MB = 2**10, 2**20
 
@@ -165,14 +166,8 @@ def _parts(space: gymnasium.Space) -> Iterator[tuple[float, int]]:
     waiting = [space]
     while waiting:
         match waiting.pop():
-            case Dict() as one:
-                waiting.extend(one.spaces.values())
-            case Tuple() | OneOf() as one:
-                waiting.extend(one.spaces)
-            case Sequence() as one:
-                waiting.append(one.feature_space)
-            case Graph() as one:
-                waiting.extend(part for part in (one.node_space, one.edge_space) if part)
+            case Dict() | Tuple() | OneOf() | Sequence() | Graph() as one:
+                waiting.extend(parts_of(one))
             case Text() as one:
                 yield one.max_length, 4
             case one:

@@ -73,6 +73,7 @@ class LocalInstance(Instance):
             "action_space": spaces.describe(self.single_action_space),
             "observation_space": spaces.describe(self.single_observation_space),
         }
+        self._space_info: dict[str, dict] = {}
         self._actions = ActionReader(self.single_action_space, config.num_envs)
         self._render_fps: object = (env.metadata or {}).get("render_fps")
         self.viewer.fps = usable_fps(self._render_fps)
@@ -200,15 +201,9 @@ class LocalInstance(Instance):
 
     def space_info(self, name: str) -> dict:
         """Return the description of a space, which is large for a large vector environment."""
-        return self._action_space_info if name == "action_space" else self._observation_space_info
-
-    @cached_property
-    def _action_space_info(self) -> dict:
-        return spaces.describe(self.gym_env.action_space)
-
-    @cached_property
-    def _observation_space_info(self) -> dict:
-        return spaces.describe(self.gym_env.observation_space)
+        if name not in self._space_info:
+            self._space_info[name] = spaces.describe(getattr(self.gym_env, name))
+        return self._space_info[name]
 
     def contains(self, name: str, claim: dict) -> bool:
         """Answer a client's "contains" question; see ``Instance.contains()``."""

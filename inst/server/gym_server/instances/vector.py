@@ -217,7 +217,7 @@ class VectorInstance(LocalInstance):
     # Values ---------------------------------------------------------------------------------
 
     def _sample_action(self) -> object:
-        return spaces.encode_sub_envs(self.single_action_space, self.gym_env.action_space.sample())
+        return spaces.encode_members(self.single_action_space, self.gym_env.action_space.sample())
 
     def _decode(self, space: Space, value: object) -> object:
         return spaces.decode_sub_envs(

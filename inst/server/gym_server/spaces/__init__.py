@@ -22,18 +22,18 @@ from gym_server.spaces import (  # noqa: F401
 from gym_server.spaces.batches import (
     decode_sub_envs,
     encode_batch,
-    encode_sub_envs,
 )
 from gym_server.spaces.kinds import (
     NotInSpace,
     brief_space,
     decode,
     encode,
+    encode_members,
     json_reader,
 )
 from gym_server.spaces.membership import contains
 from gym_server.spaces.stacking import stack
-from gym_server.spaces.support import describe
+from gym_server.spaces.support import describe, parts_of
 from gym_server.spaces.tensor_parts import (
     Rows,
     tensor_reader,
@@ -53,8 +53,9 @@ __all__ = [
     "describe",
     "encode",
     "encode_batch",
-    "encode_sub_envs",
+    "encode_members",
     "json_reader",
+    "parts_of",
     "stack",
     "tensor_reader",
     "tensor_writer",

@@ -24,7 +24,7 @@ from gym_server.spaces.arrays import (
 )
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode_part, encode
-from gym_server.spaces.stacking import ARRAYS, stack, unstack
+from gym_server.spaces.stacking import ARRAYS, stack
 from gym_server.spaces.tensor_parts import Rows
 
 
@@ -52,11 +52,6 @@ def _(space: Tuple, batch: tuple) -> object:
 @encode_batch.register
 def _(space: Dict, batch: dict) -> object:
     return {str(key): encode_batch(part, batch[key]) for key, part in space.spaces.items()}
-
-
-def encode_sub_envs(space: Space, batch: object) -> list:
-    """Encode a batch as a list of JSON values, the format that ``decode_sub_envs()`` reads."""
-    return [encode(space, member) for member in unstack(space, batch)]
 
 
 def decode_sub_envs(space: Space, value: object, rows: Rows) -> object:

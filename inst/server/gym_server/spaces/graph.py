@@ -8,8 +8,15 @@ import numpy as np
 from gymnasium.spaces import Graph, GraphInstance
 
 from gym_server.spaces.arrays import read_integer
-from gym_server.spaces.kinds import NotInSpace, decode, decode_part, description, encode
-from gym_server.spaces.stacking import stack, unstack
+from gym_server.spaces.kinds import (
+    NotInSpace,
+    decode,
+    decode_part,
+    description,
+    encode,
+    encode_members,
+)
+from gym_server.spaces.stacking import stack
 
 
 @description.register
@@ -25,14 +32,10 @@ def _(space: Graph) -> dict[str, object]:
 @encode.register
 def _(space: Graph, value: GraphInstance) -> object:
     return {
-        "nodes": _encode_batch(space.node_space, value.nodes),
-        "edges": None if value.edges is None else _encode_batch(space.edge_space, value.edges),
+        "nodes": encode_members(space.node_space, value.nodes),
+        "edges": None if value.edges is None else encode_members(space.edge_space, value.edges),
         "edge_links": None if value.edge_links is None else np.asarray(value.edge_links).tolist(),
     }
-
-
-def _encode_batch(space: Any, batch: object) -> list:
-    return [encode(space, member) for member in unstack(space, batch)]
 
 
 @decode.register

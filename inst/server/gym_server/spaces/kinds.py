@@ -10,6 +10,7 @@ from typing import Any
 from gymnasium.spaces import Space
 
 from gym_server.json_values import brief, shortened
+from gym_server.spaces.stacking import unstack
 
 
 class NotInSpace(Exception):  # noqa: N818 - it answers a question as often as it is an error
@@ -63,6 +64,11 @@ def description(space: Space) -> dict[str, object]:
 def encode(space: Space, value: Any) -> Any:
     """Encode a member of a space as JSON values (floats may still be non-finite)."""
     raise TypeError(f"no encoding for {type(space).__name__}")
+
+
+def encode_members(space: Any, batch: Any) -> list:
+    """Encode a batch as a list of JSON values, one per member."""
+    return [encode(space, member) for member in unstack(space, batch)]
 
 
 @singledispatch

@@ -39,11 +39,12 @@ def _check(space: Space, whole: Space, depth: int) -> None:
         raise _unsupported(brief_space(whole), wide)
     if isinstance(space, Dict) and len(set(map(str, space.spaces))) < len(space.spaces):
         raise _unsupported(brief_space(whole), "two of its keys are the same as text")
-    for part in _parts(space):
+    for part in parts_of(space):
         _check(part, whole, depth + (2 if isinstance(space, Graph) else 1))
 
 
-def _parts(space: Space) -> Iterable[Space]:
+def parts_of(space: Space) -> Iterable[Space]:
+    """Return the spaces that a space is directly made of."""
     match space:
         case Dict():
             return space.spaces.values()
