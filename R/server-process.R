@@ -35,7 +35,7 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   lines <- log_tail(log)
   own <- grep(server_line_start, lines, value = TRUE)
   if (length(own)) {
-    in_r <- sub("--port 0 takes", "`gym_server_start()` without a port takes", own, fixed = TRUE)
+    in_r <- sub("--port 0 picks", "`gym_server_start()` without a port picks", own, fixed = TRUE)
     abort_server_start(
       "The server ended before it took connections.", in_r, call, port_hint(own[[1L]])
     )
