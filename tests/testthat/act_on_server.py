@@ -1,8 +1,8 @@
-"""Act as the server's policies do: python act_on_server.py FOLDER
+"""Act like the server's policies: python act_on_server.py FOLDER
 
-Each file IN.safetensors there is a safetensors file of a policy, as a request for rollouts has it, with the tensor
-"observation" and the metadata "space" (what the actions are). IN.acted gets each action as
-float64, chosen one by one, and then all of them again, chosen in groups.
+Each file IN.safetensors in it is a policy in the format of a request for rollouts, with the tensor
+"observation" and the metadata "space" (the action space). IN.acted gets each action as float64:
+first chosen one by one, and then all of them again, chosen in groups.
 """
 
 import json

@@ -1,12 +1,12 @@
-"""A server that means ill, for tests of what the client bears.
+"""A malicious server, for tests of the client.
 
-    python bad_server.py flood HOW    answers each request without an end; HOW is "chunks",
-                                      "length" or "headers"
-    python bad_server.py packed       answers with 256 MB, packed, although nobody asked for that
-    python bad_server.py canned FILE  answers what FILE says at that moment: a JSON object of the
-                                      answers by path, {"status", "type", "text" or "hex"} each
+    python bad_server.py flood HOW    answers each request endlessly; HOW is "chunks", "length" or
+                                      "headers"
+    python bad_server.py packed       answers with 256 MB, compressed, although not requested
+    python bad_server.py canned FILE  answers as FILE says at that moment: a JSON object with an
+                                      answer for each path, {"status", "type", "text" or "hex"}
 
-Prints its port, ends when its standard input closes. A flood ends by itself after ten seconds.
+Prints its port, and ends when its standard input closes. A flood ends after ten seconds.
 """
 
 import contextlib
@@ -39,7 +39,7 @@ class Bad(http.server.BaseHTTPRequestHandler):
     do_POST = do_GET  # noqa: N815
 
     def flood(self, how):
-        """Send and send."""
+        """Send endlessly."""
         self.close_connection = True
         self.send_response(200)
         self.send_header("Content-Type", "application/json")
@@ -59,7 +59,7 @@ class Bad(http.server.BaseHTTPRequestHandler):
             self.wfile.write(piece)
 
     def packed(self):
-        """Send what is small and becomes large."""
+        """Send a small body that decompresses to a large one."""
         content = gzip.compress(b'{"all_envs":{}' + 256 * BLANKS + b"}")
         self.send_response(200)
         self.send_header("Content-Type", "application/json")
@@ -86,7 +86,7 @@ class Bad(http.server.BaseHTTPRequestHandler):
         self.wfile.write(content)
 
     def log_message(self, *args):
-        """Say nothing."""
+        """Log nothing."""
 
 
 server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Bad)

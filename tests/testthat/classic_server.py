@@ -1,10 +1,10 @@
-"""A server that knows the protocol of gym-http-api alone, for tests of what the client does there.
+"""A server that supports only the protocol of gym-http-api, for tests of the client.
 
     python classic_server.py
 
-It has the routes of that protocol and no others, ignores fields that it does not know, refuses
-in JSON what it cannot do, and answers an unknown route as Flask does, in HTML. Steps are answered
-as Gym did before it had truncation. Prints its port, ends when its standard input closes.
+It has only that protocol's routes, ignores unknown fields, sends errors in JSON, and answers an
+unknown route in HTML, like Flask. Steps have no truncation, as in Gym at the time. Prints its port,
+and ends when its standard input closes.
 """
 
 import secrets
@@ -21,7 +21,7 @@ envs = {}
 
 
 class Refused(Exception):
-    """What the client asks for cannot be done."""
+    """The request cannot be carried out."""
 
 
 @app.errorhandler(Refused)

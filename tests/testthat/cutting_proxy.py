@@ -1,11 +1,11 @@
-"""A proxy that breaks connections, for tests of what the client does then.
+"""A proxy that breaks connections, for tests of the client.
 
     python cutting_proxy.py SERVER_PORT WHEN PATTERN TIMES
 
-Passes HTTP requests on to 127.0.0.1:SERVER_PORT. The first TIMES requests whose
-first line contains PATTERN are broken: WHEN "answered" passes the request on,
-waits for the whole answer and then resets the client's connection; WHEN
-"unsent" resets it without passing anything on. Prints its port.
+Forwards HTTP requests to 127.0.0.1:SERVER_PORT, but breaks the first TIMES requests whose first
+line contains PATTERN. With WHEN "answered" it forwards the request, waits for the whole response
+and then resets the client's connection. With "unsent" it resets the connection without forwarding
+anything. Prints its port.
 """
 
 import socket
@@ -15,7 +15,7 @@ import threading
 
 
 def read_message(connection, buffered):
-    """One HTTP message with its body, and what was read beyond it."""
+    """Return one HTTP message with its body, and what was read beyond it."""
     while b"\r\n\r\n" not in buffered:
         chunk = connection.recv(65536)
         if not chunk:

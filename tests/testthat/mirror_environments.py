@@ -1,8 +1,8 @@
-"""An environment of a random space that checks what comes back.
+"""An environment with a random space that checks the actions it gets.
 
-It shows a value of its space as the observation, wants the same value as the action, and
-gives reward 1 when it is equal in type, dtype, shape and every bit but that of NaN; else 0,
-with both in the info. Made on a server that was started with
+It shows a value of its space as the observation, and expects the same value as the action. The
+reward is 1 if it is equal in type, dtype, shape and every bit except those of NaN; else 0, with
+both values in the info. Made on a server that was started with
 `--allow-module mirror_environments`.
 """
 
@@ -27,7 +27,7 @@ def _pick(rng, items):
 
 
 def draw_space(rng, depth=3, kinds=None):
-    """Return a random space of random nesting."""
+    """Return a random nested space."""
     kinds = kinds or list(DRAW)[: None if depth else 5]
     return DRAW[_pick(rng, kinds)](rng, depth)
 
@@ -86,7 +86,7 @@ DRAW = {
 
 
 def special_numbers(dtype):
-    """Return what `sample()` hardly ever gives."""
+    """Return numbers that `sample()` rarely returns."""
     if dtype.kind == "f":
         limits = np.finfo(dtype)
         tiny = limits.smallest_subnormal
@@ -94,14 +94,14 @@ def special_numbers(dtype):
     if dtype.kind == "b":
         return [False, True]
     limits = np.iinfo(dtype)
-    # R has no number for the smallest int64, nor for a uint64 beyond the largest int64.
+    # R cannot represent the smallest int64, nor a uint64 above the largest int64.
     wanted = [limits.min, limits.max, 0, 1, -(2**31), 2**31, 2**31 - 1, 2**32 - 1, 2**32]
     wanted += [s * (2**53 + d) for s in (1, -1) for d in (-1, 0, 1)] + [2**63 - 1, 1 - 2**63]
     return [n for n in wanted if limits.min <= n <= limits.max and -(2**63) < n < 2**63]
 
 
 def draw_value(rng, space):
-    """Return a member of a space, with special values here and there."""
+    """Return a member of a space, with some special values."""
     match space:
         case spaces.Box():
             array = np.array(space.sample(), dtype=space.dtype).reshape(space.shape)
@@ -154,7 +154,7 @@ def stack(space, members):
 
 
 def differs(sent, came):
-    """Return what is different, or an empty text."""
+    """Describe the difference, or return an empty text."""
     if type(sent) is not type(came):
         return f"{type(sent).__name__} became {type(came).__name__}"
     if isinstance(sent, (np.ndarray, np.generic)):
@@ -176,7 +176,7 @@ def differs(sent, came):
 
 
 class Boundless(np.ndarray):
-    """A bound that everything lies within, NaN too, which is in no Box."""
+    """A bound that contains everything, even NaN, which no ordinary Box contains."""
 
     def __le__(self, other):
         return np.ones(np.shape(other), bool)
@@ -185,7 +185,7 @@ class Boundless(np.ndarray):
 
 
 def unbind(space):
-    """Let NaN be a member of the Boxes of floating-point numbers in a space."""
+    """Make NaN a member of the floating-point Boxes in a space."""
     if isinstance(space, spaces.Box) and space.dtype.kind == "f":
         space.low, space.high = space.low.view(Boundless), space.high.view(Boundless)
     parts = getattr(space, "spaces", ())
@@ -197,7 +197,7 @@ def unbind(space):
 
 
 class Mirror(gym.Env):
-    """Shows one value after the other, begins with that of its seed's number, and ends at last."""
+    """Shows values one after another, starts with the one of its seed, and ends at last."""
 
     def __init__(self, number, values):
         rng = np.random.default_rng(number)

@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 
 class Odd(gym.Env):
-    """Gives back what a test wants to see arrive; never ends."""
+    """Returns values that a test wants to receive; never ends."""
 
     def __init__(self, observation_space, action_space=None, observation=None):
         self.observation_space = observation_space
@@ -72,7 +72,7 @@ class Slow(Odd):
 
 
 class Telling(Odd):
-    """Its info and reward hold all sorts of values."""
+    """Its info and reward have values of many types."""
 
     def step(self, action):
         info = {
@@ -94,7 +94,7 @@ class Chatty(Odd):
 
 
 class Drawing(Odd):
-    """Draws a dot that moves on with each step, on grey, coloured or half transparent ground."""
+    """Draws a dot that moves in each step, on a grey, coloured or half transparent background."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012
 
@@ -124,7 +124,7 @@ def box(low, high, shape, dtype):
 
 
 def image():
-    """Counts row by row, so that a swapped axis shows."""
+    """Return an image that counts row by row, so that swapped axes are noticed."""
     return Odd(
         box(0, 255, (2, 3, 4), np.uint8),
         observation=np.arange(24, dtype=np.uint8).reshape(2, 3, 4),
@@ -179,7 +179,7 @@ def shifted():
 
 
 class Riddle(spaces.Space):
-    """A kind of space that nobody knows."""
+    """An unknown kind of space."""
 
 
 def riddle():

@@ -1,11 +1,11 @@
-"""Plays a vector environment in process and writes down what came of it, for the R tests.
+"""Play a vector environment in process and write the results to a file, for the R tests.
 
 Usage: reference_sub_envs.py ENV_ID NUM_ENVS MODE AUTORESET STEPS FILE < ACTIONS. MODE is
-"vector_entry_point" or "sync", AUTORESET a value of Gymnasium's AutoresetMode, and ACTIONS
-holds a line of numbers for each step, one for each sub-environment. The file holds the observation
-of the reset with seed 7, then for each step observation, reward, terminated, truncated and the
-observation that the step led to, which within the same step may have been the last of an episode,
-sub-environment by sub-environment as little-endian doubles.
+"vector_entry_point" or "sync", AUTORESET a value of Gymnasium's AutoresetMode, and ACTIONS has a
+line of numbers per step, one per sub-environment. The file has the observation of the reset with
+seed 7, then for each step observation, reward, terminated, truncated and the observation that the
+step led to, which may be the last of an episode that was reset in the same step. The order is by
+sub-environment, the format little-endian doubles.
 """
 
 import sys

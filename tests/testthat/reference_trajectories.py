@@ -1,11 +1,11 @@
-"""Plays environments in process and writes down what came of it, for test-parity.R.
+"""Play environments in process and write the results to files, for test-parity.R.
 
 Usage: reference_trajectories.py DIRECTORY < LINES, each with the name of a file to write, an
-environment's id and a number of steps. A file holds for the first reset and for each step, one
-after the other: the observation (its parts in order, row by row, bytes where the space has
-uint8, else doubles), for a step also reward, terminated and truncated as doubles; after every
-tenth step and the first reset a frame as bytes, where there are frames. All little-endian. It
-gets its name when it is complete; with ".failed" behind it holds the reason why there is none.
+environment's id and a number of steps. A file has for the first reset and each step, in order: the
+observation (its parts in order, row by row, bytes if the dtype is uint8, else doubles), and for a
+step also reward, terminated and truncated as doubles; after the first reset and every tenth step a
+frame as bytes, if there are frames. Everything is little-endian. A file gets its name when it is
+complete. A file with the suffix ".failed" says why there is none.
 """
 
 import os
@@ -41,7 +41,7 @@ def leaves(space, value):
 
 
 def play(env, steps, out):
-    """Play with actions of the seeded action space; an episode that ends is followed by another."""
+    """Play with actions of the seeded action space; after an episode's end, start another one."""
     space = env.observation_space
     env.action_space.seed(SEED)
     draws = env.render_mode == "rgb_array"
@@ -62,7 +62,7 @@ def play(env, steps, out):
 
 
 def make(env_id):
-    """Make an environment as the server does when nothing is said about pictures."""
+    """Make an environment as the server does by default."""
     env_class = gym.envs.registration.load_env_creator(gym.spec(env_id).entry_point)
     draws = "rgb_array" in env_class.metadata.get("render_modes", ())
     return gym.make(env_id, render_mode="rgb_array" if draws else None)

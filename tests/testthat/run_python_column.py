@@ -1,4 +1,4 @@
-"""Runs lines of Python, one after the other in one place, and prints what the compared ones give.
+"""Run lines of Python, one after another in one namespace, and print the compared values.
 
 Standard input: a JSON list of objects with "python" and "compared". Standard output: a JSON list of
 one flat list of numbers or strings for each compared line.
@@ -13,12 +13,12 @@ import numpy as np
 
 
 def flat(value: object) -> list:
-    """Return a value as one list."""
+    """Return a value as a flat list."""
     return [value] if isinstance(value, str) else np.ravel(value).tolist()
 
 
 def main() -> None:
-    """Run what standard input says."""
+    """Run the lines of standard input."""
     place: dict = {}
     values = []
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):

@@ -1,7 +1,7 @@
 """Solve Gymnasium's own tables with plain loops, to compare with solve_mdp().
 
 The arguments are an id, the environment's arguments as JSON, and a horizon, 0 for none. Prints the
-values of all states and the mean over the start's distribution as JSON.
+values of all states, and their mean over the start distribution, as JSON.
 """
 
 import json

@@ -1,9 +1,9 @@
-"""A server that gets stuck, for tests of what the client does then.
+"""A server that gets stuck, for tests of the client.
 
     python stalling_server.py HOW
 
-HOW "silent" takes requests and never answers, "half" answers the first half and then no more,
-"cut" answers the first half and ends the connection, "full" takes no more connections, as a
+HOW "silent" accepts requests and never answers, "half" sends the first half of the answer and then
+nothing, "cut" sends the first half and closes the connection, "full" accepts no connections, like a
 machine behind a broken line. Prints its port.
 """
 
@@ -30,7 +30,7 @@ def main():
     port = listener.getsockname()[1]
     kept = []
     if how == "full":
-        # Those that are not accepted fill the queue; what comes then gets no answer at all.
+        # Connections that are not accepted fill the queue; later ones get no answer at all.
         for _ in range(4):
             one = socket.socket()
             one.setblocking(False)

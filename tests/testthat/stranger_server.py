@@ -1,6 +1,6 @@
-"""A program that is no Gym server: refuses all, and calls itself as its argument says.
+"""A program that is not a Gym server: refuses everything, under the name in its argument.
 
-Prints its port, ends when its standard input closes.
+Prints its port, and ends when its standard input closes.
 """
 
 import http.server
@@ -14,7 +14,7 @@ class Stranger(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
 
     def version_string(self):
-        """Tell the name."""
+        """Return the name."""
         return sys.argv[1]
 
     def do_GET(self):
@@ -27,7 +27,7 @@ class Stranger(http.server.BaseHTTPRequestHandler):
     do_POST = do_GET  # noqa: N815
 
     def log_message(self, *args):
-        """Say nothing."""
+        """Log nothing."""
 
 
 server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Stranger)

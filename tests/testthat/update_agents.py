@@ -1,7 +1,6 @@
 """Updates of ARS and of CEM in NumPy, written from the papers, for the tests of the agents.
 
-Reads JSON from the file that is named, writes the weights and the rest after each update to the
-standard output.
+Reads JSON from the given file, and prints the weights and other results after each update.
 """
 
 import json

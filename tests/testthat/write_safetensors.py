@@ -1,4 +1,4 @@
-"""Writes a file with every dtype by PyPI's safetensors. Usage: write_safetensors.py FILE"""
+"""Write a file with every dtype by PyPI's safetensors. Usage: write_safetensors.py FILE"""
 
 import sys
 
