@@ -55,9 +55,9 @@ def read_random(
 def _narrower(own: object, action_space: Space) -> Discrete:
     if not isinstance(action_space, Discrete):
         raise invalid_policy(
-            f"A random policy can have fewer actions where they are Discrete, and here they are "
-            f"{brief_space(action_space)}",
-            "leave its action_space out",
+            f"A random policy can have its own action space only if the environment's is Discrete, "
+            f"not {brief_space(action_space)}",
+            "omit its action_space",
         )
     parts = own if isinstance(own, Mapping) and own.keys() <= {"n", "start"} else {}
     n, start, first = parts.get("n"), parts.get("start", 0), int(action_space.start)

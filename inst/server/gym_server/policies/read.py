@@ -50,8 +50,8 @@ def read_policy(
     total = sum(tensor.size for tensor in tensors.values())
     if total > _MOST_NUMBERS:
         raise invalid_policy(
-            f"The policy has {total:,} numbers, and at most {_MOST_NUMBERS:,} are possible",
-            "ask for fewer candidates at a time",
+            f"The policy has {total:,} numbers, and at most {_MOST_NUMBERS:,} are allowed",
+            "send fewer candidates at a time",
         )
     if not isinstance(document, Mapping) or document.get("kind") != "list":
         return _read_one(document, tensors, observation_space, action_space)
@@ -84,7 +84,7 @@ def _read_one(
         raise invalid_policy(
             f"The policy must be an object whose kind is one of {', '.join(_READERS)} or list, "
             f"not {brief(document)}",
-            "in a list each policy is of another kind than list",
+            "lists cannot be nested",
         )
     return _READERS[kind](document, tensors, observation_space, action_space)
 
@@ -93,7 +93,7 @@ def _read_candidate(document: object, *bound: Any) -> Policy:
     policy = _read_one(document, *bound)
     if policy.candidates not in (1, None):
         raise invalid_policy(
-            f"It has {policy.candidates} candidates, and each of a list must be one"
+            f"It has {policy.candidates} candidates, but each policy of a list must be one"
         )
     return policy
 

@@ -52,7 +52,7 @@ def read_network(
             'outputs of "identity" are taken as they are',
         )
     network = "-".join(map(str, sizes)) + (" with a bias" if plan.bias else "")
-    row = f"a row of {count_of(plan.ends[-1], 'number')} for each candidate, as {network} has them"
+    row = f"a row of {count_of(plan.ends[-1], 'number')} for each candidate, as {network} needs"
     weights = finite_numbers(tensors, "weights", [(None, plan.ends[-1])], row)
     return NetworkPolicy(plan, weights, _deviation(tensors, plan, len(weights)))
 
@@ -131,9 +131,9 @@ def _moments(
         return {}
     if isinstance(space, Discrete):
         raise invalid_policy(
-            f"Observations that are numbers of a range can be normalised, but those of the "
-            f"environment are {brief_space(space)}",
-            "make the policy without mean and scale",
+            f"Only observations of a Box can be normalized, but those of the environment are "
+            f"{brief_space(space)}",
+            "omit mean and scale",
         )
     wanted = f"a number for each of its {count_of(inputs, 'input')}"
     return {name: finite_numbers(tensors, name, [(inputs,)], wanted) for name in ("mean", "scale")}

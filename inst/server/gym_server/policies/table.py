@@ -121,6 +121,6 @@ def read_table(
     if np.isnan(q).any():
         raise invalid_policy("The policy's q must be numbers, not NaN")
     if temperature is not None and (q == np.inf).any():
-        raise invalid_policy("The policy's q has the value Inf, of which there is no softmax")
+        raise invalid_policy("The policy's q must not be Inf with a temperature")
     choice = DiscreteChoice(action_space, epsilon, temperature, masks=True)
     return TablePolicy(q.reshape(-1, *shape), states, observation_space, choice)

@@ -30,12 +30,12 @@ def check_keep(keep: Keep, observation_space: Space, action_space: Space) -> Non
         GymServerError: ``not_supported``.
     """
     if keep.moments and not isinstance(observation_space, ARRAYS):
-        raise GymServerError("not_supported", "Observations that are no arrays have no moments")
+        raise GymServerError("not_supported", "Only observations that are arrays have moments")
     if keep.steps and not (_has_arrays(observation_space) and _has_arrays(action_space)):
         raise GymServerError(
             "not_supported",
-            "Steps are kept where observations and actions are arrays, or Tuples or Dicts of them",
-            "reset and step an instance to get the others",
+            "Steps are kept only if observations and actions are arrays, Tuples or Dicts of arrays",
+            "reset and step an instance instead",
         )
 
 
@@ -137,8 +137,8 @@ class Recorder:
                 raise GymServerError(
                     "too_much_memory",
                     f"The steps of an episode may take {MOST_BYTES // 2**20} MiB, which are "
-                    f"{self._most_steps:,} of these, and this one goes on",
-                    "a smaller max_steps cuts it short",
+                    f"{self._most_steps:,} of these, but this episode is longer",
+                    "use a smaller max_steps",
                 )
 
     def end(self) -> None:

@@ -60,7 +60,7 @@ def play(number: int, task: Task | None, units: Sequence[Unit]) -> Ready:
     playing = _tasks.get(number)
     if playing is None:
         if task is None:
-            raise GymServerError("internal_error", "A task was played that is not known here")
+            raise GymServerError("internal_error", "This process does not have the task")
         playing = _tasks[number] = _Playing(task)
         while len(_tasks) > _MOST_TASKS:
             _tasks.popitem(last=False)
@@ -87,8 +87,8 @@ class _Playing:
         if env.remembers:
             raise GymServerError(
                 "not_supported",
-                f"{env.remembers[0]} remembers earlier episodes, so that none of them can be "
-                "played by itself",
+                f"{env.remembers[0]} remembers earlier episodes, so they cannot be played "
+                "separately",
                 "reset and step an instance instead",
             )
         if task.max_steps is None and env.needs_max_steps:
@@ -122,7 +122,7 @@ class _Playing:
         if group is None and unit.rows is not None:
             raise GymServerError(
                 "invalid_parameter",
-                f"Each episode of {env_id} is played by itself, so the tensor 'row' must be absent",
+                f"Episodes of {env_id} are played separately, so the tensor 'row' must be absent",
             )
         if group is not None and unit.rows is None:
             raise GymServerError(

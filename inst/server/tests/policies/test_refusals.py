@@ -42,7 +42,7 @@ CASES = [
     ({"kind": "random", "action_space": {"n": True}}, {}, '{"n": true}'),
     ({"kind": "random", "action_space": {"low": 0}}, {}, '{"low": 0}'),
     ({**NETWORK, "sizes": [4, 3, 1]}, WEIGHTS, "a row of 15 numbers for each candidate"),
-    ({**NETWORK, "bias": True}, WEIGHTS, "4-2-1 with a bias has them, not 3 x 10"),
+    ({**NETWORK, "bias": True}, WEIGHTS, "4-2-1 with a bias needs, not 3 x 10"),
     ({**NETWORK, "bias": 1}, WEIGHTS, "bias must be true or false, not 1"),
     ({**NETWORK, "sizes": [3, 2, 1]}, WEIGHTS, "takes 3 inputs, but an observation"),
     ({**NETWORK, "sizes": [4, 2, 3]}, WEIGHTS, "gives 3 outputs, but an action of"),
@@ -107,7 +107,7 @@ def test_a_policy_that_is_malformed_or_does_not_fit_is_refused(document, tensors
         ({"temperature": 0}, np.zeros((4, 2)), "temperature must be a number above 0, not 0"),
         ({"temperature": float("inf")}, np.zeros((4, 2)), "temperature must be a number above 0"),
         ({"temperature": True}, np.zeros((4, 2)), "not true"),
-        ({"temperature": 1}, with_value((4, 2), np.inf), "has the value Inf"),
+        ({"temperature": 1}, with_value((4, 2), np.inf), "must not be Inf"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused(fields, q, words):
@@ -129,12 +129,12 @@ def test_a_box_without_bounds_has_no_scale():
 
 def test_a_discrete_observation_is_not_normalised():
     moments = {"mean": np.zeros(4), "scale": np.ones(4)}
-    assert "can be normalised" in refused(LINEAR, {**EIGHT, **moments}, FIELD).message
+    assert "can be normalized" in refused(LINEAR, {**EIGHT, **moments}, FIELD).message
 
 
 def test_fewer_random_actions_are_discrete():
     document = {"kind": "random", "action_space": {"n": 1}}
-    assert "leave its action_space out" in refused(document, {}, acted=box(1)).hint
+    assert "omit its action_space" in refused(document, {}, acted=box(1)).hint
 
 
 def test_composite_actions_are_only_for_random_policies():

@@ -243,7 +243,7 @@ def test_foreign_environments_are_made_anew_for_each_episode(client):
         (
             {"env_id": "Blackjack-v1", "keep": ["moments"]},
             "not_supported",
-            "no moments",
+            "have moments",
         ),
         ({"env_id": "faulty_envs:RaisesInStep-v0", "max_steps": 9}, "environment_error", "seed 1"),
         ({"env_id": "faulty_envs:ExitsInStep-v0", "max_steps": 9}, "environment_error", "seed 1"),
