@@ -7,9 +7,9 @@
 #' a band, of a single training its evaluations as a line; the target is a dashed line. Several that
 #' are given together are compared in one picture.
 #'
-#' Between two evaluations a training's return is taken from the straight line between them. The line
-#' of several seeds is thick as long as all of them train. From where the first one has ended it is
-#' thin, as that of a training that has ended is: a seed that has ended counts with its last
+#' Between two evaluations a training's return is taken from the straight line between them. The
+#' line of several seeds is thick as long as all of them train. From where the first one has ended
+#' it is thin, as that of a training that has ended is: a seed that has ended counts with its last
 #' evaluation. A picture begins where all seeds were evaluated once. Where targets, budgets or rules
 #' of evaluation differ in one environment, the caption names them.
 #'
@@ -89,18 +89,6 @@ ended_caption <- function(seeds) {
   } else {
     "thin line: the training has ended, with this evaluation"
   }
-}
-
-given_trainings <- function(values, call = rlang::caller_env()) {
-  if (any(vapply(values, inherits, NA, c("gym_search", "gym_searches")))) {
-    gym_abort(
-      c(paste("A search by `search_random()` has no evaluations that could be compared with those",
-              "of a training."),
-        i = "`train_agent(agent_random(), ...)` has."),
-      class = "gym_error_argument", argument = "...", call = call
-    )
-  }
-  only_results(values, c("gym_training", "gym_trainings"), call)
 }
 
 # The target that all have, `NULL` where there is none, or not the same.

@@ -21,54 +21,13 @@ show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = N
   invisible(picture)
 }
 
-#' Take the arguments of the function that calls this, each result with a name
-#'
-#' Results of which several can be compared have a name in the picture: that of the argument, of the
-#' variable, or else a label of their own. What is given beside them needs a name.
-#' @param first The function's first argument, a symbol. Like the others it may have another name,
-#'   that of its row or line: then it is missing.
-#' @noRd
-arguments_as_written <- function(first, frame = rlang::caller_env(), call = frame) {
-  listed <- as.call(c(quote(list), if (!eval(call("missing", first), frame)) first, quote(...)))
-  values <- eval(listed, frame)
-  if (!any(vapply(values, is_comparable, NA))) {
-    return(values)
-  }
-  written <- as.list(eval(call("substitute", listed), frame))[-1L]
-  names <- rlang::names2(values)
-  for (i in which(!nzchar(names))) {
-    if (!inherits(values[[i]], c("gym_rollout", "gym_training", "gym_trainings", "gym_searches"))) {
-      must <- "a result as the others, or have a name, such as `type = `"
-      abort_argument(values[[i]], must, "...", call)
-    }
-    variable <- is.name(written[[i]])
-    names[[i]] <- if (variable) as.character(written[[i]]) else result_label(values[[i]])
-  }
-  stats::setNames(values, names)
-}
-
-is_comparable <- function(x) {
-  inherits(x, c("gym_rollout", "gym_training", "gym_trainings")) && !inherits(x, "gym_search")
-}
-
-result_label <- function(x) {
-  if (inherits(x, "gym_rollout")) policy_label(x$policy) else training_label(x)
-}
-
-training_label <- function(x) sub(":.*", "", format(x$agent))
-
-#' Tell the results among the arguments of a picture from the others, of which there must be none
-#' @return The results, a list with names.
-#' @noRd
-only_results <- function(values, class, call = rlang::caller_env()) {
-  are <- vapply(values, inherits, NA, class)
-  rlang::exec(check_dots_empty, !!!values[!are], call = call)
-  stats::setNames(values[are], make.unique(rlang::names2(values)[are], " "))
-}
-
 #' @rdname plot.gym_bandit_learning
 #' @export
 plot.gym_bandit_learning <- show_picture
+
+#' @rdname plot.gym_comparison
+#' @export
+plot.gym_comparison <- show_picture
 
 #' @rdname plot.gym_decision_map
 #' @export

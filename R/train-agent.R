@@ -7,15 +7,15 @@
 #' # When training ends
 #'
 #' Before the first iteration and every `eval_every` iterations the agent's own policy plays
-#' `eval_episodes_curve` episodes, which make the learning curve. When these, or the candidates of an iteration, reach the target in the mean,
-#' the policy plays `eval_episodes` fresh ones, and these decide whether training ends. That may
-#' happen several times, and the time at which it ends is then one at which the policy was lucky. So
-#' at the end the policy plays `eval_episodes` further episodes, once, whose seeds nothing has seen
-#' before: their mean return is what the training has come to. Steps of evaluations are not counted
-#' as steps of the training.
+#' `eval_episodes_curve` episodes, which make the learning curve. When these, or the candidates of
+#' an iteration, reach the target in the mean, the policy plays `eval_episodes` fresh ones, and
+#' these decide whether training ends. That may happen several times, and the time at which it ends
+#' is then one at which the policy was lucky. So at the end the policy plays `eval_episodes` further
+#' episodes, once, whose seeds nothing has seen before: their mean return is what the training has
+#' come to. Steps of evaluations are not counted as steps of the training.
 #'
-#' Where episodes have no limit of steps, neither the environment's nor `max_steps`, the policy is not
-#' evaluated before the first iteration: untrained, it might never end an episode.
+#' Where episodes have no limit of steps, neither the environment's nor `max_steps`, the policy is
+#' not evaluated before the first iteration: untrained, it might never end an episode.
 #'
 #' A learner's policy is calculated instead of played where the model of the environment is known
 #' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
@@ -32,8 +32,8 @@
 #' | `"Pendulum-v1"` | -200 | ours; none is registered |
 #' | `"Swimmer-v5"` | 325 | Mania, Guy and Recht (2018); registered: 360 |
 #'
-#' A training stops at a lucky moment. So a target somewhat above makes it more likely that the final
-#' evaluation reaches the environment's; trainings that are compared need the same.
+#' A training stops at a lucky moment. So a target somewhat above makes it more likely that the
+#' final evaluation reaches the environment's; trainings that are compared need the same.
 #'
 #' # Sampling from a model
 #'
@@ -83,8 +83,8 @@
 #' @param eval_episodes How many episodes decide whether training ends, and make the final
 #'   evaluation, a whole number of at least 2; the default is 100.
 #' @param eval_episodes_curve How many episodes make a point of the learning curve, a whole number,
-#'   at most `eval_episodes` of which are played; the default is 10. With 0 there is no curve, and no
-#'   time is spent on it.
+#'   at most `eval_episodes` of which are played; the default is 10. With 0 there is no curve, and
+#'   no time is spent on it.
 #' @param evaluate How evaluations play a network that draws its actions, as agents that follow
 #'   gradients have: `"greedy"`, the default, by its most likely actions, or `"draw"`, as it is. The
 #'   same policy decides when training ends, is evaluated at the end, and is returned. Training
@@ -103,8 +103,9 @@
 #'   search after those that were played side by side) with the training so far, an object as
 #'   `train_agent()` returns it. Training ends when it returns `FALSE`.
 #' @param log `NULL`, the default, or a folder, which is made where it does not exist: each
-#'   iteration appends a row to `progress.csv` there, and `config.json` says what was trained. What
-#'   an earlier training has left there keeps its rows as `progress-1.csv`, and so on.
+#'   iteration appends a row to `progress.csv` there, each evaluation one to `evaluations.csv`, and
+#'   `config.json` says what was trained ([learning_curves()] reads it). What an earlier training
+#'   has left there keeps its rows as `progress-1.csv`, and so on.
 #' @param checkpoint `NULL`, the default, or the file to keep the training in, such as
 #'   `"training.rds"`.
 #' @param resume Go on with what the file has, if it is there? `TRUE`, the default, or `FALSE`,

@@ -1,4 +1,4 @@
-# The log of a training: a folder with a table that grows, and what was trained.
+# The log of a training: a folder with two tables that grow, and what was trained.
 
 # The columns of progress.csv, as Stable-Baselines3 names them
 # (https://stable-baselines3.readthedocs.io/en/master/common/logger.html).
@@ -31,6 +31,15 @@ log_lines <- function(state, iterations) {
   ))
 }
 
+# A row for each evaluation from this one on.
+evaluation_lines <- function(state, from = 1L) {
+  history <- rows_table(state$history, no_iterations)
+  rows <- rows_table(state$evaluations[seq_len(length(state$evaluations)) >= from], no_evaluations)
+  steps <- evaluation_steps(list(history = history, evaluations = rows))
+  names(rows)[names(rows) == "steps"] <- "eval_steps"
+  csv_lines(cbind(rows["iteration"], steps = steps, rows[-1L]))
+}
+
 # Numbers with as many digits as they need and without an exponent, and nothing for `NA`.
 csv_lines <- function(table) {
   old <- options(scipen = 15)
@@ -49,30 +58,40 @@ csv_lines <- function(table) {
 #' @noRd
 training_log <- function(folder, settings, state, call) {
   table <- file.path(folder, "progress.csv")
+  evaluations <- file.path(folder, "evaluations.csv")
   write_all <- function() {
     replace_content(table, as_lines(log_lines(state, seq_len(state$iteration))))
+    replace_content(evaluations, as_lines(evaluation_lines(state)))
   }
   tryCatch(
     {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
       write_config(file.path(folder, "config.json"), settings)
-      # One that is there when a training begins is another training's.
-      if (state$iteration == 0L && file.exists(table)) file.rename(table, free_name(table))
+      # Those that are there when a training begins are another training's.
+      if (state$iteration == 0L) for (file in c(table, evaluations)) keep_as_earlier(file)
       write_all()
     },
     error = function(cnd) abort_log(folder, cnd, call),
     warning = function(cnd) abort_log(folder, cnd, call)
   )
   logged <- state$iteration
+  evaluated <- length(state$evaluations)
   whole <- TRUE
   failed <- FALSE
   function() {
-    new <- seq_len(state$iteration - logged) + logged
+    new <- log_lines(state, seq_len(state$iteration - logged) + logged)[-1L]
+    new_evaluations <- evaluation_lines(state, evaluated + 1L)[-1L]
     logged <<- state$iteration
+    evaluated <<- length(state$evaluations)
     # A full disk must not end what has trained for hours.
     tryCatch(
       {
-        if (whole) append_lines(table, log_lines(state, new)[-1L]) else write_all()
+        if (whole) {
+          append_lines(table, new)
+          append_lines(evaluations, new_evaluations)
+        } else {
+          write_all()
+        }
         whole <<- TRUE
       },
       error = function(cnd) {
@@ -84,7 +103,9 @@ training_log <- function(folder, settings, state, call) {
   }
 }
 
-append_lines <- function(table, lines) write_bytes(table, as_lines(lines), "ab")
+append_lines <- function(table, lines) {
+  if (length(lines)) write_bytes(table, as_lines(lines), "ab")
+}
 
 abort_log <- function(folder, cnd, call) {
   gym_abort(
@@ -130,6 +151,8 @@ plain_provenance <- function(from) {
   from$started <- format(from$started, "%Y-%m-%dT%H:%M:%S%z")
   from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
 }
+
+keep_as_earlier <- function(file) if (file.exists(file)) file.rename(file, free_name(file))
 
 # "progress-1.csv" for "progress.csv", or the first such name that is free.
 free_name <- function(file) {

@@ -41,6 +41,7 @@ run_training <- function(state, vector_env, settings, progress, call) {
     }
     if (!settings$search && is.null(state$final)) {
       state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
+      state$log()
       state$checkpoint(last = TRUE)
     }
   }

@@ -57,7 +57,21 @@ no_evaluations <- data.frame(
 )
 
 #' @export
-as.data.frame.gym_training <- function(x, row.names = NULL, optional = FALSE, ...) x$history
+as.data.frame.gym_training <- function(x, row.names = NULL, optional = FALSE, ...) {
+  check_no_curve(...)
+  x$history
+}
+
+# Ignored it would give another table than the one that was asked for.
+check_no_curve <- function(..., call = rlang::caller_env()) {
+  if (any(c("curve", "curves") %in% ...names())) {
+    gym_abort(
+      c("`as.data.frame()` has no argument `curve`.",
+        i = "`learning_curves()` gives the evaluations of all seeds and trainings."),
+      class = "gym_error_argument", argument = "curve", call = call
+    )
+  }
+}
 
 #' @export
 print.gym_training <- function(x, ...) {

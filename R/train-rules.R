@@ -35,7 +35,7 @@ unequal_text <- function(what, rules, names) {
   if (length(differ)) {
     texts <- vapply(rules, function(of_one) {
       values <- vapply(differ, value, "", of_one = of_one)
-      paste(if (!identical(names, "target")) differ, values, collapse = ", ")
+      paste(if (identical(names, "target")) values else paste(differ, values), collapse = ", ")
     }, "")
     paste0(what, " differ: ", paste(names(rules), texts, collapse = "; "))
   }

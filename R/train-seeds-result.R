@@ -60,6 +60,7 @@ new_trainings <- function(trainings, settings, elapsed, interrupted) {
 #' @rdname gym_trainings
 #' @export
 as.data.frame.gym_trainings <- function(x, row.names = NULL, optional = FALSE, ...) {
+  check_no_curve(...)
   final <- function(training, name) as.numeric(training$final[[name]] %||% NA_real_)
   column <- function(f, type) unname(vapply(x$trainings, f, type))
   of_final <- function(name) column(function(training) final(training, name), 0)

@@ -92,8 +92,8 @@ test_that("a comparison names other budgets and rules of evaluation", {
   seldom <- one(total_steps = 2e4, eval_episodes = 20, max_steps = 9)
   expect_identical(
     captions(short, seldom),
-    paste("rules of evaluation differ: short max_steps none, eval_episodes 100; seldom max_steps 9,",
-          "eval_episodes 20")
+    paste("rules of evaluation differ: short max_steps none, eval_episodes 100;",
+          "seldom max_steps 9, eval_episodes 20")
   )
   # Targets of several environments are different ones.
   elsewhere <- short

@@ -1,0 +1,125 @@
+#' Plot a comparison of trainings
+#'
+#' Of scores: mean, median and interquartile mean of each training with their intervals
+#' (`type = "scores"`, the default), the performance profiles (`"profile"`), or the probabilities
+#' that one scores higher than another (`"improvement"`). Of steps to a target: the share of the
+#' runs that has reached it, over the steps of the training, with its interval; ticks are runs that
+#' ended without it.
+#'
+#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
+#' `plot()` prints it, too.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object A comparison, as [compare_trainings()] returns it.
+#' @param type What is shown of scores, a string.
+#' @param main The title; `NULL`, the default, names the environments.
+#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
+#' @return A ggplot; of `plot()` invisibly.
+#' @section Errors: `gym_error_argument` for another `type`.
+#' @rdname plot.gym_comparison
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_comparison <- function(object, type = c("scores", "profile", "improvement"), ...) {
+  check_dots_empty(...)
+  type <- check_choice(type[1L], c("scores", "profile", "improvement"), arg = "type")
+  picture <- if (object$by == "steps") {
+    reached_picture(object)
+  } else {
+    switch(type, scores = scores_picture(object), profile = profile_picture(object),
+           improvement = improvement_picture(object))
+  }
+  notes <- if (length(object$notes)) paste0("note: ", object$notes)
+  ids <- unique(object$runs$env_id)
+  picture +
+    picture_labels(
+      if (!anyNA(ids)) paste(ids, collapse = ", "),
+      paste0("line and band, or bar: ", percent_text(object$level), " interval"), caption = notes
+    ) +
+    theme_gym()
+}
+
+score_label <- function(x) if (is.null(x$reference)) "mean return" else "normalised score"
+
+scores_picture <- function(x) {
+  table <- x$table
+  table$statistic <- factor(table$statistic, unique(table$statistic))
+  table$training <- factor(table$training, rev(unique(table$training)))
+  ggplot2::ggplot(table, ggplot2::aes(
+    .data$value, .data$training, xmin = .data$lower, xmax = .data$upper, colour = .data$training
+  )) +
+    ggplot2::geom_pointrange() +
+    ggplot2::facet_wrap(ggplot2::vars(.data$statistic), ncol = 1L) +
+    ggplot2::scale_colour_manual(values = named_colours(unique(x$table$training)), guide = "none") +
+    ggplot2::labs(x = score_label(x), y = NULL)
+}
+
+# Lines with bands over scores or steps.
+shares_picture <- function(rows, x, geom) {
+  labels <- unique(rows$training)
+  rows$training <- factor(rows$training, labels)
+  marks <- lapply(named_colours(labels), function(colour) {
+    list(colour = colour, shape = NA, line = "solid")
+  })
+  ggplot2::ggplot(rows, ggplot2::aes(
+    .data[[x]], .data$share, colour = .data$training, fill = .data$training
+  )) +
+    ggplot2::geom_ribbon(
+      ggplot2::aes(ymin = .data$lower, ymax = .data$upper), rows[!is.na(rows$lower), ],
+      alpha = 0.25, linetype = "blank", show.legend = FALSE
+    ) +
+    geom +
+    ggplot2::scale_fill_manual(values = named_colours(labels), guide = "none") +
+    key_of_marks(marks) +
+    ggplot2::coord_cartesian(ylim = c(0, 1))
+}
+
+profile_picture <- function(x) {
+  shares_picture(x$profile, "score", ggplot2::geom_step(direction = "hv", linewidth = 0.8)) +
+    ggplot2::labs(x = score_label(x), y = "share of runs that score more")
+}
+
+improvement_picture <- function(x) {
+  rows <- x$improvement
+  if (is.null(rows)) {
+    gym_abort("There is one training: none could score higher than another.",
+              class = "gym_error_argument", argument = "type", value = "improvement", call = NULL)
+  }
+  rows$pair <- paste0(rows$training, " > ", rows$than)
+  ggplot2::ggplot(rows, ggplot2::aes(
+    .data$probability, factor(.data$pair, rev(.data$pair)), xmin = .data$lower, xmax = .data$upper
+  )) +
+    ggplot2::geom_vline(xintercept = 0.5, linetype = "dashed", colour = gym_colours[["ink"]]) +
+    ggplot2::geom_pointrange(colour = gym_colours[["blue"]]) +
+    ggplot2::coord_cartesian(xlim = c(0, 1)) +
+    ggplot2::labs(x = "probability of a higher score", y = NULL)
+}
+
+reached_picture <- function(x) {
+  # Steps drawn by corners, so that the band has them, too.
+  rows <- do.call(rbind, lapply(split(x$profile, list(x$profile$training, x$profile$env_id),
+                                      drop = TRUE), function(rows) {
+    n <- nrow(rows)
+    corners <- rows[rep(seq_len(n), each = 2L)[-2L * n], ]
+    corners$steps <- rows$steps[rep(seq_len(n), each = 2L)[-1L]]
+    corners
+  }))
+  failed <- x$runs[!x$runs$reached, ]
+  at <- match_profile(failed, x$profile)
+  failed$share <- x$profile$share[at]
+  failed$training <- factor(failed$training, unique(x$runs$training))
+  picture <- shares_picture(
+    rows[order(match(rows$training, unique(x$runs$training))), ], "steps",
+    ggplot2::geom_path(linewidth = 0.8)
+  )
+  picture +
+    ggplot2::geom_point(data = failed, shape = 3, show.legend = FALSE) +
+    (if (length(unique(rows$env_id)) > 1L) {
+      ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
+    }) +
+    number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
+    ggplot2::labs(x = training_steps_label, y = "share of runs that has reached the target")
+}
+
+match_profile <- function(runs, profile) {
+  key <- function(rows) paste(rows$training, rows$env_id, rows$steps, sep = "\r")
+  match(key(runs), key(profile))
+}

@@ -1,0 +1,235 @@
+# Comparing scores at a common budget, as Agarwal et al. (2021) do.
+
+compare_by_scores <- function(trainings, curves, settings, reference, call) {
+  if (is.null(curves$env_id)) curves$env_id <- NA_character_
+  interrupted <- unlist(lapply(trainings, function(x) {
+    vapply(each_training(x), function(one) isTRUE(one$interrupted), NA)
+  }))
+  found <- run_scores(trainings, curves, settings$steps, call)
+  runs <- found$runs
+  ids <- unique(runs$env_id)
+  check_same_environments(runs, call)
+  if (is.null(reference) && length(ids) > 1L) reference <- default_reference(trainings, call)
+  if (!is.null(reference)) runs$score <- normalised_scores(runs, reference, call)
+  scores <- lapply(split(runs, factor(runs$training, unique(runs$training))), function(own) {
+    split(own$score, factor(own$env_id, ids, exclude = NULL))
+  })
+  generator <- new_generator(settings$seed)
+  drawn <- with_generator(generator, lapply(scores, bootstrap_scores, settings$reps))
+  list(
+    by = "scores", table = score_table(scores, drawn, settings$level), runs = runs,
+    improvement = improvement_table(scores, drawn, settings$level),
+    profile = profile_table(scores, drawn, settings$level), reference = reference,
+    notes = c(
+      found$note,
+      if (any(interrupted)) paste(count_of(sum(interrupted), "interrupted run"), "left out")
+    ),
+    steps = found$steps
+  )
+}
+
+#' Find the score of each run
+#'
+#' Where all have the same budget in steps it is the last evaluation. Otherwise it is read from the
+#' learning curve, from the straight line between two evaluations.
+#' @return A list: `runs`, `steps` and `note`, which is `NULL` or says how scores were found.
+#' @noRd
+run_scores <- function(trainings, curves, steps, call) {
+  cut_short <- unlist(lapply(names(trainings), function(label) {
+    ones <- unlist(lapply(trainings[names(trainings) == label], each_training), recursive = FALSE)
+    ended <- vapply(ones, function(one) isTRUE(one$interrupted), NA)
+    vapply(ones[ended], function(one) paste(label, one$env_id, one$seed), "")
+  }))
+  curves <- curves[!paste(curves$training, curves$env_id, curves$seed) %in% cut_short, ]
+  key <- paste(curves$training, curves$env_id, curves$seed)
+  of_run <- split(curves, factor(key, unique(key)))
+  if (!length(of_run)) {
+    gym_abort("There is nothing to compare: no policy was evaluated.", class = "gym_error_argument",
+              argument = "...", call = call)
+  }
+  ends <- vapply(of_run, function(run) max(run$steps), 0)
+  budgets <- unique(unlist(lapply(trainings, function(x) {
+    lapply(each_training(x), function(one) one$rules$total_steps %||% NA)
+  })))
+  same <- if (length(trainings)) {
+    length(budgets) == 1L && !anyNA(budgets)
+  } else {
+    length(unique(ends)) == 1L
+  }
+  by_end <- is.null(steps) && same
+  at <- steps %||% if (same && length(trainings)) budgets else min(ends)
+  if (at > min(ends)) {
+    gym_abort(
+      c(paste0("Not all runs have taken ", number_text(at), " steps."),
+        i = paste0("The shortest ended after ", number_text(min(ends)), ".")),
+      class = "gym_error_argument", argument = "steps", value = at, call = call
+    )
+  }
+  score <- vapply(of_run, function(run) {
+    run <- run[!duplicated(run$steps, fromLast = TRUE), ]
+    if (by_end || nrow(run) == 1L) {
+      run$mean_return[[which.max(run$steps)]]
+    } else {
+      stats::approx(run$steps, run$mean_return, at, rule = 2L)$y
+    }
+  }, 0)
+  runs <- do.call(rbind, lapply(of_run, function(run) run[1L, c("training", "env_id", "seed")]))
+  list(
+    runs = data.frame(runs, steps = unname(ends), score = unname(score), row.names = NULL),
+    steps = at,
+    note = if (!by_end) paste("scores are those of the learning curves after", number_text(at),
+                              "steps")
+  )
+}
+
+check_same_environments <- function(runs, call) {
+  ids <- lapply(split(runs$env_id, runs$training), function(ids) sort(unique(ids), na.last = TRUE))
+  if (length(unique(ids)) > 1L) {
+    gym_abort(
+      c("All agents must have been trained in the same environments.",
+        x = paste0(names(ids), ": ", vapply(ids, toString, ""), collapse = "; ")),
+      class = "gym_error_argument", argument = "...", call = call
+    )
+  }
+}
+
+# Normalising ---------------------------------------------------------------------------
+
+# What a random policy earns, and the environment's threshold.
+default_reference <- function(trainings, call) {
+  if (!length(trainings)) {
+    gym_abort(
+      c("Scores of several environments are compared when they are normalised.",
+        i = "Give `reference`, a data frame with the columns env_id, low and high."),
+      class = "gym_error_argument", argument = "reference", call = call
+    )
+  }
+  ones <- lapply(trainings, function(x) each_training(x)[[1L]])
+  ones <- ones[!duplicated(vapply(ones, function(one) one$env_id, ""))]
+  do.call(rbind, unname(lapply(ones, function(one) {
+    high <- environment_threshold(one)
+    if (is.null(high)) {
+      gym_abort(
+        c(paste0(one$env_id, " has no threshold, by which scores could be normalised."),
+          i = "Give `reference`, a data frame with the columns env_id, low and high."),
+        class = "gym_error_argument", argument = "reference", call = call
+      )
+    }
+    random <- rlang::exec(
+      evaluate_policy, one$env, policy_random(), !!!one$kwargs, max_steps = one$max_steps, seed = 1,
+      progress = FALSE
+    )
+    data.frame(env_id = one$env_id, low = random$mean_return, high = as.numeric(high))
+  })))
+}
+
+environment_threshold <- function(one) {
+  registered <- if (is.character(one$env)) {
+    known <- env_registry(search = one$env)
+    known$reward_threshold[known$id == one$env]
+  } else {
+    one$env$spec$reward_threshold
+  }
+  threshold <- own_targets[[one$env_id]] %||% registered
+  if (length(threshold) && !is.na(threshold)) threshold
+}
+
+normalised_scores <- function(runs, reference, call) {
+  at <- match(runs$env_id, reference$env_id)
+  span <- reference$high[at] - reference$low[at]
+  if (anyNA(at) || !all(is.finite(span) & span != 0)) {
+    wrong <- runs$env_id[is.na(at) | !is.finite(span) | span == 0][[1L]]
+    gym_abort(
+      paste0("`reference` must have a row for ", wrong, " with two different numbers."),
+      class = "gym_error_argument", argument = "reference", value = reference, call = call
+    )
+  }
+  (runs$score - reference$low[at]) / span
+}
+
+# Statistics ----------------------------------------------------------------------------
+
+# Scores are a list with a vector for each environment. What was drawn is a list with a matrix for
+# each, which has a column for each draw; the scores themselves are such matrices with one column.
+score_statistics <- list(
+  mean = function(each) Reduce(`+`, lapply(each, colMeans)) / length(each),
+  median = function(each) {
+    apply(matrix(vapply(each, colMeans, numeric(ncol(each[[1L]]))), ncol = length(each)), 1L,
+          stats::median)
+  },
+  iqm = function(each) apply(do.call(rbind, each), 2L, mean, trim = 0.25)
+)
+
+bootstrap_scores <- function(scores, reps) {
+  lapply(scores, function(own) {
+    matrix(own[sample.int(length(own), length(own) * reps, replace = TRUE)], ncol = reps)
+  })
+}
+
+as_columns <- function(scores) lapply(scores, as.matrix)
+
+interval_of <- function(values, level) {
+  tail <- (1 - level) / 2
+  stats::quantile(values, c(tail, 1 - tail), names = FALSE)
+}
+
+score_table <- function(scores, drawn, level) {
+  rows <- lapply(names(scores), function(label) {
+    do.call(rbind, lapply(names(score_statistics), function(name) {
+      statistic <- score_statistics[[name]]
+      interval <- interval_of(statistic(drawn[[label]]), level)
+      data.frame(
+        training = label, runs = sum(lengths(scores[[label]])), statistic = name,
+        value = statistic(as_columns(scores[[label]])), lower = interval[[1L]],
+        upper = interval[[2L]]
+      )
+    }))
+  })
+  do.call(rbind, rows)
+}
+
+# How often a run of one scores higher than one of the other: ties count half.
+improvement_probability <- function(x, y) {
+  each <- Map(function(x, y) {
+    wins <- 0
+    for (i in seq_len(nrow(x))) {
+      for (j in seq_len(nrow(y))) wins <- wins + (x[i, ] > y[j, ]) + (x[i, ] == y[j, ]) / 2
+    }
+    wins / (nrow(x) * nrow(y))
+  }, x, y)
+  Reduce(`+`, each) / length(each)
+}
+
+improvement_table <- function(scores, drawn, level) {
+  labels <- names(scores)
+  pairs <- which(outer(seq_along(labels), seq_along(labels), `<`), arr.ind = TRUE)
+  do.call(rbind, lapply(seq_len(nrow(pairs)), function(row) {
+    x <- labels[[pairs[row, 1L]]]
+    y <- labels[[pairs[row, 2L]]]
+    interval <- interval_of(improvement_probability(drawn[[x]], drawn[[y]]), level)
+    data.frame(
+      training = x, than = y,
+      probability = improvement_probability(as_columns(scores[[x]]), as_columns(scores[[y]])),
+      lower = interval[[1L]], upper = interval[[2L]]
+    )
+  }))
+}
+
+# At how many scores a profile is calculated.
+profile_places <- 101L
+
+profile_table <- function(scores, drawn, level) {
+  range <- range(unlist(scores))
+  at <- seq(range[[1L]], range[[2L]], length.out = if (diff(range) > 0) profile_places else 1L)
+  do.call(rbind, lapply(names(scores), function(label) {
+    all <- unlist(scores[[label]])
+    all_drawn <- do.call(rbind, drawn[[label]])
+    bounds <- vapply(at, function(score) {
+      interval_of(colMeans(all_drawn > score), level)
+    }, numeric(2))
+    data.frame(
+      training = label, score = at, share = vapply(at, function(score) mean(all > score), 0),
+      lower = bounds[1L, ], upper = bounds[2L, ]
+    )
+  }))
+}

@@ -1,0 +1,225 @@
+#' Compare trainings
+#'
+#' Says how agents compare over many seeds, with intervals: their scores at a common budget, or the
+#' steps that they needed to a target.
+#'
+#' # Scores
+#'
+#' Trainings without a target (`target = Inf`) are compared by their scores, the mean returns of the
+#' final evaluations. Where budgets differ, they are compared at the smallest number of steps that
+#' all have taken, by their learning curves, and `print()` says so. The statistics are those of
+#' Agarwal et al. (2021):
+#'
+#' * `mean` of all scores, `median` of the environments' mean scores (with one environment the mean
+#'   again), and `iqm`, the interquartile mean: that of the middle half of all runs, which a few
+#'   lucky or failed seeds change little;
+#' * the probability of improvement, that a run of one agent scores higher than one of another, the
+#'   mean over the environments;
+#' * the performance profile: which share of the runs scores more than each number.
+#'
+#' Intervals are percentiles of a stratified bootstrap, which draws runs anew in each environment.
+#'
+#' In several environments scores are normalised, so that 0 is `low` and 1 is `high` of `reference`.
+#' By default these are what a random policy earns (100 episodes, seed 1) and the environment's
+#' threshold, see [train_agent()].
+#'
+#' # Steps to a target
+#'
+#' Trainings that stop at a target all score about that target. They are compared by the steps of
+#' the training after which they reached it. Of a run that did not reach it only is known that it
+#' needs more steps than it had: it is censored, and the share that has reached the target after so
+#' many steps is estimated by Kaplan and Meier (1958), with Greenwood's variance on the scale of
+#' log(-log).
+#'
+#' @param ... Trainings of class [gym_trainings] or `gym_training`, by name or not. Those of one
+#'   agent in several environments have the same name. Or one data frame as [learning_curves()]
+#'   returns it, with logs of other programs, compared by scores.
+#' @param steps The number of steps at which scores are compared; `NULL`, the default, is the common
+#'   budget.
+#' @param reference `NULL`, the default, or a data frame with the columns `env_id`, `low` and
+#'   `high`, which normalises scores also in one environment.
+#' @param reps How many times the bootstrap draws, a whole number of at least 1.
+#' @param level The confidence level of the intervals, a number between 0 and 1.
+#' @param seed A whole number that fixes the bootstrap, or `NULL`, the default, to draw from the
+#'   session's generator.
+#' @param x A comparison.
+#' @param row.names,optional Not used.
+#' @return An object of class `gym_comparison`, a list with the elements
+#'   \describe{
+#'     \item{by}{`"scores"` or `"steps"`.}
+#'     \item{table}{A data frame, which `as.data.frame()` returns: for scores a row for each
+#'       training and statistic, `training`, `runs` (an integer), `statistic` (`"mean"`, `"median"`,
+#'       `"iqm"`), `value`, `lower`, `upper`; for steps a row for each training and environment,
+#'       `training`, `env_id`, `runs`, `reached` (how many, an integer), `median`, `lower`, `upper`
+#'       (steps, `NA` where fewer than half have reached the target).}
+#'     \item{runs}{A data frame with a row for each run: `training`, `env_id`, `seed`, `steps`, and
+#'       `score`, or `reached` (a logical).}
+#'     \item{improvement}{For scores a data frame with a row for each pair: `training`, `than`,
+#'       `probability`, `lower`, `upper`.}
+#'     \item{profile}{A data frame of the curves that [plot()][plot.gym_comparison()] shows:
+#'       `training`, `score` (or `env_id` and `steps`), `share`, `lower`, `upper`.}
+#'     \item{reference}{The data frame that normalised the scores, or `NULL`.}
+#'     \item{notes}{Strings: what makes the comparison unequal.}
+#'     \item{steps, level, reps, seed}{As given, found or drawn.}
+#'   }
+#' @section Errors: `gym_error_argument` for trainings that cannot be compared. The warning
+#'   `gym_warning_seeds` says that there are fewer than five seeds: then intervals mean little.
+#' @references R. Agarwal, M. Schwarzer, P. S. Castro, A. Courville and M. G. Bellemare (2021), Deep
+#'   reinforcement learning at the edge of the statistical precipice, NeurIPS 34,
+#'   <https://arxiv.org/abs/2108.13264>; code: <https://github.com/google-research/rliable>.
+#'   E. L. Kaplan and P. Meier (1958), Nonparametric estimation from incomplete observations,
+#'   Journal of the American Statistical Association 53, 457-481.
+#' @seealso [learning_curves()]
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' train <- function(agent) {
+#'   train_agent(agent, "CartPole-v1", total_steps = 3000, target = Inf, seeds = 1:5)
+#' }
+#' ars <- train(agent_ars())
+#' hill <- train(agent_hill_climb(candidates = 16))
+#' compared <- compare_trainings(ARS = ars, `hill climbing` = hill, seed = 1)
+#' compared
+#' plot(compared)
+compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, level = 0.95,
+                              seed = NULL) {
+  call <- rlang::current_env()
+  check_number(steps, min = 0, allow_null = TRUE)
+  check_reference(reference, call)
+  check_count(reps)
+  check_seed(seed)
+  if (!is_number(level) || level <= 0 || level >= 1) {
+    abort_argument(level, "a number between 0 and 1", "level", call)
+  }
+  given <- name_results(list(...), as.list(substitute(list(...)))[-1L])
+  curves <- if (length(given) == 1L && is.data.frame(given[[1L]])) given[[1L]]
+  trainings <- if (is.null(curves)) {
+    given_trainings(given, call, unique = FALSE)
+  } else {
+    check_curves(curves, call)
+    list()
+  }
+  if (!length(trainings) && !NROW(curves)) {
+    gym_abort("There is nothing to compare: give trainings.", class = "gym_error_argument",
+              argument = "...", call = call)
+  }
+  settings <- list(
+    steps = steps, level = level, reps = as.integer(reps), seed = seed %||% draw_seed()
+  )
+  compared <- if (stop_at_target(trainings, call)) {
+    compare_by_steps(trainings, level)
+  } else {
+    compare_by_scores(trainings, curves %||% curves_of(trainings), settings, reference, call)
+  }
+  settings["steps"] <- compared["steps"]
+  compared$notes <- c(compared$notes, unequal_rules(trainings))
+  compared$steps <- NULL
+  few <- min(runs_each(compared$runs))
+  if (few < 5L) warn_few_seeds(few)
+  structure(c(compared, settings), class = "gym_comparison")
+}
+
+curves_of <- function(trainings) {
+  do.call(rbind, unname(Map(function(x, label) {
+    rows <- curve_rows(x, label, NULL)
+    cbind(training = rep(label, nrow(rows)), rows)
+  }, trainings, names(trainings))))
+}
+
+each_training <- function(x) if (inherits(x, "gym_trainings")) unname(x$trainings) else list(x)
+
+# All or none: otherwise there is nothing that both kinds could be compared by.
+stop_at_target <- function(trainings, call) {
+  stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)
+  if (any(stops) && !all(stops)) {
+    gym_abort(
+      c(paste0("Some trainings stop at a target (", toString(names(trainings)[stops]),
+               "), and others do not (", toString(names(trainings)[!stops]), ")."),
+        i = "Train all with `target = Inf` to compare scores, or all with the same target."),
+      class = "gym_error_argument", argument = "...", call = call
+    )
+  }
+  any(stops)
+}
+
+# How many runs each training has in each environment.
+runs_each <- function(runs) table(paste(runs$training, runs$env_id, sep = "\r"))
+
+warn_few_seeds <- function(few) {
+  rlang::warn(
+    c(paste0("There ", if (few == 1L) "is " else "are ", count_of(few, "seed"),
+             " of a training: intervals of so few mean little."),
+      i = "Train with at least five, better ten or more."),
+    class = "gym_warning_seeds"
+  )
+}
+
+check_curves <- function(curves, call) {
+  missing <- setdiff(c("training", "seed", "steps", "mean_return"), names(curves))
+  if (length(missing)) {
+    must <- paste0("a table as `learning_curves()` returns it, with a column `", missing[[1L]], "`")
+    abort_argument(curves, must, "...", call)
+  }
+}
+
+check_reference <- function(reference, call) {
+  columns <- c("env_id", "low", "high")
+  if (!is.null(reference) && !(is.data.frame(reference) && all(columns %in% names(reference)))) {
+    abort_argument(reference, "NULL, or a data frame with the columns env_id, low and high",
+                   "reference", call)
+  }
+}
+
+#' @rdname compare_trainings
+#' @export
+as.data.frame.gym_comparison <- function(x, row.names = NULL, optional = FALSE, ...) x$table
+
+#' @export
+print.gym_comparison <- function(x, ...) {
+  cat(comparison_lines(x), sep = "\n")
+  invisible(x)
+}
+
+comparison_lines <- function(x) {
+  scores <- x$by == "scores"
+  ids <- unique(x$runs$env_id)
+  seeds <- unique(range(runs_each(x$runs)))
+  where <- if (length(ids) > 1L) count_of(length(ids), "environment") else ids
+  table <- x$table
+  interval <- function(value, lower, upper) {
+    text <- number_text_each
+    paste0(text(value), " [", text(lower), ", ", text(upper), "]")
+  }
+  shown <- if (scores) {
+    each <- split(table, factor(table$statistic, unique(table$statistic)))
+    columns <- lapply(each, function(rows) interval(rows$value, rows$lower, rows$upper))
+    data.frame(columns, row.names = unique(table$training))
+  } else {
+    columns <- c(
+      if (length(ids) > 1L) table["env_id"],
+      list(
+        reached = paste(table$reached, "of", table$runs),
+        `median steps` = interval(table$median, table$lower, table$upper)
+      )
+    )
+    data.frame(columns, check.names = FALSE, row.names = make.unique(table$training, " "))
+  }
+  c(
+    paste0(
+      if (scores) "Scores" else "Steps to the target", if (!anyNA(where)) paste0(" in ", where),
+      if (scores) paste0(" after ", count_of(round(x$steps), "step")), ", ",
+      paste(seeds, collapse = " to "), " seed", if (max(seeds) > 1L) "s", " each"
+    ),
+    if (!is.null(x$reference)) "Normalised: 0 is low, 1 is high of the reference",
+    utils::capture.output(print(shown)),
+    paste0(
+      percent_text(x$level), " intervals: ",
+      if (scores) paste0("stratified bootstrap, ", count_of(x$reps, "draw")) else "Kaplan-Meier"
+    ),
+    if (NROW(x$improvement)) {
+      pair <- x$improvement
+      paste0("Probability that ", pair$training, " scores higher than ", pair$than, ": ",
+             interval(pair$probability, pair$lower, pair$upper))
+    },
+    paste0("Note: ", x$notes, recycle0 = TRUE)
+  )
+}

@@ -1,0 +1,74 @@
+# Results as they were given to a function that compares them, with their names.
+
+#' Take the arguments of the function that calls this, each result with a name
+#'
+#' Results of which several can be compared have a name in the picture: that of the argument, of the
+#' variable, or else a label of their own. What is given beside them needs a name.
+#' @param first The function's first argument, a symbol. Like the others it may have another name,
+#'   that of its row or line: then it is missing.
+#' @noRd
+arguments_as_written <- function(first, frame = rlang::caller_env(), call = frame) {
+  listed <- as.call(c(quote(list), if (!eval(call("missing", first), frame)) first, quote(...)))
+  values <- eval(listed, frame)
+  if (!any(vapply(values, is_comparable, NA))) {
+    return(values)
+  }
+  written <- as.list(eval(call("substitute", listed), frame))[-1L]
+  for (value in values[!nzchar(rlang::names2(values))]) {
+    if (!inherits(value, c("gym_rollout", "gym_training", "gym_trainings", "gym_searches"))) {
+      must <- "a result as the others, or have a name, such as `type = `"
+      abort_argument(value, must, "...", call)
+    }
+  }
+  name_results(values, written)
+}
+
+# What has no name gets that of its variable, or else a label of its own.
+name_results <- function(values, written) {
+  names <- rlang::names2(values)
+  for (i in which(!nzchar(names))) {
+    variable <- is.name(written[[i]])
+    names[[i]] <- if (variable) as.character(written[[i]]) else result_label(values[[i]])
+  }
+  stats::setNames(values, names)
+}
+
+is_comparable <- function(x) {
+  inherits(x, c("gym_rollout", "gym_training", "gym_trainings")) && !inherits(x, "gym_search")
+}
+
+result_label <- function(x) {
+  if (inherits(x, "gym_rollout")) {
+    policy_label(x$policy)
+  } else if (rlang::is_string(x)) {
+    tools::file_path_sans_ext(basename(x))
+  } else if (inherits(x, c("gym_training", "gym_trainings", "gym_searches"))) {
+    training_label(x)
+  } else {
+    ""
+  }
+}
+
+training_label <- function(x) sub(":.*", "", format(x$agent))
+
+#' Tell the results among the arguments of a picture from the others, of which there must be none
+#' @return The results, a list with names.
+#' @noRd
+only_results <- function(values, class, call = rlang::caller_env(), unique = TRUE) {
+  are <- vapply(values, inherits, NA, class)
+  rlang::exec(check_dots_empty, !!!values[!are], call = call)
+  if (unique) names(values) <- make.unique(rlang::names2(values), " ")
+  values[are]
+}
+
+given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {
+  if (any(vapply(values, inherits, NA, c("gym_search", "gym_searches")))) {
+    gym_abort(
+      c(paste("A search by `search_random()` has no evaluations that could be compared with those",
+              "of a training."),
+        i = "`train_agent(agent_random(), ...)` has."),
+      class = "gym_error_argument", argument = "...", call = call
+    )
+  }
+  only_results(values, c("gym_training", "gym_trainings"), call, unique)
+}

@@ -1,0 +1,174 @@
+# Trainings as they would be, each with a final evaluation after `steps`.
+trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, solved = FALSE,
+                           total_steps = 100, curve = NULL) {
+  trainings <- Map(function(score, steps, solved, seed) {
+    structure(
+      list(
+        history = data.frame(steps = c(steps / 2, steps)),
+        evaluations = data.frame(
+          iteration = 0:2, kind = c("curve", "curve", "final"),
+          mean_return = c(0, curve %||% score, score), se = 0, lower = 0, upper = 0, episodes = 9L
+        ),
+        agent = agent_ars(), target = target, env_id = env_id, seed = seed, steps = steps,
+        solved = solved, interrupted = FALSE, rules = list(total_steps = total_steps)
+      ),
+      class = "gym_training"
+    )
+  }, scores, steps, solved, seq_along(scores))
+  structure(
+    list(trainings = trainings, agent = agent_ars(), env_id = env_id, target = target),
+    class = "gym_trainings"
+  )
+}
+
+rliable <- function() {
+  reference <- jsonlite::read_json(testthat::test_path("rliable.json"), simplifyVector = TRUE)
+  reference$lists <- lapply(reference$scores, function(runs) asplit(runs, 2L))
+  reference
+}
+
+test_that("point estimates are those of rliable", {
+  reference <- rliable()
+  scores <- lapply(reference$lists, as_columns)
+  for (name in names(scores)) {
+    point <- vapply(score_statistics, function(statistic) statistic(scores[[name]]), 0)
+    expect_equal(unname(point), reference$points[[name]], tolerance = 1e-12)
+  }
+  expect_equal(improvement_probability(scores$x, scores$y), reference$improvement,
+               tolerance = 1e-12)
+  for (name in names(scores)) {
+    all <- unlist(reference$lists[[name]])
+    share <- vapply(reference$taus, function(tau) mean(all > tau), 0)
+    expect_equal(share, reference$profiles[[name]], tolerance = 1e-12)
+  }
+})
+
+test_that("interval ends are those of rliable within Monte Carlo error", {
+  reference <- rliable()
+  ids <- c("A", "B", "C")
+  trainings <- unlist(lapply(c("x", "y"), function(name) {
+    Map(function(scores, id) trainings_with(scores, id), reference$lists[[name]], ids)
+  }), recursive = FALSE)
+  names(trainings) <- rep(c("x", "y"), each = 3)
+  unit <- data.frame(env_id = ids, low = 0, high = 1)
+  compared <- rlang::exec(compare_trainings, !!!trainings, reference = unit, reps = 4000, seed = 1)
+  for (name in c("x", "y")) {
+    own <- compared$table[compared$table$training == name, ]
+    expect_equal(own$value, reference$points[[name]], tolerance = 1e-12)
+    ends <- rbind(own$lower, own$upper)
+    width <- diff(reference$intervals[[name]])
+    # The standard error of an end is about 0.02 of the width.
+    expect_lt(max(abs(ends - reference$intervals[[name]]) / rep(width, each = 2)), 0.07)
+  }
+  pair <- compared$improvement
+  expect_equal(pair$probability, reference$improvement, tolerance = 1e-12)
+  expect_lt(max(abs(c(pair$lower, pair$upper) - reference$improvement_interval)), 0.02)
+  profile <- compared$profile[compared$profile$training == "x", ]
+  expect_true(all(profile$lower <= profile$share & profile$share <= profile$upper))
+})
+
+test_that("a comparison has a table and prints, and a seed fixes it", {
+  a <- trainings_with(c(10, 12, 14, 16, 30))
+  b <- trainings_with(c(1, 2, 3, 4, 5))
+  compared <- compare_trainings(a, b, seed = 7)
+  expect_identical(as.data.frame(compared)$value[1:3], c(16.4, 16.4, 14))
+  expect_identical(compared$improvement$probability, 1)
+  expect_identical(compared$steps, 100)
+  expect_identical(compare_trainings(a, b, seed = 7)$table, compared$table)
+  set.seed(3)
+  state <- .Random.seed
+  compare_trainings(a, b, seed = 7)
+  expect_identical(.Random.seed, state)
+  expect_output(print(compared), "Scores in A after 100 steps, 5 seeds each", fixed = TRUE)
+  expect_output(print(compared), "Probability that a scores higher than b: 1 [1, 1]", fixed = TRUE)
+  expect_length(compared$notes, 0)
+})
+
+test_that("few seeds are warned of", {
+  few <- trainings_with(1:4)
+  expect_warning(compare_trainings(few, again = few, seed = 1), "4 seeds",
+                 class = "gym_warning_seeds")
+})
+
+test_that("with other budgets scores are those of the curves at the common number of steps", {
+  short <- trainings_with(rep(10, 5))
+  long <- trainings_with(rep(20, 5), steps = 400, total_steps = 400, curve = 4)
+  compared <- compare_trainings(short, long, seed = 1)
+  expect_identical(compared$steps, 100)
+  # From 0 to 4 in 200 steps.
+  expect_identical(unique(compared$runs$score[compared$runs$training == "long"]), 2)
+  expect_match(compared$notes, "learning curves after 100 steps", all = FALSE)
+  expect_match(compared$notes, "budgets differ", all = FALSE)
+  expect_error(compare_trainings(short, long, steps = 101), "100", class = "gym_error_argument")
+  # A budget that was used up by more or less: the final evaluations count.
+  a <- trainings_with(1:5, steps = c(100, 120, 110, 100, 105), curve = 99)
+  expect_identical(compare_trainings(a, seed = 1)$table$value[[1]], 3)
+})
+
+test_that("a table of curves is compared, and the environments must be the same", {
+  curves <- data.frame(training = rep(c("p", "q"), each = 5), seed = 1:5, steps = 50,
+                       mean_return = c(1:5, 2:6))
+  compared <- compare_trainings(curves, seed = 1)
+  expect_identical(compared$table$value[c(1, 4)], c(3, 4))
+  expect_error(compare_trainings(curves[-3]), "column", class = "gym_error_argument")
+  a <- trainings_with(1:5)
+  expect_error(compare_trainings(a, other = trainings_with(1:5, "B")), "same environments",
+               class = "gym_error_argument")
+  expect_error(compare_trainings(), class = "gym_error_argument")
+})
+
+test_that("scores of several environments are between random policy and threshold", {
+  a <- trainings_with(rep(3, 5), "Fake-v0")
+  b <- trainings_with(rep(30, 5), "Pendulum-v1")
+  envs <- list(`Fake-v0` = fake_environment(reward_threshold = 5), `Pendulum-v1` =
+                 fake_environment(id = "Pendulum-v1"))
+  with_env <- function(x) {
+    x$trainings <- lapply(x$trainings, function(one) {
+      one$env <- envs[[one$env_id]]
+      one
+    })
+    x
+  }
+  compared <- compare_trainings(x = with_env(a), x = with_env(b), seed = 1)
+  # A step earns 1, an episode has three.
+  expect_identical(compared$reference,
+                   data.frame(env_id = c("Fake-v0", "Pendulum-v1"), low = 3, high = c(5, -200)))
+  expect_equal(compared$runs$score, rep(c(0, (30 - 3) / (-200 - 3)), each = 5))
+  wrong <- data.frame(env_id = "Fake-v0", low = 1, high = 1)
+  expect_error(compare_trainings(x = a, x = b, reference = wrong), "Fake-v0",
+               class = "gym_error_argument")
+})
+
+test_that("trainings that stop at a target are compared by steps, failures censored", {
+  quick <- trainings_with(rep(9, 6), target = 9, steps = c(10, 20, 30, 30, 50, 60),
+                          solved = c(TRUE, TRUE, TRUE, FALSE, TRUE, FALSE))
+  slow <- trainings_with(rep(9, 6), target = 9, steps = c(40, 60, 60, 60, 60, 60),
+                         solved = c(TRUE, rep(FALSE, 5)))
+  compared <- compare_trainings(quick, slow)
+  expect_identical(compared$by, "steps")
+  expect_identical(compared$table$reached, c(4L, 1L))
+  expect_identical(compared$table$median, c(30, NA))
+  curve <- kaplan_meier(c(10, 20, 30, 30, 50, 60), c(TRUE, TRUE, TRUE, FALSE, TRUE, FALSE), 0.95)
+  expect_equal(curve$survival, c(1, 5 / 6, 4 / 6, 3 / 6, 1 / 4, 1 / 4))
+  expect_output(print(compared), "Steps to the target in A, 6 seeds each", fixed = TRUE)
+  expect_output(print(compared), "4 of 6")
+  inf <- trainings_with(1:5)
+  expect_error(compare_trainings(quick, inf), "target = Inf", class = "gym_error_argument")
+  other <- trainings_with(rep(9, 6), target = 8, steps = 10, solved = TRUE)
+  expect_match(compare_trainings(quick, other)$notes, "targets differ: quick 9; other 8",
+               all = FALSE)
+})
+
+test_that("the estimate of Kaplan and Meier is that of package survival", {
+  steps <- c(3, 5, 5, 8, 8, 10, 12, 12, 15, 20)
+  reached <- c(1, 1, 0, 1, 1, 0, 1, 0, 1, 0) == 1
+  own <- kaplan_meier(steps, reached, 0.9)
+  # survfit(Surv(steps, reached) ~ 1, conf.type = "log-log", conf.int = 0.9), survival 3.5-3
+  expect_equal(own$steps, c(0, 3, 5, 8, 10, 12, 15, 20))
+  expect_equal(own$survival[-1], c(0.9, 0.8, 0.571428571, 0.571428571, 0.428571429, 0.214285714,
+                                   0.214285714), tolerance = 1e-8)
+  expect_equal(own$lower[-1], c(0.579140925, 0.488830228, 0.272695358, 0.272695358, 0.154685368,
+                                0.025202831, 0.025202831), tolerance = 1e-8)
+  expect_equal(own$upper[-1], c(0.979881719, 0.932796125, 0.785832901, 0.785832901, 0.680682461,
+                                0.524825691, 0.524825691), tolerance = 1e-8)
+})

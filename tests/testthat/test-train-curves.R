@@ -1,0 +1,119 @@
+quiet_trainings <- function(..., seeds = 1:2) {
+  suppressMessages(train_agent(
+    agent_ars(3, 2), fake_environment(reward = first_action), iterations = 4, seeds = seeds,
+    target = Inf, eval_every = 2, eval_episodes = 4, max_steps = 3, ...
+  ))
+}
+
+test_that("all evaluations of all trainings and seeds are one table", {
+  ars <- quiet_trainings()
+  curves <- learning_curves(ars, one = ars$trainings[["2"]])
+  expect_identical(names(curves), c("training", names(no_curve)))
+  expect_identical(unique(curves$training), c("ars", "one"))
+  one <- ars$trainings[["2"]]
+  of_one <- curves[curves$training == "one", ]
+  expect_identical(of_one$mean_return, one$evaluations$mean_return)
+  expect_identical(of_one$steps, evaluation_steps(one))
+  expect_identical(of_one$kind, c("curve", "curve", "curve", "final"))
+  expect_identical(unique(of_one$seed), 2)
+  expect_identical(curves[curves$training == "ars" & curves$seed == 2, -1], of_one[-1],
+                   ignore_attr = TRUE)
+  expect_identical(nrow(learning_curves()), 0L)
+})
+
+test_that("a log has the same evaluations as the result", {
+  folder <- withr::local_tempdir()
+  ars <- quiet_trainings(log = folder)
+  curves <- learning_curves(ars, log = folder)
+  log <- curves[curves$training == "log", -1]
+  expect_equal(log, curves[curves$training == "ars", -1], ignore_attr = TRUE)
+  expect_identical(unique(learning_curves(file.path(folder, "seed-2"))$seed), 2)
+  # Also where the training went on, and where another began.
+  path <- local_checkpoint()
+  again <- withr::local_tempdir()
+  for (iterations in c(1, 4)) {
+    one <- suppressMessages(train_agent(
+      agent_ars(3, 2), fake_environment(reward = first_action), iterations = iterations, seed = 2,
+      target = Inf, eval_every = 2, eval_episodes = 4, max_steps = 3, log = again,
+      checkpoint = path
+    ))
+  }
+  expect_equal(learning_curves(one)[-1], learning_curves(again)[-1])
+  quiet_trainings(log = folder, seeds = 1)
+  expect_true(file.exists(file.path(folder, "seed-1", "evaluations-1.csv")))
+})
+
+test_that("a table with curves is refused with the function that makes it", {
+  ars <- quiet_trainings()
+  expect_error(as.data.frame(ars, curve = TRUE), "learning_curves", class = "gym_error_argument")
+  expect_error(as.data.frame(ars$trainings[[1]], curve = TRUE), "learning_curves",
+               class = "gym_error_argument")
+})
+
+test_that("logs of Stable-Baselines3 are read", {
+  folder <- withr::local_tempdir()
+  inside <- function(...) file.path(folder, ...)
+  dir.create(inside("ppo-seed3"))
+  # Rows of the evaluation callback have no rollout.
+  writeLines(c(
+    "eval/mean_reward,eval/mean_ep_length,time/total_timesteps,rollout/ep_rew_mean",
+    "20.5,20,1000,", ",,2048,33", "60,60,2000,"
+  ), inside("ppo-seed3", "progress.csv"))
+  curves <- learning_curves(PPO = inside("ppo-seed3"))
+  expect_identical(curves$steps, c(1000, 2000))
+  expect_identical(curves$mean_return, c(20.5, 60))
+  expect_identical(curves$kind, c("curve", "curve"))
+  expect_identical(curves$seed, c(3, 3))
+  # Two environments side by side: episodes in the order of their ends.
+  dir.create(inside("two"))
+  writeLines(c("#{\"t_start\": 100.5, \"env_id\": \"CartPole-v1\"}", "r,l,t", "11.0,11,0.5",
+               "9.0,9,3.0"), inside("two", "0.monitor.csv"))
+  writeLines(c("#{\"t_start\": 101.0, \"env_id\": \"CartPole-v1\"}", "r,l,t", "20.0,20,1.0"),
+             inside("two", "1.monitor.csv"))
+  curves <- learning_curves(inside("two"))
+  expect_identical(curves$mean_return, c(11, 20, 9))
+  expect_identical(curves$steps, c(11, 31, 40))
+  expect_identical(unique(curves$kind), "training")
+  expect_identical(unique(curves$env_id), "CartPole-v1")
+  # Without evaluations, and without a monitor.
+  writeLines(c("time/total_timesteps,rollout/ep_rew_mean", "2048,33"), inside("progress.csv"))
+  expect_identical(learning_curves(inside("progress.csv"))$kind, "training")
+})
+
+test_that("CSV files of CleanRL are read", {
+  folder <- withr::local_tempdir()
+  inside <- function(...) file.path(folder, ...)
+  run <- function(seed) paste0("CartPole-v1__ppo__", seed, "__1700000000")
+  columns <- paste0(run(c(1, 7)), " - charts/episodic_return")
+  writeLines(c(
+    paste0("\"global_step\",", paste0("\"", rep(columns, each = 2), c("", "__MAX"), "\"",
+                                      collapse = ",")),
+    "10,10,99,,", "30,,,20,99", "60,40,99,30,99"
+  ), inside("wandb.csv"))
+  curves <- learning_curves(ppo = inside("wandb.csv"))
+  expect_identical(curves$seed, c(1, 1, 7, 7))
+  expect_identical(curves$steps, c(10, 60, 30, 60))
+  expect_identical(curves$mean_return, c(10, 40, 20, 30))
+  expect_identical(unique(curves$env_id), "CartPole-v1")
+  # TensorBoard's, a file for each run, in a folder.
+  dir.create(inside("board"))
+  for (seed in 2:3) {
+    writeLines(c("Wall time,Step,Value", "1700000001.5,22,22.0"),
+               inside("board", paste0("run-", run(seed), "-tag-charts_episodic_return.csv")))
+  }
+  curves <- learning_curves(inside("board"))
+  expect_identical(curves$seed, c(2, 3))
+  expect_identical(unique(curves$env_id), "CartPole-v1")
+  writeLines(c("_step,charts/episodic_return", "5,1", "9,2"), inside("history.csv"))
+  expect_identical(learning_curves(inside("history.csv"))$steps, c(5, 9))
+})
+
+test_that("what is no log, or no training, is refused", {
+  folder <- withr::local_tempdir()
+  writeLines("a,b", file.path(folder, "other.csv"))
+  for (wrong in list(folder, file.path(folder, "other.csv"), "no-such-folder", 3)) {
+    expect_error(learning_curves(x = wrong), class = "gym_error_argument")
+  }
+  search <- search_random(fake_environment(), rounds = 2, seed = 1)
+  expect_error(learning_curves(search), "agent_random", class = "gym_error_argument")
+})
